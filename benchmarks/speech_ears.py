@@ -178,7 +178,7 @@ def _other(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> dict[str
 def _hear(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> Run:
     """Let a stream be heard as fast as it can be."""
     stream, cpu = StreamClock(), MonotonicClock()
-    hearing = open_hearing(ears.recogniser, ears.why, profile, stream)
+    hearing = open_hearing(ears, profile, stream)
     began_ns = cpu.now_ns()
     told = list(_told(hearing, stream, sound))
     took_s = (cpu.now_ns() - began_ns) / NS_PER_S

@@ -62,7 +62,7 @@ class StopListening:
         self._clock = StreamClock()
         selected = select_recogniser(shelf, profile, 0)
         self.why_no_words = selected.why
-        self._asr = open_hearing(selected.recogniser, selected.why, profile, self._clock)
+        self._asr = open_hearing(selected, profile, self._clock)
         self._count = 0
         self.scores: list[tuple[float, float]] = []
         self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}

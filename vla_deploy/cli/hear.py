@@ -17,10 +17,12 @@ from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.devices import linked_microphone
+from vla_deploy.speech.errors import SpeechError
+from vla_deploy.speech.event_publisher import evidence
 from vla_deploy.speech.microphone import Microphone
-from vla_deploy.speech.model_selection import open_best
+from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recording import StreamClock, described, hear_recording, open_hearing
+from vla_deploy.speech.recording import StreamClock, hear_recording, open_hearing
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -52,13 +54,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Print each phrase with what becomes of it; no robot is needed, and none hears of it."""
     profile = _profile(arguments)
     base: Path = arguments.runtime_base or default_base()
-    recogniser = open_best(ModelShelf.of_base(base, MonotonicClock()), profile, 0)
+    selected = select_recogniser(ModelShelf.of_base(base, MonotonicClock()), profile, 0)
+    recogniser = selected.recogniser
+    if recogniser is None:
+        raise SpeechError(selected.why)
     for notice in recogniser.notices:
         print(f"vla-deploy: degraded: {notice}", file=sys.stderr)
     clock = StreamClock()
     live: Clock = MonotonicClock()
     used = live if arguments.microphone else clock
-    hearing = open_hearing(recogniser, "", profile, used, arguments.words)
+    hearing = open_hearing(selected, profile, used, arguments.words)
     try:
         if arguments.microphone:
             return _listen(arguments, hearing, live)
@@ -78,7 +83,7 @@ def _profile(arguments: argparse.Namespace) -> Profile:
 
 def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
     if arguments.json:
-        print(json.dumps([described(heard) for heard in phrases], indent=2))
+        print(json.dumps([_described(heard) for heard in phrases], indent=2))
         return 0
     for heard in phrases:
         print(_line(heard))
@@ -98,7 +103,7 @@ def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -
     deadline_ns = began_ns + round((arguments.seconds or 1e9) * NS_PER_S)
     try:
         for heard in _live(microphone, hearing, clock, deadline_ns):
-            told = described(heard)
+            told = _described(heard)
             since_s = began_ns / NS_PER_S
             told |= {key: round(told[key] - since_s, 3) for key in ("began_s", "ended_s")}
             print(json.dumps(told) if arguments.json else _line(heard, began_ns), flush=True)
@@ -134,3 +139,15 @@ def _line(heard: HeardPhrase, since_ns: int = 0) -> str:
         f"{began_s:7.2f} to {ended_s:.2f} s  {heard.judgement.verdict:<8} "
         f"{heard.confidence:>4.0%}  {heard.text!r}{reason}"
     )
+
+
+def _described(heard: HeardPhrase) -> dict[str, Any]:
+    """Return what was heard as JSON takes it, its times in seconds since the stream began."""
+    return {
+        "began_s": round(heard.phrase.began_ns / NS_PER_S, 3),
+        "ended_s": round(heard.phrase.ended_ns / NS_PER_S, 3),
+        "text": heard.text,
+        "verdict": str(heard.judgement.verdict),
+        "reason": heard.judgement.reason,
+        **evidence(heard),
+    }

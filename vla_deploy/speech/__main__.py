@@ -4,19 +4,20 @@ import sys
 from typing import Final
 
 from platforms import load_profile
-from vla_deploy.aside import background, beside
+from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.devices import linked_microphone, linked_speaker
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.listener import build_page_stop_words, build_stop_words
+from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
 from vla_deploy.speech.voice.robot_voice import build_voice
 
 SYNTHESIS_S: Final = 0.1
 RECOGNITION_S: Final = 0.25
 """What a sentence takes, of simulated time."""
+LOADING_S: Final = 1.0
 
 
 def build(context: NodeContext) -> SpeechNode:
@@ -33,10 +34,10 @@ def build(context: NodeContext) -> SpeechNode:
         profile,
         linked_microphone(robot, links, clock),
         beside("recogniser", clock, RECOGNITION_S),
-        background(clock),
+        beside("loader", clock, LOADING_S),
         voice=voice,
         stop_words=build_stop_words(context, profile, voice),
-        page_stop_words=build_page_stop_words(context, profile),
+        page_stop_words=build_stop_words(context, profile, place=PAGE),
     )
 
 

@@ -67,7 +67,7 @@ class AsrPipeline:
         self._hot_words = hot_words
         self._names = names
         self._framer = Framer()
-        self._endpointer = Endpointer(settings)
+        self.endpointer = Endpointer(settings)
         self._stopped_number = 0
         self._barge_ns: int | None = None
         self._refused: list[HeardPhrase] = []
@@ -78,18 +78,9 @@ class AsrPipeline:
         self.floor, self.gate = room.floor, room.gate
 
     @property
-    def settings(self) -> SpeechSettings:
-        """Return what a phrase is, and how surely it must be understood."""
-        return self._endpointer.settings
-
-    @settings.setter
-    def settings(self, settings: SpeechSettings) -> None:
-        self._endpointer.settings = settings
-
-    @property
     def state(self) -> str:
         """Return what hearing does at this moment."""
-        if self._endpointer.is_open:
+        if self.endpointer.is_open:
             return "hearing"
         return "transcribing" if self.queue.is_busy else "listening"
 
@@ -126,7 +117,7 @@ class AsrPipeline:
     def _frame(self, frame: SoundBlock, playing: Playing | None) -> None:
         if not frame.follows:
             self._activity.reset()
-            self._endpointer.reset()
+            self.endpointer.reset()
             self.queue.forget_draft()
         voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
         self.gate.follow(playing, frame.end_ns)
@@ -135,7 +126,7 @@ class AsrPipeline:
         else:
             self.floor.note(level, is_voice=voice >= OFFSET)
         is_loud = level >= self.floor.level_db + ABOVE_FLOOR_DB
-        for event in self._endpointer.feed(frame, voice, is_loud=is_loud):
+        for event in self.endpointer.feed(frame, voice, is_loud=is_loud):
             self._on(event)
 
     def _through_gate(self, frame: SoundBlock, level: float, voice: float) -> float:
@@ -159,7 +150,7 @@ class AsrPipeline:
         else:
             self.queue.forget_draft()
         if kind is VadEventKind.TOO_LONG:
-            reason = f"{self.settings.longest_phrase_s:g} s of talk are no command"
+            reason = f"{self.endpointer.settings.longest_phrase_s:g} s of talk are no command"
             self._refused.append(_refused(phrase, reason))
 
     def _draft(self, draft: PhraseTranscript) -> Iterator[HeardPhrase]:
@@ -170,8 +161,8 @@ class AsrPipeline:
         if self._stops(draft.phrase, draft.transcript, sure):
             self._stopped_number = draft.phrase.number
             yield _heard(draft, sure, Judgement(verdict=Verdict.STOP))
-        elif self._endpointer.is_open and is_unfinished(draft.transcript.text):
-            self._endpointer.wait_longer()
+        elif self.endpointer.is_open and is_unfinished(draft.transcript.text):
+            self.endpointer.wait_longer()
 
     def _judged(self, answer: PhraseTranscript) -> HeardPhrase:
         """Return what becomes of a phrase that has ended."""
@@ -190,7 +181,7 @@ class AsrPipeline:
                 transcript=answer.transcript,
                 phrase=answer.phrase,
                 confidence=sure,
-                least_confidence=self.settings.least_confidence,
+                least_confidence=self.endpointer.settings.least_confidence,
                 languages=recogniser.declared.languages,
             )
             judgement = judge(case)

@@ -33,7 +33,7 @@ class AskingAgain:
         self._next_ns = 0
 
     def may_ask(self, now_ns: int) -> bool:
-        """Tell whether the robot may ask now; it then counts as having asked."""
+        """Return whether the robot may ask now; it then counts as having asked."""
         if now_ns < self._next_ns:
             return False
         self._next_ns = now_ns + self._pause_ns

@@ -65,8 +65,8 @@ class SpeechNode:
     ) -> None:
         """Take `microphone`, which opens it, None where the robot has none.
 
-        The recogniser works in `executor`, and is loaded in `loader`, which gives way to the steps;
-        without one, within the steps. The two listeners hear the room and the page.
+        The recogniser works in `executor`, and is loaded in `loader`; without one, within the
+        steps. The two listeners hear the room and the page.
         """
         self._clock = context.clock
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
@@ -125,6 +125,7 @@ class SpeechNode:
         if self._microphone is not None:
             self._microphone.close()
         self._close_asr()
+        self._loader.shutdown(wait=False, cancel_futures=True)
         for listener in self._listeners:
             listener.close()
         if self._voice is not None:
@@ -133,7 +134,7 @@ class SpeechNode:
 
     def prepare(self, profile: Profile, model_tier: int) -> PreparedSpeech:
         """Open the recogniser of a profile; where it has none, the robot says so."""
-        selected = select_recogniser(self._shelf, profile, model_tier)
+        selected = self._select(profile, model_tier).result()
         return PreparedSpeech(profile=profile, selected=selected)
 
     def commit(self, prepared: PreparedSpeech) -> PreparedSpeech:
@@ -141,26 +142,24 @@ class SpeechNode:
         before, self._profile = self._profile, prepared.profile
         for listener in self._listeners:
             listener.adopt(prepared.profile.speech)
-        recogniser, why = None, self._deaf
+        selected = SelectedRecogniser(recogniser=None, why=self._deaf)
         if self._asr is not None:
-            self._asr.settings = prepared.profile.speech
-            selected = prepared.selected
-            recogniser, why = self._asr.queue.take(selected.recogniser, selected.why)
-        selected = SelectedRecogniser(recogniser=recogniser, why=why)
+            self._asr.endpointer.settings = prepared.profile.speech
+            selected, self._asr.queue.selected = self._asr.queue.selected, prepared.selected
         return PreparedSpeech(profile=before, selected=selected)
 
     def discard(self, prepared: PreparedSpeech) -> None:
-        """Close the recogniser that is not needed."""
+        """Close the recogniser that is not needed, behind what it was asked last."""
         recogniser = prepared.selected.recogniser
         if recogniser is not None and self._asr is not None:
-            self._asr.queue.release(recogniser)
+            self._executor.submit(recogniser.close)
         elif recogniser is not None:
             recogniser.close()
 
     def _open_asr(self) -> None:
         self._opened_asr = True
         try:
-            activity = open_voice_activity(self._clock)
+            activity = open_voice_activity()
         except (InferenceError, SpeechError) as error:
             self._go_deaf(one_line(error))
             return
@@ -169,10 +168,21 @@ class SpeechNode:
         names = frozenset(words_of(self._robot.name))
         self._asr = AsrPipeline(activity, queue, self._profile.speech, hot_words.text, names)
         self._asr.enter(self._rooms[False])
-        self._loading = self._loader.submit(select_recogniser, self._shelf, self._profile, 0)
+        self._loading = self._select(self._profile, 0)
+
+    def _select(self, profile: Profile, model_tier: int) -> "Future[SelectedRecogniser]":
+        """Open a recogniser in the loader's thread, which has the priority of the steps."""
+        return self._loader.submit(self._opened, profile, model_tier)
+
+    def _opened(self, profile: Profile, model_tier: int) -> SelectedRecogniser:
+        selected = select_recogniser(self._shelf, profile, model_tier)
+        if selected.recogniser is None:
+            _log.error("degraded: no model turns speech into text, type: %s", selected.why)
+        elif selected.why:
+            _log.warning("degraded: %s", selected.why)
+        return selected
 
     def _close_asr(self) -> None:
-        self._loader.shutdown(wait=False, cancel_futures=True)
         if self._asr is not None:
             self._asr.close()
         else:
@@ -182,8 +192,7 @@ class SpeechNode:
     def _take_loaded(self) -> None:
         if self._asr is None or self._loading is None or not self._loading.done():
             return
-        selected, self._loading = self._loading.result(), None
-        self._asr.queue.take(selected.recogniser, selected.why)
+        self._asr.queue.selected, self._loading = self._loading.result(), None
 
     def _poll(self) -> SoundBlock | None:
         if self._microphone is None:
@@ -277,4 +286,4 @@ class SpeechNode:
         if self._microphone.away or self._asr is None:
             return self._microphone.away
         queue = self._asr.queue
-        return "" if queue.recogniser is not None else f"no model: {queue.why}"
+        return "" if queue.recogniser is not None else f"no model: {queue.selected.why}"

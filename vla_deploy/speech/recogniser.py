@@ -1,14 +1,15 @@
 """Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
 
 import math
-from importlib import import_module
+import os
 from typing import Any, Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from drivers.latency import LatencyHistogram
 from platforms import ModelChoice
+from vla_deploy.aside import background
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
@@ -17,7 +18,7 @@ from vla_deploy.inference.providers import CPU, CUDA
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.errors import SpeechMissing
+from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.sound import RATE_HZ, Sound
 from vla_deploy.speech.transcript import Transcript, others_of
 
@@ -34,6 +35,8 @@ _COMPUTE: Final = {
 }
 _DEVICES: Final = {CPU: "cpu", CUDA: "cuda"}
 _RUNTIME: Final = "vla_deploy.speech.whisper_runtime"
+_MODEL_ERRORS: Final = (RuntimeError, ValueError, OSError, KeyError, TypeError)
+"""What faster-whisper and CTranslate2 raise."""
 
 
 class Recogniser:
@@ -68,7 +71,7 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
-        except _model_errors() as error:
+        except _MODEL_ERRORS as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
@@ -145,22 +148,22 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
         RunFailed: it cannot run.
     """
     before_mb, started_ns = resident_mb(), clock.now_ns()
-    runtime = _runtime()
-    check_parts(model)
+    runtime = import_extra(_RUNTIME, "turning speech into text needs faster-whisper")
+    # Hashing half a gigabyte gives way to the steps. The model itself is made by this thread, since
+    # the threads that it starts inherit the priority, and phrases are to be read without delay.
+    with background(MonotonicClock()) as thread:
+        thread.submit(check_parts, model).result()
     provider = _provider(choice, runtime)
-    declared = model.manifest.whisper
-    is_trimmed = declared is not None and declared.context == Context.TRIMMED
-    kind = runtime.TrimmedWhisper if is_trimmed else runtime.Whisper
     try:
-        whisper = kind(
+        whisper = runtime.Whisper(
             str(model.folder),
             device=_DEVICES[provider],
             compute_type=_COMPUTE[provider, choice.precision],
-            cpu_threads=choice.threads,
+            cpu_threads=min(choice.threads, len(os.sched_getaffinity(0))),
             num_workers=1,
             local_files_only=True,
         )
-    except runtime.MODEL_ERRORS as error:
+    except _MODEL_ERRORS as error:
         raise ModelFileSpoiled(
             f"{model.folder}: {runtime.VERSION} cannot load it: {one_line(error)}; expected a "
             "Whisper converted by CTranslate2: add the model again"
@@ -188,21 +191,6 @@ def _provider(choice: ModelChoice, runtime: Any) -> str:
         f"CTranslate2 here runs nothing of {', '.join(asked)} in {choice.precision}; "
         "allow the CPU in int8 or fp32, or install a CTranslate2 built with CUDA"
     )
-
-
-def _runtime() -> Any:
-    try:
-        return import_module(_RUNTIME)
-    except ImportError as error:
-        raise SpeechMissing(
-            f"turning speech into text needs faster-whisper ({error}): "
-            "pip install 'vla-deploy[speech]'"
-        ) from error
-
-
-def _model_errors() -> tuple[type[Exception], ...]:
-    errors: tuple[type[Exception], ...] = _runtime().MODEL_ERRORS
-    return errors
 
 
 def _mean(values: list[float], weights: list[int], nothing: float) -> float:

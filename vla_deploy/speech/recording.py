@@ -1,16 +1,15 @@
 """Hear a whole recording as the robot would hear it live, only faster."""
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
-from vla_deploy.speech.event_publisher import evidence
-from vla_deploy.speech.recogniser import Recogniser
+from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
@@ -35,11 +34,7 @@ class StreamClock:
 
 
 def open_hearing(
-    recogniser: Recogniser | None,
-    why: str,
-    profile: Profile,
-    clock: Clock,
-    hot_words: str = "",
+    selected: SelectedRecogniser, profile: Profile, clock: Clock, hot_words: str = ""
 ) -> AsrPipeline:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
 
@@ -48,8 +43,8 @@ def open_hearing(
         InferenceError: its voice network cannot be opened.
     """
     queue = TranscriptionQueue(AtOnce(), clock)
-    queue.take(recogniser, why)
-    return AsrPipeline(open_voice_activity(clock), queue, profile.speech, lambda: hot_words)
+    queue.selected = selected
+    return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)
 
 
 def hear_recording(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
@@ -61,15 +56,3 @@ def hear_recording(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> It
         clock.ns = block.end_ns
         hearing.feed(block, None)
         yield from hearing.heard()
-
-
-def described(heard: HeardPhrase) -> dict[str, Any]:
-    """Return what was heard as JSON takes it, its times in seconds since the stream began."""
-    return {
-        "began_s": round(heard.phrase.began_ns / NS_PER_S, 3),
-        "ended_s": round(heard.phrase.ended_ns / NS_PER_S, 3),
-        "text": heard.text,
-        "verdict": str(heard.judgement.verdict),
-        "reason": heard.judgement.reason,
-        **evidence(heard),
-    }

@@ -80,7 +80,8 @@ def judge(case: Case) -> Judgement:
     for why, ask_again in _REFUSALS:
         reason = why(case)
         if reason:
-            is_doubted = why is _unsure and _may_make_sense(case)
+            makes_sense = case.confidence >= DOUBT_RATIO * case.least_confidence
+            is_doubted = why is _unsure and makes_sense
             verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
             return Judgement(verdict=verdict, reason=reason, ask_again=ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
@@ -128,10 +129,6 @@ def _unsure(case: Case) -> str:
         return ""
     reason = f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
     return reason + (_OVERDRIVEN if case.phrase.clipped_ratio > CLIPPED_RATIO else "")
-
-
-def _may_make_sense(case: Case) -> bool:
-    return case.confidence >= DOUBT_RATIO * case.least_confidence
 
 
 _REFUSALS: Final[tuple[tuple[Callable[[Case], str], bool], ...]] = (

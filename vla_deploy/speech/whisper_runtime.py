@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 # It tells the log of every phrase; what was heard is told in `heard`, and nowhere else.
 logging.getLogger("faster_whisper").setLevel(logging.WARNING)
-MODEL_ERRORS: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError, KeyError, TypeError)
 VERSION: str = f"faster-whisper {faster_whisper.__version__}"
 _MARGIN_FRAMES = 40
 _FRAMES_PER_STATE = 2
@@ -32,12 +31,27 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     """Keep what else the search found beside what it read, which the library drops.
 
     `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
-    the best first. Whoever reads empties them before.
+    the best first. Whoever reads empties them before. With `content_frames` the encoder is given
+    only so many frames and a little silence, for weights that were trained so: the library itself
+    always pads to its window.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
+        self.content_frames: int | None = None
+
+    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
+        """Return what the encoder makes of features, (mel bands, frames)."""
+        if self.content_frames is None:
+            return super().encode(features)
+        kept = self.content_frames + _MARGIN_FRAMES
+        kept += kept % _FRAMES_PER_STATE
+        # CTranslate2 takes what has as many rows as there are mel bands for features, and would
+        # encode its own states once more (`WhisperEncoder::is_encoded`).
+        if kept // _FRAMES_PER_STATE == features.shape[-2]:
+            kept += _FRAMES_PER_STATE
+        return super().encode(np.ascontiguousarray(features[..., :kept]))
 
     def generate_with_fallback(
         self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any
@@ -73,29 +87,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
         # The end of the text is a token, too.
         mean = log_probability / (len(result.sequences_ids[0]) + 1)
         return result, mean, 0.0, get_compression_ratio(text)
-
-
-class TrimmedWhisper(Whisper):
-    """Give the encoder only the sound that is there, and a little silence.
-
-    For weights that were trained so: the library itself always pads to its window.
-    """
-
-    content_frames: int = 0
-
-    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
-        """Return what the encoder makes of features, (mel bands, frames)."""
-        return super().encode(_trimmed(features, self.content_frames))
-
-
-def _trimmed(features: NDArray[np.float32], content_frames: int) -> NDArray[np.float32]:
-    kept = content_frames + _MARGIN_FRAMES
-    kept += kept % _FRAMES_PER_STATE
-    # CTranslate2 takes what has as many rows as there are mel bands for features, and would
-    # encode its own states once more (`WhisperEncoder::is_encoded`).
-    if kept // _FRAMES_PER_STATE == features.shape[-2]:
-        kept += _FRAMES_PER_STATE
-    return np.ascontiguousarray(features[..., :kept])
 
 
 def cuda_devices() -> int:

@@ -9,6 +9,7 @@ from platforms import load_profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.manifest import Context, Whisper
 from vla_deploy.speech.asr_pipeline import STOPPED, AsrPipeline, HeardPhrase
+from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import FRAME, Playing, SoundBlock, duration_ns
@@ -59,7 +60,8 @@ def heard(
     """Return what is told of words that are spoken for so long, and when, from their beginning."""
     clock = StreamClock()
     queue = TranscriptionQueue(AtOnce(), clock)
-    queue.take(cast("Recogniser", Reader(words, log_probability)), "")
+    reader = cast("Recogniser", Reader(words, log_probability))
+    queue.selected = SelectedRecogniser(recogniser=reader)
     activity = cast("VoiceActivity", LoudnessVad())
     asr = AsrPipeline(activity, queue, load_profile("desktop").speech, lambda: "")
     told: list[tuple[float, HeardPhrase]] = []

@@ -13,7 +13,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import EventPublisher
-from vla_deploy.speech.hot_words import HotWords, joined, thing_names
+from vla_deploy.speech.hot_words import HotWords, hot_words_of
 from vla_deploy.speech.transcript import Alternative, Transcript
 from vla_deploy.speech.verdict import Judgement, Verdict
 
@@ -149,5 +149,5 @@ def test_hot_words_are_the_things_seen_and_the_places(
 
 def test_hot_words_are_bounded() -> None:
     objects = [{"class": "cup", "colour": f"c{number}"} for number in range(500)]
-    assert len(joined(thing_names({"objects": objects})).split()) == 40
-    assert thing_names({}) == ()
+    assert len(hot_words_of({"objects": objects}, ()).split()) == 40
+    assert hot_words_of({}, ()) == ""

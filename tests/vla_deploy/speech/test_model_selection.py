@@ -12,14 +12,20 @@ from vla_deploy.inference.memory_claims import RunMemory
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.speech.errors import NoRecogniser
-from vla_deploy.speech.model_selection import open_best, select_recogniser
+from vla_deploy.speech.model_selection import select_recogniser
+from vla_deploy.speech.recogniser import Recogniser
 
 
 @pytest.fixture
 def shelf(scripted_whisper: Any) -> ModelShelf:
     store = ModelStore(scripted_whisper.folder, embedded=scripted_whisper.folder / "none")
     return ModelShelf(store=store, engines=scripted_whisper.folder, clock=MonotonicClock())
+
+
+def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> Recogniser:
+    recogniser = select_recogniser(shelf, profile, model_tier).recogniser
+    assert recogniser is not None
+    return recogniser
 
 
 def profile_with(*tiers: str) -> Profile:
@@ -71,8 +77,7 @@ def test_a_model_too_large_for_the_memory_that_is_free_gives_way_to_a_smaller_on
 def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_whisper: Any) -> None:
     (scripted_whisper.folder / "empty").mkdir(parents=True)
     profile = profile_with("empty", "missing")
-    with pytest.raises(NoRecogniser, match=r"empty is not here .*; missing is not here"):
-        open_best(shelf, profile, 0)
-    ears = select_recogniser(shelf, profile, 0)
-    assert ears.recogniser is None
-    assert "vla-deploy models add empty --whisper FOLDER" in ears.why
+    selected = select_recogniser(shelf, profile, 0)
+    assert selected.recogniser is None
+    absent = "{0} is not here (vla-deploy models add {0} --whisper FOLDER)"
+    assert selected.why == f"{absent.format('empty')}; {absent.format('missing')}"

@@ -11,6 +11,7 @@ from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.transcript import Transcript
 from vla_deploy.speech.transcription_queue import MOST_WAITING, TranscriptionQueue
 
@@ -89,7 +90,7 @@ def reader() -> Any:
 @pytest.fixture
 def queue(pool: Waiting, reader: Any, clock: ManualClock) -> TranscriptionQueue:
     queue = TranscriptionQueue(pool, clock)
-    queue.take(reader, "")
+    queue.selected = SelectedRecogniser(recogniser=reader)
     return queue
 
 
@@ -183,7 +184,7 @@ def test_a_failing_network_is_told(
 
 def test_without_a_network_each_phrase_is_refused_with_the_reason(clock: ManualClock) -> None:
     queue = TranscriptionQueue(AtOnce(), clock)
-    queue.take(None, "commands-whisper: no such model")
+    queue.selected = SelectedRecogniser(recogniser=None, why="commands-whisper: no such model")
     queue.draft(phrase(1, 0.9), "")
     queue.finish(phrase(1, 0.9), "")
     (answer,) = queue.answers()
@@ -195,9 +196,10 @@ def test_the_network_before_is_closed_behind_what_it_was_asked(
     queue: TranscriptionQueue, pool: Waiting, reader: Reader
 ) -> None:
     queue.finish(phrase(1, 0.9), "")
-    before, _ = queue.take(None, "changed")
+    before = queue.recogniser
+    queue.selected = SelectedRecogniser(recogniser=None, why="changed")
     assert before is reader
-    queue.release(before)
+    pool.submit(before.close)
     assert reader.closed == 0
     pool.work()
     assert (reader.read_phrases, reader.closed) == ([100], 1)

@@ -30,15 +30,8 @@ from vla_deploy.speech.words import words_of
 LEAST: Final = 20
 _PULL: Final = 0.2
 _STEPS: Final = 50
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Known:
-    """Hold a recording and its words; none for sound of which nothing should be understood."""
-
-    name: str
-    sound: Sound
-    words: tuple[str, ...]
+KnownSound = tuple[Sound, tuple[str, ...]]
+"""A recording and its words; none for sound of which nothing should be understood."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +45,7 @@ class Calibrated:
     error_after: float
 
 
-def known_recordings(folder: Path) -> list[Known]:
+def known_recordings(folder: Path) -> list[KnownSound]:
     """Return the WAV files of a folder, each with the words of the text file beside it.
 
     Raises:
@@ -68,17 +61,13 @@ def known_recordings(folder: Path) -> list[Known]:
             f"it (empty for other sound); got {len(paths)}, without words: {wordless[:3]}"
         )
     return [
-        Known(
-            name=path.name,
-            sound=sound_of(path),
-            words=words_of(path.with_suffix(".txt").read_text(encoding="utf-8")),
-        )
+        (sound_of(path), words_of(path.with_suffix(".txt").read_text(encoding="utf-8")))
         for path in paths
     ]
 
 
 def calibrate(
-    model: Model, choice: ModelChoice, known: Sequence[Known], *, beam: int, clock: Clock
+    model: Model, choice: ModelChoice, known: Sequence[KnownSound], *, beam: int, clock: Clock
 ) -> Calibrated:
     """Read every recording and learn how sure the model's words are.
 
@@ -88,12 +77,12 @@ def calibrate(
     """
     recogniser = open_recogniser(model, choice, beam=beam, clock=clock)
     try:
-        readings = [recogniser.read(one.sound) for one in known]
+        readings = [recogniser.read(sound) for sound, _ in known]
     finally:
         recogniser.close()
     right = [
-        bool(one.words) and words_of(reading.text) == one.words
-        for one, reading in zip(known, readings, strict=True)
+        bool(words) and words_of(reading.text) == words
+        for (_, words), reading in zip(known, readings, strict=True)
     ]
     return learn(readings, right, recogniser.declared.calibration)
 

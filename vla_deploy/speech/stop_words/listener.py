@@ -204,24 +204,15 @@ class StopWords:
 
 
 def build_stop_words(
-    context: NodeContext, profile: Profile, voice: RobotVoice | None = None
+    context: NodeContext, profile: Profile, voice: RobotVoice | None = None, place: Place = ROOM
 ) -> StopWords:
-    """Return the listener to the room; it opens the profile's network when the node starts."""
+    """Return the listener to a place; it opens the profile's network when the node starts."""
+    # It claims no memory: what hears a spoken stop is never refused for want of it.
+    shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
     return StopWords(
-        lambda: open_spotter(_shelf(context), profile),
+        lambda: open_spotter(shelf, profile),
         profile.speech,
         context.clock,
         lambda: None if voice is None else voice.playing,
+        place,
     )
-
-
-def build_page_stop_words(context: NodeContext, profile: Profile) -> StopWords:
-    """Return the listener to the page, where the robot does not sound: it falls silent for it."""
-    return StopWords(
-        lambda: open_spotter(_shelf(context), profile), profile.speech, context.clock, place=PAGE
-    )
-
-
-def _shelf(context: NodeContext) -> ModelShelf:
-    """Return a shelf that claims no memory: a spoken stop is never refused for want of it."""
-    return ModelShelf.of_base(context.run_dir.parent, context.clock)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,12 @@ from drivers.clock import NS_PER_S
 from platforms import Profile
 from vla_deploy.inference.manifest import KeyWords, Manifest
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.session import ModelSession
 from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import Sound, duration_ns
 from vla_deploy.speech.stop_words import features
 
 ROLE: Final = "key_words"
-
-
-class Scorer(Protocol):
-    """Run the model, as `ModelSession` does."""
-
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
-        """Return the outputs by name."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,13 +31,13 @@ class Spotted:
 class Spotter:
     """Follow one stream of sound at 16 kHz; `score` is that of the likeliest word by now."""
 
-    def __init__(self, scorer: Scorer, manifest: Manifest) -> None:
+    def __init__(self, session: ModelSession, manifest: Manifest) -> None:
         """Take the model and what its manifest says of it.
 
         Raises:
             SpotterMismatch: it wants other features than there are, or none at all.
         """
-        self._scorer = scorer
+        self._session = session
         self._words = _checked(manifest)
         self._input = manifest.inputs[0].name
         self._output = manifest.outputs[0].name
@@ -92,7 +85,7 @@ class Spotter:
 
     def _judge(self, new: features.Frames, stamp_ns: int, threshold: float) -> Spotted | None:
         self._frames = np.concatenate([self._frames[len(new) :], new])
-        outputs = self._scorer.run({self._input: self._frames.T[None]})
+        outputs = self._session.run({self._input: self._frames.T[None]})
         self.runs += 1
         scores = outputs[self._output][0, 1:].T
         kept = self._words.smoothing_frames - 1 + self._moments
@@ -115,17 +108,15 @@ def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
 
 
 def _checked(manifest: Manifest) -> KeyWords:
-    words, shapes = manifest.key_words, [tensor.shape for tensor in manifest.inputs]
+    words, shapes = manifest.key_words, [one.shape for one in (*manifest.inputs, *manifest.outputs)]
     if words is None or words.features != features.NAME:
         got = "no [key_words]" if words is None else repr(words.features)
         raise SpotterMismatch(f"{manifest.name}: expected features {features.NAME!r}, got {got}")
-    whole = len(shapes) == 1 and len(shapes[0]) == 3 and shapes[0][:2] == (1, features.BANDS)
-    if not whole or not all(
-        isinstance(shape[2], int) for shape in (shapes[0], manifest.outputs[0].shape)
-    ):
+    is_counted = all(isinstance(shape[-1], int) for shape in shapes)
+    if len(shapes) != 2 or shapes[0][:2] != (1, features.BANDS) or not is_counted:
         raise SpotterMismatch(
             f"{manifest.name}: expected one input of shape (1, {features.BANDS}, frames) and a "
-            f"count of moments, got {shapes} and {manifest.outputs[0].shape}"
+            f"count of moments, got {shapes}"
         )
     return words
 

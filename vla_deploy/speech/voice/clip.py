@@ -1,7 +1,9 @@
 """Hold a piece of sound, read one from a program, bring it to the rate of a speaker or a room."""
 
+import io
 import math
 import struct
+import wave
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -9,16 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
-from vla_deploy.speech.voice.errors import SynthesisFailed
+from vla_deploy.speech.errors import SynthesisFailed
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""
 # Silence behind the sound: the transform is a circle, and the end must not ring into the beginning.
 _APART_ROWS: Final = 256
-_RIFF: Final = struct.Struct("<4sI4s")
-_CHUNK: Final = struct.Struct("<4sI")
-_FORMAT: Final = struct.Struct("<HHIIHH")
-_PCM: Final = 1
 _BITS: Final = 16
 
 
@@ -70,19 +68,20 @@ def read_wav_stream(data: bytes) -> Clip:
     Raises:
         SynthesisFailed: it is no WAV of 16-bit samples, or has none.
     """
-    if len(data) < _RIFF.size or _RIFF.unpack_from(data)[::2] != (b"RIFF", b"WAVE"):
-        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}")
-    rate_hz, channels = 0, 0
-    at = _RIFF.size
-    while at + _CHUNK.size <= len(data):
-        name, length = _CHUNK.unpack_from(data, at)
-        at += _CHUNK.size
-        if name == b"fmt ":
-            rate_hz, channels = _format(data[at : at + length])
-        elif name == b"data" and rate_hz:
-            return Clip(rate_hz=rate_hz, wave=pcm_wave(data[at : at + length], channels))
-        at += length + length % 2
-    raise SynthesisFailed(f"expected a WAV with a format and samples, got {len(data)} bytes")
+    try:
+        told = data[:4] + struct.pack("<I", len(data)) + data[8:]
+        with wave.open(io.BytesIO(told)) as sound:
+            bits, channels, rate_hz = (
+                8 * sound.getsampwidth(),
+                sound.getnchannels(),
+                sound.getframerate(),
+            )
+            rows = sound.readframes(len(data))
+    except (wave.Error, EOFError) as error:
+        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}: {error}") from error
+    if bits != _BITS:
+        raise SynthesisFailed(f"expected PCM of {_BITS} bits, got {bits} bits")
+    return Clip(rate_hz=rate_hz, wave=pcm_wave(rows, channels))
 
 
 def pcm_wave(data: bytes, channels: int = 1) -> Wave:
@@ -98,15 +97,3 @@ def pcm_wave(data: bytes, channels: int = 1) -> Wave:
     rows = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
     wave: Wave = (rows.mean(axis=1) / 32_768.0).astype(np.float32)
     return wave
-
-
-def _format(chunk: bytes) -> tuple[int, int]:
-    if len(chunk) < _FORMAT.size:
-        raise SynthesisFailed("expected the format of the samples, got half of it")
-    kind, channels, rate_hz, _, _, bits = _FORMAT.unpack_from(chunk)
-    if kind != _PCM or bits != _BITS or not channels or not rate_hz:
-        raise SynthesisFailed(
-            f"expected PCM of {_BITS} bits, got kind {kind}, {bits} bits, {channels} channels, "
-            f"{rate_hz} Hz"
-        )
-    return rate_hz, channels

@@ -1,12 +1,12 @@
 """Read the topic `say`, and keep what waits to be said in order: bounded, and none for long."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.speech.voice.errors import OrderRefused
+from vla_deploy.speech.errors import OrderRefused
 
 LONGEST_LETTERS: Final = 400
 """More is cut at a word: half a minute of talk is enough, and the text is shown whole elsewhere."""
@@ -27,22 +27,18 @@ class Priority(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """Ask for a text to be said; `interrupt` cuts off what is no more urgent than this."""
+    """Ask for a text to be said; `interrupt` cuts off what is no more urgent than this.
+
+    With `withdraws` it takes the order of that id back, whether it waits or is being said.
+    """
 
     say_id: str
-    text: str
+    text: str = ""
     priority: Priority = Priority.MEDIUM
     interrupt: bool = False
-    source: str = ""
     given_ns: int = 0
     is_cut: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Withdrawal:
-    """Take an order back, whether it waits or is being said."""
-
-    say_id: str
+    withdraws: bool = False
 
 
 class SayQueue:
@@ -53,9 +49,6 @@ class SayQueue:
 
     def __len__(self) -> int:
         return len(self._orders)
-
-    def __iter__(self) -> Iterator[Order]:
-        return iter(self._orders)
 
     def add(self, order: Order) -> Order | None:
         """Take an order; return the one that has no room: the least urgent, of those the last."""
@@ -70,23 +63,14 @@ class SayQueue:
         """Return and forget the first one."""
         return self._orders.pop(0) if self._orders else None
 
-    def withdraw(self, say_id: str) -> Order | None:
-        """Return and forget one by its id."""
-        return self._taken(each for each in self._orders if each.say_id == say_id)
-
-    def expired(self, now_ns: int) -> Order | None:
-        """Return and forget one that has waited for too long."""
-        oldest_ns = now_ns - LONGEST_WAIT_NS
-        return self._taken(each for each in self._orders if each.given_ns < oldest_ns)
-
-    def _taken(self, found: Iterable[Order]) -> Order | None:
-        order = next(iter(found), None)
-        if order is not None:
-            self._orders.remove(order)
-        return order
+    def drop(self, is_dropped: Callable[[Order], bool]) -> list[Order]:
+        """Return and forget those of a kind."""
+        dropped = [each for each in self._orders if is_dropped(each)]
+        self._orders = [each for each in self._orders if each not in dropped]
+        return dropped
 
 
-def read_order(payload: Mapping[str, Any], given_ns: int) -> Order | Withdrawal:
+def read_order(payload: Mapping[str, Any], given_ns: int) -> Order:
     """Return what a message of the topic `say` asks for.
 
     Raises:
@@ -99,14 +83,13 @@ def read_order(payload: Mapping[str, Any], given_ns: int) -> Order | Withdrawal:
     if not isinstance(say_id, str) or not 0 < len(say_id) <= LONGEST_ID:
         raise OrderRefused(f"say_id: expected 1..{LONGEST_ID} letters, got {say_id!r:.100}")
     if payload.get("cancel") is True:
-        return Withdrawal(say_id=say_id)
+        return Order(say_id=say_id, withdraws=True)
     spoken, is_cut = _spoken(payload.get("text"))
     return Order(
         say_id=say_id,
         text=spoken,
         priority=_priority(payload.get("priority", "medium")),
         interrupt=payload.get("interrupt") is True,
-        source=str(payload.get("source", "")),
         given_ns=given_ns,
         is_cut=is_cut,
     )

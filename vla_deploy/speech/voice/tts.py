@@ -5,16 +5,15 @@ Nothing here fetches a program or a voice.
 
 import json
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, Protocol
 
 from vla_deploy.one_line import one_line
 from vla_deploy.robots.description import VoiceSettings
+from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
 from vla_deploy.speech.voice.clip import Clip, pcm_wave, read_wav_stream
-from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
 
 TIMEOUT_S: Final = 10.0
 ESPEAK: Final = "espeak-ng"
@@ -114,31 +113,20 @@ class PiperEngine:
             ) from error
 
 
-def _espeak(settings: VoiceSettings) -> Engine:
+def chosen_engine(settings: VoiceSettings) -> Engine:
+    """Return the engine of a robot file; whether it is installed shows when it first speaks."""
+    if settings.engine == PIPER:
+        return PiperEngine(
+            voice=settings.voice,
+            words_per_minute=settings.words_per_minute,
+            program=settings.program or PIPER,
+        )
     return EspeakEngine(
         voice=settings.voice,
         words_per_minute=settings.words_per_minute,
         pitch=settings.pitch,
         program=settings.program or ESPEAK,
     )
-
-
-def _piper(settings: VoiceSettings) -> Engine:
-    return PiperEngine(
-        voice=settings.voice,
-        words_per_minute=settings.words_per_minute,
-        program=settings.program or PIPER,
-    )
-
-
-ENGINES: Final[Mapping[str, Callable[[VoiceSettings], Engine]]] = MappingProxyType(
-    {"espeak-ng": _espeak, "piper": _piper}
-)
-
-
-def chosen_engine(settings: VoiceSettings) -> Engine:
-    """Return the engine; whether it is installed shows when it first speaks."""
-    return ENGINES[settings.engine](settings)
 
 
 def _run_program(words: Sequence[str], text: str, remedy: str) -> bytes:

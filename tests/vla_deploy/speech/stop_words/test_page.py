@@ -21,7 +21,7 @@ from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import SoundBlock, duration_ns
-from vla_deploy.speech.stop_words.listener import PAGE, StopWords, build_page_stop_words
+from vla_deploy.speech.stop_words.listener import PAGE, StopWords, build_stop_words
 from vla_deploy.speech.stop_words.spotter import Spotter
 from vla_deploy.speech.voice.tts import EspeakEngine
 
@@ -102,7 +102,7 @@ def loud(seconds: float) -> Samples:
 def test_the_shipped_model_hears_a_stop_before_the_button_is_let_go(
     page: MakePage, context: NodeContext
 ) -> None:
-    held = page(build_page_stop_words(context, load_profile("desktop")))
+    held = page(build_stop_words(context, load_profile("desktop"), place=PAGE))
     talker = Talker(engine=EspeakEngine(voice="en-us"))
     wave = arrival("stop", talker, RATE_HZ, Acoustics()).sound.wave
     held.say((32_767 * wave.clip(-1.0, 1.0)).astype(np.int16))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
+from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
 from vla_deploy.speech.voice.clip import Clip, read_wav_stream
-from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
 from vla_deploy.speech.voice.tts import EspeakEngine, PiperEngine
 
 
@@ -73,7 +73,7 @@ def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
         (b"<html>not found</html>", "expected a WAV"),
         (wav(b""), "no sample"),
         (wav(b"\0" * 8, bits=24), "24 bits"),
-        (wav(b"\0" * 8)[:30], "with a format and samples"),
+        (wav(b"\0" * 8)[:30], "expected a WAV"),
     ],
 )
 def test_what_is_no_sound_is_refused(data: bytes, told: str) -> None:
