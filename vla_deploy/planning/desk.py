@@ -234,6 +234,9 @@ class Desk:
 
     def _is_answer(self, command: Command, waiting: Waiting) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
+        if command.has_unsure_number:
+            doubted = replace(waiting.command, heard_confidence=READ_BACK)
+            waiting = replace(waiting, command=doubted)
         said = self.dialogue.read(command.text)
         full = described(waiting.question, command.text)
         is_reply = command.plan is None and said.verdict is not Verdict.ANEW

@@ -15,7 +15,7 @@ from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.aids import Aid, Recall
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotReady
-from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
@@ -67,7 +67,7 @@ class Situation:
             scene=scene,
             here=here,
             conversation=conversation,
-            heard_confidence=command.heard_confidence,
+            heard_confidence=_heard_confidence(command),
             image=self._image() if Aid.IMAGE in of_use else None,
             recollections=recall.sentences(command.text) if recall and recalls else (),
             last_seen=recall.things() if recall else (),
@@ -132,3 +132,11 @@ class Situation:
         sample = reader.latest()
         is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
         return sample if is_fresh else None
+
+
+def _heard_confidence(command: Command) -> float | None:
+    """Return how sure the words are; with an unsure number so little that they are read back."""
+    sure = command.heard_confidence
+    if not command.has_unsure_number:
+        return sure
+    return READ_BACK if sure is None else min(sure, READ_BACK)

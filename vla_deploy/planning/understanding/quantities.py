@@ -49,6 +49,27 @@ NUMBER: Final = rf"(?:\d{{1,6}}(?:[.,]\d{{1,4}})?|{_WORDS})"
 _QUANTITY: Final = re.compile(rf"(?P<number>-?{NUMBER})\s*(?:of a |an? )?(?P<unit>[a-z/°]*)")
 
 
+_SPOKEN: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        **{word: value for word, value in NUMBER_WORDS.items() if " " not in word},
+        "zero": 0, "thirteen": 13, "fourteen": 14, "sixteen": 16, "seventeen": 17, "eighteen": 18,
+        "nineteen": 19,
+    }
+)  # fmt: skip
+_ARTICLES: Final = frozenset({"a", "an"})
+_FIGURES_OR_WORD: Final = re.compile(r"\d+(?:[.,]\d+)?|[a-z]+")
+
+
+def numbers_in(text: str) -> tuple[float, ...]:
+    """Return the numbers of a sentence in their order, in figures or as words that name one."""
+    tokens = _FIGURES_OR_WORD.findall(text.lower())
+    return tuple(
+        _SPOKEN[token] if token in _SPOKEN else float(token.replace(",", "."))
+        for token in tokens
+        if token not in _ARTICLES and (token in _SPOKEN or token[0].isdigit())
+    )
+
+
 def number_of(words: str) -> float | None:
     """Return the value of a number in figures or in words, or None."""
     spoken = words.strip().replace("-", " ") if not words.strip().startswith("-") else words
