@@ -10,7 +10,6 @@ from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.speech.asr_pipeline import Room
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.recording import StreamClock, open_hearing
 from vla_deploy.speech.sound import SoundBlock, duration_ns
@@ -76,7 +75,6 @@ class StopListening:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
         self.scores = []
-        self._asr.enter(Room())
         for at in range(0, len(sound), BLOCK):
             samples = sound[at : at + BLOCK]
             block = SoundBlock(stamp_ns=duration_ns(self._count), samples=samples, follows=at > 0)

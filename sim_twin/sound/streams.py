@@ -4,8 +4,7 @@ from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from drivers.clock import Clock
 from drivers.opener import DeviceOpener
 from vla_deploy.robots.description import RobotDescription
-from vla_deploy.speech.devices import format_of
-from vla_deploy.speech.microphone import OpenInput
+from vla_deploy.speech.microphone import OpenInput, format_of
 from vla_deploy.speech.voice.audio_player import OpenOutput
 
 

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -16,17 +18,18 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
-from vla_deploy.speech.devices import linked_microphone
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import evidence
-from vla_deploy.speech.microphone import Microphone
+from vla_deploy.speech.microphone import Microphone, linked_microphone
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recording import StreamClock, hear_recording, open_hearing
+from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
+from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
 _STEP_NS: Final = NS_PER_S // 50
+_AFTER_S: Final = 1.5
 
 
 def register(commands: Any) -> None:
@@ -67,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         if arguments.microphone:
             return _listen(arguments, hearing, live)
-        return _read(arguments, list(hear_recording(hearing, clock, sound_of(arguments.file))))
+        return _read(arguments, list(_heard(hearing, clock, sound_of(arguments.file))))
     finally:
         hearing.close()
 
@@ -90,6 +93,17 @@ def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
     if not phrases:
         print(f"{arguments.file}: nobody speaks")
     return 0
+
+
+def _heard(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
+    """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
+    padded = np.concatenate((sound, np.zeros(count_of(_AFTER_S), np.float32)))
+    for at in range(0, len(padded), BLOCK):
+        samples = padded[at : at + BLOCK]
+        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
+        clock.ns = block.end_ns
+        hearing.feed(block, None)
+        yield from hearing.heard()
 
 
 def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -> int:

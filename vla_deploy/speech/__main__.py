@@ -9,9 +9,10 @@ from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.devices import linked_microphone, linked_speaker
+from vla_deploy.speech.microphone import linked_microphone
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
+from vla_deploy.speech.voice.audio_player import linked_speaker
 from vla_deploy.speech.voice.robot_voice import build_voice
 
 SYNTHESIS_S: Final = 0.1

@@ -2,20 +2,12 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from platforms import SpeechSettings
 from vla_deploy.speech.echo_gate import EchoGate
-from vla_deploy.speech.endpointing import (
-    ABOVE_FLOOR_DB,
-    OFFSET,
-    Endpointer,
-    NoiseFloor,
-    Phrase,
-    VadEvent,
-    VadEventKind,
-)
+from vla_deploy.speech.endpointing import Endpointer, Phrase, VadEvent, VadEventKind
 from vla_deploy.speech.sound import Framer, Playing, SoundBlock, level_db
 from vla_deploy.speech.transcript import Transcript, confidence
 from vla_deploy.speech.transcription_queue import PhraseTranscript, TranscriptionQueue
@@ -41,14 +33,6 @@ class HeardPhrase:
         return "" if self.transcript is None else self.transcript.text
 
 
-@dataclass(frozen=True, slots=True)
-class Room:
-    """Hold what is known of where a microphone stands."""
-
-    floor: NoiseFloor = field(default_factory=NoiseFloor)
-    gate: EchoGate = field(default_factory=EchoGate)
-
-
 class AsrPipeline:
     """Hold what hearing remembers between two blocks."""
 
@@ -67,15 +51,11 @@ class AsrPipeline:
         self._hot_words = hot_words
         self._names = names
         self._framer = Framer()
+        self._gate = EchoGate()
         self.endpointer = Endpointer(settings)
         self._stopped_number = 0
         self._barge_ns: int | None = None
         self._refused: list[HeardPhrase] = []
-        self.enter(Room())
-
-    def enter(self, room: Room) -> None:
-        """Listen elsewhere from the next block on; what was known of a room is kept in it."""
-        self.floor, self.gate = room.floor, room.gate
 
     @property
     def state(self) -> str:
@@ -106,8 +86,8 @@ class AsrPipeline:
             yield self._judged(answer)
 
     def document(self) -> dict[str, Any]:
-        """Return what hearing knows of the room, as `speech_status` tells it."""
-        return {"noise_floor_db": round(self.floor.level_db, 1), "counts": dict(self.counts)}
+        """Return how many phrases have begun, ended and so on, as `speech_status` tells it."""
+        return {"counts": dict(self.counts)}
 
     def close(self) -> None:
         """Release the networks."""
@@ -119,30 +99,27 @@ class AsrPipeline:
             self._activity.reset()
             self.endpointer.reset()
             self.queue.forget_draft()
-        voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
-        self.gate.follow(playing, frame.end_ns)
-        if self.gate.is_shut:
-            voice = self._through_gate(frame, level, voice)
-        else:
-            self.floor.note(level, is_voice=voice >= OFFSET)
-        is_loud = level >= self.floor.level_db + ABOVE_FLOOR_DB
-        for event in self.endpointer.feed(frame, voice, is_loud=is_loud):
+        voice = self._activity.probability(frame.samples)
+        self._gate.follow(playing, frame.end_ns)
+        if self._gate.is_shut:
+            voice = self._through_gate(frame, voice)
+        for event in self.endpointer.feed(frame, voice):
             self._on(event)
 
-    def _through_gate(self, frame: SoundBlock, level: float, voice: float) -> float:
+    def _through_gate(self, frame: SoundBlock, voice: float) -> float:
         """Return how probably a person speaks while the robot does."""
-        is_person = self.gate.is_person(level, voice)
-        if self.gate.barges_in():
+        is_person = self._gate.is_person(level_db(frame.samples), voice)
+        if self._gate.barges_in():
             self._barge_ns = frame.stamp_ns
             self.counts["barged_in"] += 1
         return voice if is_person else 0.0
 
     def _on(self, event: VadEvent) -> None:
         kind = event.kind
-        phrase = replace(event.phrase, own_words=self.gate.own_words(event.phrase))
+        phrase = replace(event.phrase, own_words=self._gate.own_words(event.phrase))
         self.counts[kind.name.lower()] += 1
         if kind is VadEventKind.BEGAN:
-            self.gate.note_begun()
+            self._gate.note_begun()
         elif kind is VadEventKind.PAUSED:
             self.queue.draft(phrase, self._hot_words())
         elif kind is VadEventKind.ENDED:

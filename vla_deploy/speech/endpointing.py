@@ -12,18 +12,14 @@ from typing import Final
 import numpy as np
 
 from platforms import SpeechSettings
-from vla_deploy.speech.sound import FRAME_S, SILENCE_DB, Sound, SoundBlock, joined
+from vla_deploy.speech.sound import FRAME_S, Sound, SoundBlock
 
 ONSET: Final = 0.5
 OFFSET: Final = 0.45
 ONSET_FRAMES: Final = 2
-ABOVE_FLOOR_DB: Final = 3.0
 PAUSE_RATIO: Final = 0.6
 """After this share of the silence that ends a phrase, its words are read in advance."""
 CLIPPED: Final = 0.985
-START_FLOOR_DB: Final = -60.0
-_RISE_DB_S: Final = 3.0
-_FALL_DB_S: Final = 30.0
 
 
 class VadEventKind(Enum):
@@ -63,24 +59,6 @@ class VadEvent:
     phrase: Phrase
 
 
-class NoiseFloor:
-    """Follow the level of frames without a voice: down at once, up slowly, so a word is no floor.
-
-    A voice holds it where it is; a noise that goes on is the floor after some seconds.
-    """
-
-    def __init__(self) -> None:
-        self.level_db = START_FLOOR_DB
-
-    def note(self, level_db: float, *, is_voice: bool) -> None:
-        """Take the level of the next frame."""
-        if is_voice and level_db > self.level_db:
-            return
-        step = level_db - self.level_db
-        most = (_RISE_DB_S if step > 0 else _FALL_DB_S) * FRAME_S
-        self.level_db = max(SILENCE_DB, self.level_db + float(np.clip(step, -most, most)))
-
-
 class Endpointer:
     """Follow one stream."""
 
@@ -110,16 +88,16 @@ class Endpointer:
         self._close()
         self._swallowing = False
 
-    def feed(self, frame: SoundBlock, voice: float, *, is_loud: bool) -> Iterator[VadEvent]:
-        """Take the next frame, how probably it holds a voice, and whether it is above the floor."""
+    def feed(self, frame: SoundBlock, voice: float) -> Iterator[VadEvent]:
+        """Take the next frame, and how probably it holds a voice."""
         if self._frames:
             yield from self._go_on(frame, voice)
         else:
-            yield from self._wait(frame, voice, is_loud=is_loud)
+            yield from self._wait(frame, voice)
 
-    def _wait(self, frame: SoundBlock, voice: float, *, is_loud: bool) -> Iterator[VadEvent]:
+    def _wait(self, frame: SoundBlock, voice: float) -> Iterator[VadEvent]:
         self._before.append(frame)
-        self._rising = self._rising + 1 if voice >= ONSET and is_loud else 0
+        self._rising = self._rising + 1 if voice >= ONSET else 0
         if self._swallowing:
             self._count_silence(voice)
             self._swallowing = self._silent * FRAME_S < self.settings.unfinished_silence_s
@@ -178,7 +156,7 @@ class Endpointer:
         """Return the phrase so far."""
         voiced = [number for number, voice in enumerate(self._voices) if voice >= OFFSET]
         first, last = voiced[0], voiced[-1]
-        samples = joined(self._frames)
+        samples = np.concatenate([frame.samples for frame in self._frames])
         return Phrase(
             number=self._number,
             began_ns=self._frames[first].stamp_ns,

@@ -22,31 +22,12 @@ _LONGEST_OTHER: Final = 200
 """What is longer is no command that may have been misheard."""
 
 
-class AskingAgain:
-    """Decide when the robot asks again: each time twice as seldom, until something is understood.
-
-    Whoever talks near the robot, and not to it, is not asked for a repetition again and again.
-    """
-
-    def __init__(self) -> None:
-        self._pause_ns = FIRST_PAUSE_NS
-        self._next_ns = 0
-
-    def may_ask(self, now_ns: int) -> bool:
-        """Return whether the robot may ask now; it then counts as having asked."""
-        if now_ns < self._next_ns:
-            return False
-        self._next_ns = now_ns + self._pause_ns
-        self._pause_ns = min(2 * self._pause_ns, LONGEST_PAUSE_NS)
-        return True
-
-    def note_understood(self) -> None:
-        """Begin anew."""
-        self._pause_ns, self._next_ns = FIRST_PAUSE_NS, 0
-
-
 class EventPublisher:
-    """Hold the ways out."""
+    """Hold the ways out.
+
+    The robot asks again each time twice as seldom, until something is understood: whoever talks
+    near it, and not to it, is left alone.
+    """
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
         """Open the topics."""
@@ -57,7 +38,7 @@ class EventPublisher:
         self._utterances = space.ring_writer("utterance")
         self._say = space.ring_writer("say")
         self._stop = StopButton(space, SOURCE, clock)
-        self._asking = AskingAgain()
+        self._pause_ns, self._ask_from_ns = FIRST_PAUSE_NS, 0
         self._numbers = count(1)
 
     def publish(self, heard: HeardPhrase) -> None:
@@ -68,11 +49,11 @@ class EventPublisher:
             self._stop.press(f'heard "{heard.text}"')
         self.counts[verdict] += 1
         if verdict is Verdict.ACCEPTED:
-            self._asking.note_understood()
+            self._pause_ns, self._ask_from_ns = FIRST_PAUSE_NS, 0
             self._command(heard)
         elif verdict is Verdict.DOUBTED:
-            self._command(heard, doubted=True, ask_again=self._asking.may_ask(now_ns))
-        elif heard.judgement.ask_again and self._asking.may_ask(now_ns):
+            self._command(heard, doubted=True, ask_again=self._may_ask(now_ns))
+        elif heard.judgement.ask_again and self._may_ask(now_ns):
             self._ask_again()
         self._heard.publish(self._document(heard, now_ns))
         self.latency.record(now_ns - heard.phrase.ended_ns)
@@ -89,6 +70,14 @@ class EventPublisher:
 
     def _command(self, heard: HeardPhrase, **doubt: bool) -> None:
         self._utterances.publish({"command_id": self._new_id(), **utterance(heard, **doubt)})
+
+    def _may_ask(self, now_ns: int) -> bool:
+        """Return whether the robot may ask again now; it then counts as having asked."""
+        if now_ns < self._ask_from_ns:
+            return False
+        self._ask_from_ns = now_ns + self._pause_ns
+        self._pause_ns = min(2 * self._pause_ns, LONGEST_PAUSE_NS)
+        return True
 
     def _ask_again(self) -> None:
         self.counts["asked_again"] += 1

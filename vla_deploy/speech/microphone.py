@@ -1,13 +1,17 @@
 """Keep one microphone open, whichever kind it is, and give what it hears as one 16 kHz stream."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
 from drivers.audio.base import FULL_SCALE, AudioBlock, AudioFormat, AudioInput, Samples
+from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock
+from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
+from vla_deploy.robots.description import Audio, RobotDescription
 from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.sound import RATE_HZ, Sound, SoundBlock
 
@@ -117,3 +121,18 @@ class Microphone:
         samples = self._resampler.feed(block.samples)
         self._end_ns = block.stamp_ns + block.format.duration_ns(len(block.samples))
         return SoundBlock(stamp_ns=block.stamp_ns, samples=samples, follows=follows)
+
+
+def linked_microphone(
+    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
+) -> OpenInput | None:
+    """Return how to open the microphone by the path of its link; None where there is none."""
+    audio = robot.microphone
+    if audio is None:
+        return None
+    return partial(open_audio_input, links[audio.device].path, clock, format_of(audio))
+
+
+def format_of(audio: Audio) -> AudioFormat:
+    """Return the format that a robot file declares."""
+    return AudioFormat(rate_hz=audio.rate_hz, channels=audio.channels)

@@ -2,7 +2,7 @@
 
 import logging
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -14,7 +14,7 @@ from vla_deploy.ipc import BY_NAME, CellWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.one_line import one_line
 from vla_deploy.robots import RobotDescription
-from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase, Room
+from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError, SpeechMissing
 from vla_deploy.speech.event_publisher import EventPublisher
 from vla_deploy.speech.hot_words import HotWords
@@ -30,15 +30,9 @@ from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.speech.words import words_of
 
 STATUS_PERIOD_NS: Final = round(NS_PER_S / BY_NAME["speech_status"].rate_hz)
+PreparedSpeech = tuple[Profile, SelectedRecogniser]
+"""What a profile asks of speech: its settings, and the recogniser."""
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PreparedSpeech:
-    """Hold what a profile asks of speech: its settings, and the recogniser."""
-
-    profile: Profile
-    selected: SelectedRecogniser
 
 
 class SpeechNode:
@@ -85,7 +79,6 @@ class SpeechNode:
             self._deaf = ""
         self._asr: AsrPipeline | None = None
         self._page: PageMicrophone
-        self._rooms = {False: Room(), True: Room()}
         self._in_page = False
         self._opened_asr = False
         self._loading: Future[SelectedRecogniser] | None = None
@@ -134,23 +127,23 @@ class SpeechNode:
 
     def prepare(self, profile: Profile, model_tier: int) -> PreparedSpeech:
         """Open the recogniser of a profile; where it has none, the robot says so."""
-        selected = self._select(profile, model_tier).result()
-        return PreparedSpeech(profile=profile, selected=selected)
+        return profile, self._select(profile, model_tier).result()
 
     def commit(self, prepared: PreparedSpeech) -> PreparedSpeech:
         """Change settings and recogniser between two phrases."""
-        before, self._profile = self._profile, prepared.profile
+        before = SelectedRecogniser(recogniser=None, why=self._deaf)
+        (profile, selected), profile_before = prepared, self._profile
+        self._profile = profile
         for listener in self._listeners:
-            listener.adopt(prepared.profile.speech)
-        selected = SelectedRecogniser(recogniser=None, why=self._deaf)
+            listener.adopt(profile.speech)
         if self._asr is not None:
-            self._asr.endpointer.settings = prepared.profile.speech
-            selected, self._asr.queue.selected = self._asr.queue.selected, prepared.selected
-        return PreparedSpeech(profile=before, selected=selected)
+            self._asr.endpointer.settings = profile.speech
+            before, self._asr.queue.selected = self._asr.queue.selected, selected
+        return profile_before, before
 
     def discard(self, prepared: PreparedSpeech) -> None:
         """Close the recogniser that is not needed, behind what it was asked last."""
-        recogniser = prepared.selected.recogniser
+        recogniser = prepared[1].recogniser
         if recogniser is not None and self._asr is not None:
             self._executor.submit(recogniser.close)
         elif recogniser is not None:
@@ -167,7 +160,6 @@ class SpeechNode:
         queue = TranscriptionQueue(self._executor, self._clock)
         names = frozenset(words_of(self._robot.name))
         self._asr = AsrPipeline(activity, queue, self._profile.speech, hot_words.text, names)
-        self._asr.enter(self._rooms[False])
         self._loading = self._select(self._profile, 0)
 
     def _select(self, profile: Profile, model_tier: int) -> "Future[SelectedRecogniser]":
@@ -177,7 +169,7 @@ class SpeechNode:
     def _opened(self, profile: Profile, model_tier: int) -> SelectedRecogniser:
         selected = select_recogniser(self._shelf, profile, model_tier)
         if selected.recogniser is None:
-            _log.error("degraded: no model turns speech into text, type: %s", selected.why)
+            _log.error("degraded: nothing turns speech into text, type commands: %s", selected.why)
         elif selected.why:
             _log.warning("degraded: %s", selected.why)
         return selected
@@ -231,7 +223,6 @@ class SpeechNode:
             return
         if in_page is not self._in_page:
             self._in_page = in_page
-            self._asr.enter(self._rooms[in_page])
             block = replace(block, follows=False)
         try:
             barged_ns = self._asr.feed(block, playing)

@@ -75,12 +75,8 @@ class PageMicrophone:
 
     def document(self) -> dict[str, Any]:
         """Return how it fares, as `speech_status` tells it."""
-        return {
-            "speaking": self.is_open,
-            "why": self._why,
-            "turns": self._turns,
-            "cut": self._cut,
-        }
+        counts = {"turns": self._turns, "cut": self._cut}
+        return {"speaking": self.is_open, "why": self._why, **counts}
 
     def _take(self, sound: PageSound, silence_s: float) -> Iterator[SoundBlock]:
         if self._turn is None or self._turn.number != sound.turn:

@@ -75,12 +75,13 @@ class Recogniser:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
-        weights = [max(1, len(one.tokens)) for one in segments]
+        # Without timestamps a window is one segment, and a phrase is one window.
+        segment = segments[0] if segments else None
         return Transcript(
-            text=" ".join(one.text.strip() for one in segments).strip(),
-            log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
-            no_speech=_mean([one.no_speech_prob for one in segments], weights, 1.0),
-            compression=max((one.compression_ratio for one in segments), default=0.0),
+            text="" if segment is None else segment.text.strip(),
+            log_probability=0.0 if segment is None else segment.avg_logprob,
+            no_speech=1.0 if segment is None else segment.no_speech_prob,
+            compression=0.0 if segment is None else segment.compression_ratio,
             language=info.language,
             duration_s=len(samples) / RATE_HZ,
             took_s=took_ns / NS_PER_S,
@@ -191,7 +192,3 @@ def _provider(choice: ModelChoice, runtime: Any) -> str:
         f"CTranslate2 here runs nothing of {', '.join(asked)} in {choice.precision}; "
         "allow the CPU in int8 or fp32, or install a CTranslate2 built with CUDA"
     )
-
-
-def _mean(values: list[float], weights: list[int], nothing: float) -> float:
-    return float(np.average(values, weights=weights)) if values else nothing

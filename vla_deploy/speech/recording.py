@@ -1,21 +1,17 @@
-"""Hear a whole recording as the robot would hear it live, only faster."""
+"""Hear without a process around it: a recording, or a microphone of the command line."""
 
-from collections.abc import Iterator
 from typing import Final
-
-import numpy as np
 
 from drivers.clock import Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
-from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
+from vla_deploy.speech.asr_pipeline import AsrPipeline
 from vla_deploy.speech.model_selection import SelectedRecogniser
-from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
+from vla_deploy.speech.sound import count_of
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
 
 BLOCK: Final = count_of(0.02)
-AFTER_S: Final = 1.5
 
 
 class StreamClock:
@@ -45,14 +41,3 @@ def open_hearing(
     queue = TranscriptionQueue(AtOnce(), clock)
     queue.selected = selected
     return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)
-
-
-def hear_recording(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
-    """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
-    padded = np.concatenate((sound, np.zeros(count_of(AFTER_S), np.float32)))
-    for at in range(0, len(padded), BLOCK):
-        samples = padded[at : at + BLOCK]
-        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
-        clock.ns = block.end_ns
-        hearing.feed(block, None)
-        yield from hearing.heard()

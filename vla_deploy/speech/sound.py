@@ -3,7 +3,7 @@
 A device gives blocks of any length; the networks take frames of 512 samples, 32 ms.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -73,11 +73,6 @@ class Framer:
                 stamp_ns=stamp_ns + duration_ns(at), samples=samples, follows=self._follows
             )
             self._follows = True
-
-
-def joined(blocks: Iterable[SoundBlock]) -> Sound:
-    """Return the samples of blocks in a row."""
-    return np.concatenate([NOTHING, *(block.samples for block in blocks)])
 
 
 def duration_ns(count: int) -> int:

@@ -19,8 +19,7 @@ from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import RATE_HZ
 from vla_deploy.speech.transcript import Transcript
 
-OPTIONAL_PARTS: Final = ("preprocessor_config.json",)
-PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, *OPTIONAL_PARTS)
+PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, "preprocessor_config.json")
 PLAIN_CHOICE: Final = replace(opening.PLAIN_CHOICE, precision="int8")
 """To look at a model by itself, as no profile is needed for."""
 

@@ -94,13 +94,7 @@ def learn(
     pairs = [pair for pair in zip(readings, right, strict=True) if pair[0].text]
     evidence = np.array([evidence_of(reading) for reading, _ in pairs]).reshape(-1, 4)
     truth = np.array([float(is_right) for _, is_right in pairs])
-    bias, log_probability, no_speech, compression = _fitted(evidence, truth)
-    fitted = Calibration(
-        bias=bias,
-        log_probability=log_probability,
-        no_speech=no_speech,
-        compression=compression,
-    )
+    fitted = _fitted(evidence, truth)
     return Calibrated(
         calibration=fitted,
         recordings=len(readings),
@@ -124,7 +118,7 @@ def keep(model: Model, calibration: Calibration) -> None:
     write_manifest(model.folder, dataclasses.replace(model.manifest, whisper=whisper))
 
 
-def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> list[float]:
+def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> Calibration:
     """Return the weights by Newton's method, pulled towards those of an unmeasured model."""
     start = np.array(dataclasses.astuple(UNCALIBRATED))
     weights = start.copy()
@@ -134,7 +128,8 @@ def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> list[f
         curve = (evidence.T * (sure * (1.0 - sure))) @ evidence + _PULL * np.eye(len(start))
         step = np.linalg.solve(curve, slope)
         weights -= step / max(1.0, float(np.abs(step).max()))
-    return [round(float(weight), 4) for weight in weights]
+    names = [field.name for field in dataclasses.fields(Calibration)]
+    return Calibration(**dict(zip(names, (round(float(one), 4) for one in weights), strict=True)))
 
 
 def _error(

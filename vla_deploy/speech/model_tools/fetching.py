@@ -7,7 +7,6 @@ what does not have its hash is refused. Nothing about this robot is sent but the
 import hashlib
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -50,23 +49,31 @@ def fetch(name: str, folder: Path, endpoint: str | None = None) -> None:
     """
     if name not in PUBLISHED:
         raise ModelUnknown(f"no model {name!r} to fetch: expected one of {', '.join(PUBLISHED)}")
-    hub = _hub()
+    os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
+    os.environ["HF_HUB_DISABLE_PROGRESS_BARS"] = "1"
+    hub = import_extra("huggingface_hub", "fetching needs the hub's client")
     repository = f"Systran/faster-{name}"
-    with _told(hub, repository):
-        api = hub.HfApi(endpoint=endpoint, token=False)
-        info = api.model_info(repository, files_metadata=True, timeout=TIMEOUT_S)
-    files = [one for one in info.siblings or () if one.rfilename in PARTS]
+    try:
+        files = list(_downloaded(hub, repository, folder, endpoint))
+    except (hub.errors.HTTPError, OSError, ValueError) as error:
+        raise FetchFailed(
+            f"{repository}: the hub was not reached or does not have it: {one_line(error)[:300]}; "
+            "this computer needs a way to huggingface.co for this once; or copy the files here by "
+            "hand, then: vla-deploy models add NAME --whisper FOLDER"
+        ) from error
     for file in files:
-        with _told(hub, repository):
-            hub.hf_hub_download(
-                repository,
-                file.rfilename,
-                revision=info.sha,
-                local_dir=folder,
-                endpoint=endpoint,
-                token=False,
-            )
         _check(folder / file.rfilename, file)
+
+
+def _downloaded(hub: Any, repository: str, folder: Path, endpoint: str | None) -> Iterator[Any]:
+    """Fetch each file of the newest commit, and yield what the hub says of it."""
+    api = hub.HfApi(endpoint=endpoint, token=False)
+    info = api.model_info(repository, files_metadata=True, timeout=TIMEOUT_S)
+    at = {"revision": info.sha, "local_dir": folder, "endpoint": endpoint, "token": False}
+    for file in info.siblings or ():
+        if file.rfilename in PARTS:
+            hub.hf_hub_download(repository, file.rfilename, **at)
+            yield file
 
 
 def _check(path: Path, file: Any) -> None:
@@ -83,26 +90,3 @@ def _check(path: Path, file: Any) -> None:
         expected, got = str(file.blob_id), hashlib.sha1(blob, usedforsecurity=False).hexdigest()
     if expected != got:
         raise ModelFileSpoiled(f"{path.name}: expected the hash {expected}, got {got}; try again")
-
-
-@contextmanager
-def _told(hub: Any, repository: str) -> Iterator[None]:
-    """Turn what the hub's client raises into one line.
-
-    Raises:
-        FetchFailed: the hub was not reached, or does not have it.
-    """
-    try:
-        yield
-    except (hub.errors.HTTPError, OSError, ValueError) as error:
-        raise FetchFailed(
-            f"{repository}: the hub was not reached or does not have it: {one_line(error)[:300]}; "
-            "this computer needs a way to huggingface.co for this once; or copy the files here by "
-            "hand, then: vla-deploy models add NAME --whisper FOLDER"
-        ) from error
-
-
-def _hub() -> Any:
-    os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
-    os.environ["HF_HUB_DISABLE_PROGRESS_BARS"] = "1"
-    return import_extra("huggingface_hub", "fetching needs the hub's client")

@@ -45,7 +45,6 @@ class Spotter:
         self._moments = int(manifest.outputs[0].shape[2])
         self._step = self._moments * features.STRIDE
         self.runs = 0
-        self.score = 0.0
         self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
         self.reset()
 

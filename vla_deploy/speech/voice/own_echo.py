@@ -112,26 +112,6 @@ class _Played:
     until_ns: int
 
 
-@dataclass(slots=True)
-class _Trial:
-    """Add up how much of what is heard the filter takes out since the robot began to speak."""
-
-    blocks: int = 0
-    heard_power: float = 0.0
-    rest_power: float = 0.0
-
-    @property
-    def fits(self) -> bool:
-        return (
-            self.blocks >= _FITS_AFTER_BLOCKS and self.heard_power > _FITS_RATIO * self.rest_power
-        )
-
-    def add(self, heard_power: float, rest_power: float) -> None:
-        self.blocks += 1
-        self.heard_power += heard_power
-        self.rest_power += rest_power
-
-
 class OwnEcho:
     """Follow speaker and microphone."""
 
@@ -143,7 +123,8 @@ class OwnEcho:
         self._is_active = False
         self._follows = False
         self._is_confirmed = False
-        self._trial = _Trial()
+        self._tried_powers = np.zeros(2)
+        self._tried_blocks = 0
         self._gain = 1.0
         self._left: deque[float] = deque(maxlen=_FRAME_BLOCKS)
         self._heard_power = 0.0
@@ -197,7 +178,7 @@ class OwnEcho:
         self._pending, self._pending_ns = self._pending[:0], block.stamp_ns
         self._follows = block.follows
         self._is_active, self._gain = True, 1.0
-        self._is_confirmed, self._trial = False, _Trial()
+        self._is_confirmed, self._tried_powers, self._tried_blocks = False, np.zeros(2), 0
 
     def _pass_on(self, block: SoundBlock) -> SoundBlock:
         """Return a block as it is, behind what still waits."""
@@ -223,8 +204,11 @@ class OwnEcho:
 
     def _try(self, heard_power: float, rest_power: float) -> None:
         """Find out whether the path still holds: the speaker may have begun later than before."""
-        self._trial.add(heard_power, rest_power)
-        if not self._is_confirmed and self._trial.fits:
+        self._tried_blocks += 1
+        self._tried_powers += heard_power, rest_power
+        heard, rest = self._tried_powers
+        fits = self._tried_blocks >= _FITS_AFTER_BLOCKS and heard > _FITS_RATIO * rest
+        if fits and not self._is_confirmed:
             self._is_confirmed = True
             self._filter.confirm()
 

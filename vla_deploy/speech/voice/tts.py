@@ -68,7 +68,9 @@ class EspeakEngine:
             *(self.program, "--stdin", "--stdout", "-b", "1"),
             *("-v", self.voice, "-s", str(self.words_per_minute), "-p", str(self.pitch)),
         )
-        return read_wav_stream(_run_program(words, _plain(text), _ESPEAK_REMEDY))
+        # Its brackets would switch to phonemes.
+        plain = text.replace("[[", " ").replace("]]", " ")
+        return read_wav_stream(_run_program(words, plain, _ESPEAK_REMEDY))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,8 +152,3 @@ def _run_program(words: Sequence[str], text: str, remedy: str) -> bytes:
         told = one_line(ran.stderr.decode(errors="replace")) or "it says nothing"
         raise SynthesisFailed(f"{words[0]} ended with {ran.returncode}: {told}")
     return ran.stdout
-
-
-def _plain(text: str) -> str:
-    """Return the text without the brackets that would switch to phonemes."""
-    return text.replace("[[", " ").replace("]]", " ")
