@@ -21,11 +21,11 @@ from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.stats import resident_mb
-from vla_deploy.speech.choosing import Ears, ears_of
-from vla_deploy.speech.hearing import Heard, Hearing
+from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
+from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
 from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
 from vla_deploy.speech.sound import RATE_HZ, Sound, SoundBlock, duration_ns
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 from vla_deploy.supervisor.runtime import default_base
 
 VOICES: Final = ("en-gb", "en-us", "en-gb-scotland", "en-gb-x-rp", "en-029")
@@ -57,7 +57,7 @@ class Scene:
 class Run:
     """Hold what was heard of a scene: each phrase with the stream's time at which it was told."""
 
-    told: list[tuple[Heard, int]]
+    told: list[tuple[HeardPhrase, int]]
     cpu_s: float
     sound_s: float
 
@@ -67,7 +67,7 @@ def measure(profile: str = "jetson_orin_nano", rounds: int = 2) -> dict[str, Any
     before_mb = resident_mb()
     loaded = load_profile(profile)
     shelf = ModelShelf.of_base(default_base(), MonotonicClock())
-    ears = ears_of(shelf, loaded, 0)
+    ears = select_recogniser(shelf, loaded, 0)
     report: dict[str, Any] = {
         "profile": profile,
         "model": None if ears.recogniser is None else ears.recogniser.model.manifest.name,
@@ -87,7 +87,9 @@ def measure(profile: str = "jetson_orin_nano", rounds: int = 2) -> dict[str, Any
     return report
 
 
-def _spoken(ears: Ears, profile: Profile, snr_db: float | None, rounds: int) -> dict[str, Any]:
+def _spoken(
+    ears: SelectedRecogniser, profile: Profile, snr_db: float | None, rounds: int
+) -> dict[str, Any]:
     """Return how well and how soon phrases were found, and at what cost."""
     scene = _scene(snr_db, rounds)
     run = _hear(ears, profile, scene.sound)
@@ -113,16 +115,15 @@ def _spoken(ears: Ears, profile: Profile, snr_db: float | None, rounds: int) -> 
     }
 
 
-def _read_s(heard: Heard, profile: Profile) -> float:
+def _read_s(heard: HeardPhrase, profile: Profile) -> float:
     """Return what reading still takes after the phrase has ended.
 
     On the robot it begins in advance, in the pause; here it takes no time of the stream.
     """
-    reading = None if heard.answer is None else heard.answer.reading
-    if reading is None:
+    if heard.transcript is None:
         return 0.0
     in_advance_s = 0.4 * profile.speech.end_silence_s
-    return max(0.0, reading.took_s - in_advance_s)
+    return max(0.0, heard.transcript.took_s - in_advance_s)
 
 
 def _scene(snr_db: float | None, rounds: int) -> Scene:
@@ -164,7 +165,7 @@ def _other_sounds() -> dict[str, Sound]:
     return {name: sound.astype(np.float32) for name, sound in named.items()}
 
 
-def _other(ears: Ears, profile: Profile, sound: Sound) -> dict[str, Any]:
+def _other(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> dict[str, Any]:
     run = _hear(ears, profile, sound)
     accepted = sum(heard.judgement.verdict != "rejected" for heard, _ in run.told)
     return {
@@ -174,17 +175,19 @@ def _other(ears: Ears, profile: Profile, sound: Sound) -> dict[str, Any]:
     }
 
 
-def _hear(ears: Ears, profile: Profile, sound: Sound) -> Run:
+def _hear(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> Run:
     """Let a stream be heard as fast as it can be."""
     stream, cpu = StreamClock(), MonotonicClock()
-    hearing = open_hearing(ears.recogniser, ears.why, profile, stream)
+    hearing = open_hearing(ears, profile, stream)
     began_ns = cpu.now_ns()
     told = list(_told(hearing, stream, sound))
     took_s = (cpu.now_ns() - began_ns) / NS_PER_S
     return Run(told=told, cpu_s=took_s, sound_s=len(sound) / RATE_HZ)
 
 
-def _told(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterator[tuple[Heard, int]]:
+def _told(
+    hearing: AsrPipeline, clock: StreamClock, sound: Sound
+) -> Iterator[tuple[HeardPhrase, int]]:
     for at in range(0, len(sound), BLOCK):
         samples = sound[at : at + BLOCK]
         block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
@@ -194,7 +197,7 @@ def _told(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterator[tuple[
             yield heard, clock.ns
 
 
-def _touches(heard: Heard, first: int, last: int) -> bool:
+def _touches(heard: HeardPhrase, first: int, last: int) -> bool:
     near_ns = round(NEAR_S * NS_PER_S)
     return (
         heard.phrase.ended_ns > duration_ns(first) - near_ns

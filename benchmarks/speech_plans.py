@@ -25,12 +25,11 @@ from training.speech.judging import NOISY_DB
 from training.speech.trials import NAMES, by_held_out_voices, by_unseen_engine, heard
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
-from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.hearing import Heard
-from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.readings import Answer as Read
+from vla_deploy.speech.asr_pipeline import HeardPhrase
+from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.event_publisher import utterance
 from vla_deploy.speech.recogniser import Recogniser
-from vla_deploy.speech.telling import utterance
+from vla_deploy.speech.transcript import confidence
 from vla_deploy.speech.verdict import Case as SpokenCase
 from vla_deploy.speech.verdict import Verdict, judge
 
@@ -113,7 +112,7 @@ def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) 
     return _answer(scene, utterance(heard, doubted=doubted))
 
 
-def _heard(recogniser: Recogniser, clip: Clip, least: float) -> Heard:
+def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
     reading = recogniser.read(clip.samples, NAMES)
     sure = confidence(reading, recogniser.declared.calibration)
     phrase = Phrase(
@@ -121,11 +120,10 @@ def _heard(recogniser: Recogniser, clip: Clip, least: float) -> Heard:
         voiced_s=clip.duration_s, clipped_ratio=0.0, voice=1.0, samples=clip.samples,
     )  # fmt: skip
     case = SpokenCase(
-        reading=reading, phrase=phrase, confidence=sure, least_confidence=least,
+        transcript=reading, phrase=phrase, confidence=sure, least_confidence=least,
         languages=recogniser.declared.languages,
     )  # fmt: skip
-    answer = Read(phrase=phrase, reading=reading)
-    return Heard(phrase=phrase, answer=answer, confidence=sure, judgement=judge(case))
+    return HeardPhrase(phrase=phrase, transcript=reading, confidence=sure, judgement=judge(case))
 
 
 def _share(

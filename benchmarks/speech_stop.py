@@ -3,7 +3,8 @@
 Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, at
 10 dB also a moment after the voice has said something else; and other talk by the same voices. All
 goes into what listens on board: the spotter as the profile wants it, and the recogniser, whose
-words press the button too as soon as it has read them. A delay is from the end of the word to the
+words press the button too as soon as it has read them; `stop_curve` is what other thresholds of the
+spotter alone would miss and take for stops. A delay is from the end of the word to the
 end of the block of sound in which it was told, and what the computer took for that block. `latch`
 does it with the whole way: a person in the twin's room says it while an arm moves, and physics
 tells when all stands still.
@@ -12,17 +13,21 @@ tells when all stands still.
 import sys
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import closing
 from itertools import islice
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from benchmarks.command import parser, show
-from benchmarks.speech_stop_ear import SPOTTER, WORDS, Delay, Ear, delay_figures
 from benchmarks.speech_stop_latch import latch
-from benchmarks.speech_stop_recall import Glances, Recall
+from benchmarks.speech_stop_listening import (
+    BLOCK,
+    SPOTTER,
+    WORDS,
+    Delay,
+    StopListening,
+    delay_figures,
+)
 from benchmarks.speech_stop_talk import Voices, other_talk, phrases, words_alike
 from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.mixing import at_level, at_snr
@@ -41,6 +46,42 @@ TOO_LATE_S: Final = 1.0
 _LEVEL_DB: Final = -26.0
 _HISS: Final = 2e-4
 _BEFORE_S, _AFTER_S = 0.8, 1.2
+_SECOND: Final = RATE_HZ // BLOCK
+_THRESHOLDS: Final = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85)
+
+
+class _Curve:
+    """Follow what the spotter alone would miss, and take for a stop, at other thresholds."""
+
+    def __init__(self) -> None:
+        self._stops: dict[str, list[float]] = defaultdict(list)
+        self._talk: list[float] = []
+        self._talked_h = 1e-9
+
+    def add_stop(self, case: str, scores: Sequence[tuple[float, float]], start_s: float) -> None:
+        """Take the scores of a phrase whose stop word begins at `start_s`."""
+        self._stops[case].append(max(score for at_s, score in scores if at_s > start_s))
+
+    def add_talk(self, scores: Sequence[tuple[float, float]], duration_s: float) -> None:
+        """Take the scores of other talk: after an alarm the spotter is silent for a second."""
+        values = [score for _, score in scores]
+        self._talk += [max(values[at : at + _SECOND]) for at in range(0, len(values), _SECOND)]
+        self._talked_h += duration_s / 3600.0
+
+    def rows(self) -> list[dict[str, float]]:
+        """Return a row for each threshold."""
+        return [
+            {
+                "threshold": threshold,
+                **{
+                    f"missed_ratio_{case}": float(np.mean([one < threshold for one in highest]))
+                    for case, highest in self._stops.items()
+                },
+                "false_alarms_per_hour": sum(one >= threshold for one in self._talk)
+                / self._talked_h,
+            }
+            for threshold in _THRESHOLDS
+        ]
 
 
 def measure(
@@ -50,22 +91,20 @@ def measure(
     latches: int = 3,
     misses: bool = False,
     cases: Collection[str] = tuple(CASES),
-    glances: Glances = Glances.MEASURED,
-    recall: Path | None = None,
 ) -> dict[str, Any]:
     """Return the figures; `clips` are phrases by each engine, `hours` those of other talk.
 
-    The phrases are said in some of CASES. `recall` is a file to keep clips and readings in.
+    The phrases are said in some of CASES.
 
     Raises:
         InferenceError: the model cannot be opened.
         EngineMissing: not even eSpeak is installed.
     """
     random = np.random.default_rng(seed)
-    with closing(Recall(recall)) as kept:
-        voices, ear = Voices(kept), Ear(kept, glances)
-        stops = _stops(voices, ear, clips, cases, random)
-        talk = _talk(voices, ear, hours, random) | _alike(voices, ear, 3 * clips, random)
+    voices, ear = Voices(), StopListening()
+    curve = _Curve()
+    stops = _stops(voices, ear, clips, cases, random, curve)
+    talk = _talk(voices, ear, hours, random, curve) | _alike(voices, ear, 3 * clips, random)
     if not misses:
         stops.pop("stop_misses")
         talk.pop("stop_false_alarms")
@@ -74,7 +113,7 @@ def measure(
         "stop_engines": sorted(voices.engines),
         "stop_engines_missing": voices.missing,
         "stop_threshold": ear.threshold,
-        "stop_glances": str(glances),
+        "stop_curve": curve.rows(),
         **stops,
         **talk,
         "stop_no_words": ear.why_no_words,
@@ -85,7 +124,12 @@ def measure(
 
 
 def _stops(
-    voices: Voices, ear: Ear, clips: int, cases: Collection[str], random: np.random.Generator
+    voices: Voices,
+    ear: StopListening,
+    clips: int,
+    cases: Collection[str],
+    random: np.random.Generator,
+    curve: "_Curve",
 ) -> dict[str, Any]:
     missed: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
     delays: list[Delay] = []
@@ -101,6 +145,7 @@ def _stops(
                 samples, later_s = np.concatenate((first, clip.samples)), len(first) / RATE_HZ
                 sound = _around(samples, snr_db, drawn)
                 by = _delays(ear, sound, later_s + start_s, later_s + end_s)
+                curve.add_stop(name, ear.scores, _BEFORE_S + later_s + start_s)
                 for group in (engine, "all"):
                     missed[name][group].append(not by)
                 for one in (SPOTTER, WORDS):
@@ -127,7 +172,7 @@ def _stops(
     }
 
 
-def _delays(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, Delay]:
+def _delays(ear: StopListening, sound: Wave, start_s: float, end_s: float) -> dict[str, Delay]:
     """Return how long after the word each listener hit the button, unless far too late."""
     found: dict[str, Delay] = {}
     for alarm in ear.alarms(sound):
@@ -154,7 +199,13 @@ def _around(samples: Wave, snr_db: float | None, random: np.random.Generator) ->
     return sound + np.float32(_HISS) * random.standard_normal(len(sound), np.float32)
 
 
-def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -> dict[str, Any]:
+def _talk(
+    voices: Voices,
+    ear: StopListening,
+    hours: float,
+    random: np.random.Generator,
+    curve: "_Curve",
+) -> dict[str, Any]:
     """Let people talk of other things, half of the time in noise at 20 or 10 dB."""
     alarms: dict[str, list[str]] = {name: [] for name in _TALK_SNRS}
     talked_h = dict.fromkeys(_TALK_SNRS, 1e-9)
@@ -164,6 +215,7 @@ def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -
         name = _drawn(random)
         alarms[name] += _alarms(ear, clip, SNRS_DB[name], random)
         talked_h[name] += clip.duration_s / 3600.0
+        curve.add_talk(ear.scores, clip.duration_s)
     count, talked = sum(map(len, alarms.values())), sum(talked_h.values())
     return {
         "stop_talk_hours": talked,
@@ -176,7 +228,9 @@ def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -
     }
 
 
-def _alike(voices: Voices, ear: Ear, count: int, random: np.random.Generator) -> dict[str, Any]:
+def _alike(
+    voices: Voices, ear: StopListening, count: int, random: np.random.Generator
+) -> dict[str, Any]:
     """Let people say what was made to sound like a stop word, in the same noise."""
     clips = islice(words_alike(voices, random), count)
     alarms = [_alarms(ear, clip, SNRS_DB[_drawn(random)], random) for clip in clips]
@@ -191,7 +245,9 @@ def _drawn(random: np.random.Generator) -> str:
     return _TALK_SNRS[int(random.integers(len(_TALK_SNRS)))]
 
 
-def _alarms(ear: Ear, clip: Clip, snr_db: float | None, random: np.random.Generator) -> list[str]:
+def _alarms(
+    ear: StopListening, clip: Clip, snr_db: float | None, random: np.random.Generator
+) -> list[str]:
     sound = _around(clip.samples, snr_db, _apart(random))
     found = ear.alarms(sound[: -RATE_HZ // 2])
     return [f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
@@ -206,16 +262,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments.add_argument("--seed", type=int, default=0)
     arguments.add_argument("--misses", action="store_true", help="list what went wrong")
     arguments.add_argument("--case", action="append", choices=CASES, help="all, if none is named")
-    arguments.add_argument(
-        "--glances",
-        type=Glances,
-        choices=list(Glances),
-        default=Glances.MEASURED,
-        help="whether there is time for them, as on this computer, a fast or a busy one",
-    )
-    arguments.add_argument(
-        "--recall", type=Path, help="keep clips and readings in this file, to judge other bounds"
-    )
     given = arguments.parse_args(argv)
     figures = measure(
         given.clips,
@@ -224,8 +270,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         given.latches,
         given.misses,
         given.case or tuple(CASES),
-        given.glances,
-        given.recall,
     )
     show(figures, as_json=given.json)
     return 0

@@ -6,12 +6,12 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
+from sim_twin.sound.streams import streamed_microphone
 from sim_twin.sound.talker import Talker
 from sim_twin.stack import LockstepControl
-from vla_deploy.speech.devices import streamed_microphone
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_stop_words
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.stop_words.listener import build_stop_words
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 _CASES: Final = (
     ("stop", "en-us", None),
@@ -51,7 +51,7 @@ def _stop(
     profile = load_profile("desktop")
     microphone = streamed_microphone(rig.robot, clock.devices, clock.clock)
     listener = build_stop_words(context, profile)
-    clock.add(SpeechNode(context, rig.robot, profile, microphone, listeners=[listener]))
+    clock.add(SpeechNode(context, rig.robot, profile, microphone, stop_words=listener))
     rig.arm()
     goal = {"kind": "goal", "motion_id": 1, "targets": _TARGETS, "speed_ratio": 0.1}
     rig.space.ring_writer("motion_command").publish(goal)

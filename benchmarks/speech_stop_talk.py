@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.speech_stop_recall import Recall, spoken
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.texts import is_clean
 from training.stop_words.timing import word_times
@@ -69,14 +68,13 @@ _SENTENCE: Final = re.compile(r"[A-Z][a-z]+(?: [a-z]+[,;]?){3,20}[.?!]")
 class Voices:
     """Know which engines are installed, and draw from their voices."""
 
-    def __init__(self, recall: Recall) -> None:
+    def __init__(self) -> None:
         """Try every engine once.
 
         Raises:
             EngineMissing: there is none at all.
         """
         self.missing: dict[str, str] = {}
-        self._recall = recall
         parts = {}
         for part in PARTS:
             try:
@@ -120,7 +118,7 @@ class Voices:
         self, part: Part, text: str, voice: str, random: np.random.Generator
     ) -> Clip | None:
         try:
-            return spoken(self._recall, part, text, voice, draw_style(random))
+            return part.speak(text, voice, draw_style(random))
         except SynthesisFailed:
             return None
 

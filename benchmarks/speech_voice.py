@@ -16,7 +16,7 @@ from typing import Any, Final
 from benchmarks.command import parser, show
 from sim_twin.sound.speech_room import SpeechRoom
 from sim_twin.sound.talker import Talker
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 SENTENCES: Final = (
     "I have put the red cup into the box",

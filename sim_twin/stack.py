@@ -10,6 +10,7 @@ from sim_twin.faults import FaultInjector
 from sim_twin.lockstep import Lockstep
 from sim_twin.senses_node import SensesNode
 from sim_twin.sound.hearing import Spoken, let_arrive
+from sim_twin.sound.streams import streamed_microphone, streamed_speaker
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.aside import AtOnce
 from vla_deploy.control.node import ControlNode
@@ -18,10 +19,9 @@ from vla_deploy.node import Node
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.skills.node import ExecutorNode
-from vla_deploy.speech.devices import streamed_microphone, streamed_speaker
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_page_stop_words, build_stop_words
-from vla_deploy.speech.voice.engines import build_voice
+from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
+from vla_deploy.speech.voice.robot_voice import build_voice
 
 READY_TIMEOUT_S = 10.0
 COMMAND_TIMEOUT_S = 300.0
@@ -163,8 +163,8 @@ class LockstepStack(LockstepControl):
             self._profile,
             streamed_microphone(robot, devices, context.clock),
             voice=voice,
-            listeners=[build_stop_words(context, self._profile, voice)],
-            page_listeners=[build_page_stop_words(context, self._profile)],
+            stop_words=build_stop_words(context, self._profile, voice),
+            page_stop_words=build_stop_words(context, self._profile, place=PAGE),
         )
 
     def give(self, **utterance: Any) -> str:

@@ -38,6 +38,11 @@ def models_dir_of(base: Path) -> Path:
     return library_dir_of(base) / _MODELS
 
 
+def system_models_dir() -> Path:
+    """Return where the models lie that root has added, for the service of this computer."""
+    return _ROOT_LIBRARY / _MODELS
+
+
 def engines_dir_of(base: Path) -> Path:
     """Return where execution providers keep what they build from models; it may be deleted."""
     return library_dir_of(base) / _ENGINES

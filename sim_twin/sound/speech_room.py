@@ -1,6 +1,5 @@
 """Put a speech process into the twin's room without the physics: ears, mouth and people alone."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,9 +16,9 @@ from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import Announced, Announcer, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
-from vla_deploy.speech.companions import StreamListener
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.voice.engines import build_voice
+from vla_deploy.speech.stop_words.listener import StopWords
+from vla_deploy.speech.voice.robot_voice import build_voice
 
 STEP_NS: Final = NS_PER_S // 50
 _FORMAT: Final = AudioFormat(rate_hz=16_000)
@@ -28,7 +27,7 @@ _FORMAT: Final = AudioFormat(rate_hz=16_000)
 class SpeechRoom:
     """Step one robot's real speech node, with its real voice, on a clock of its own."""
 
-    def __init__(self, run_dir: Path, listeners: Sequence[StreamListener] = ()) -> None:
+    def __init__(self, run_dir: Path, stop_words: StopWords | None = None) -> None:
         """Start the node under `run_dir`; what it has said and heard is read from its topics."""
         self.clock = ManualClock(NS_PER_S)
         self.ear = MicrophoneDevice(_FORMAT, seed=1)
@@ -37,7 +36,7 @@ class SpeechRoom:
         self.announcer = Announcer(self.space, "room", self.clock)
         self._heard = self.space.ring_reader("heard", from_start=True)
         self._status = self.space.cell_reader("speech_status")
-        self.node = self._node(run_dir, listeners)
+        self.node = self._node(run_dir, stop_words)
         self.node.start()
         self.run(0.5)
 
@@ -86,7 +85,7 @@ class SpeechRoom:
         self.node.stop()
         self.space.close()
 
-    def _node(self, run_dir: Path, listeners: Sequence[StreamListener]) -> SpeechNode:
+    def _node(self, run_dir: Path, stop_words: StopWords | None) -> SpeechNode:
         robot, clock = load_robot("butler"), self.clock
         context = NodeContext(
             run_dir=run_dir, robot=robot.name, profile="desktop", devices_dir=None, clock=clock
@@ -102,7 +101,7 @@ class SpeechRoom:
                 clock,
                 AtOnce(),
             ),
-            listeners=listeners,
+            stop_words=stop_words,
         )
 
     def _line(self, device: MicrophoneDevice | SpeakerDevice) -> MemoryLine:

@@ -7,8 +7,7 @@ import numpy as np
 
 from sim_twin.sound.acoustics import Acoustics, path, through
 from vla_deploy.speech.voice.clip import Clip, Wave
-from vla_deploy.speech.voice.engine import Engine
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.tts import Engine, EspeakEngine
 
 USUAL_DISTANCE_M: Final = 1.5
 NOISE_AROUND_S: Final = 0.5

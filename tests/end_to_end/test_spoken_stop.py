@@ -8,12 +8,12 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
+from sim_twin.sound.streams import streamed_microphone
 from sim_twin.sound.talker import Talker
 from sim_twin.stack import LockstepControl
-from vla_deploy.speech.devices import streamed_microphone
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_stop_words
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.stop_words.listener import build_stop_words
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -37,7 +37,7 @@ class Moving:
             self.rig.robot,
             profile,
             microphone,
-            listeners=[build_stop_words(context, profile)],
+            stop_words=build_stop_words(context, profile),
         )
         self.rig.lockstep.add(self.node)
         self.rig.arm()

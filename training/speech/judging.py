@@ -21,9 +21,8 @@ from training.speech.trials import (
 )
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
-from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.recogniser import Recogniser
+from vla_deploy.speech.transcript import Transcript, confidence
 
 NOISY_DB: Final = 10.0
 
@@ -33,7 +32,7 @@ class Read:
     """Hold what was said, and what was read of it."""
 
     clip: Clip
-    reading: Reading
+    reading: Transcript
     cpu_s: float
 
     @property

@@ -27,9 +27,8 @@ LONGEST_DELAY_S: Final = 0.42
 GRID: Final = tuple(round(float(one), 3) for one in np.arange(0.3, 1.0, 0.005))
 REFRACTORY_S: Final = 1.0
 LATE_S: Final = 0.6
-ALARMS_PER_HOUR: Final = {"high": 20.0, "normal": 8.0, "low": 3.0, "own_voice": 3.0}
+ALARMS_PER_HOUR: Final = {"high": 20.0, "normal": 8.0, "low": 3.0}
 """Of this talk, half of which is made to sound like a stop word: ordinary talk alarms a tenth."""
-STRICTER: Final = {"high": 0.0, "normal": 0.0, "low": 0.0, "own_voice": 0.03}
 _BEFORE_S, _AFTER_S = 1.0, 0.9
 _LOUDNESS, _HISS = 0.05, 3e-4
 _LOG = logging.getLogger(__name__)
@@ -165,7 +164,7 @@ def _threshold(name: str, peaks: list[float], hours: float) -> float:
     """Return the lowest threshold of the grid with few enough false alarms."""
     for threshold in GRID:
         if sum(peak >= threshold for peak in peaks) <= ALARMS_PER_HOUR[name] * hours:
-            return min(GRID[-1], round(threshold + STRICTER[name], 3))
+            return threshold
     return GRID[-1]
 
 

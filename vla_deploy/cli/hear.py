@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -15,16 +17,19 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.choosing import open_best
-from vla_deploy.speech.devices import linked_microphone
-from vla_deploy.speech.hearing import Heard, Hearing
-from vla_deploy.speech.microphone import Microphone
+from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
+from vla_deploy.speech.errors import SpeechError
+from vla_deploy.speech.event_publisher import evidence
+from vla_deploy.speech.microphone import Microphone, linked_microphone
+from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recording import StreamClock, described, hear_recording, open_hearing
+from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
+from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
 _STEP_NS: Final = NS_PER_S // 50
+_AFTER_S: Final = 1.5
 
 
 def register(commands: Any) -> None:
@@ -52,17 +57,20 @@ def run(arguments: argparse.Namespace) -> int:
     """Print each phrase with what becomes of it; no robot is needed, and none hears of it."""
     profile = _profile(arguments)
     base: Path = arguments.runtime_base or default_base()
-    recogniser = open_best(ModelShelf.of_base(base, MonotonicClock()), profile, 0)
+    selected = select_recogniser(ModelShelf.of_base(base, MonotonicClock()), profile, 0)
+    recogniser = selected.recogniser
+    if recogniser is None:
+        raise SpeechError(selected.why)
     for notice in recogniser.notices:
         print(f"vla-deploy: degraded: {notice}", file=sys.stderr)
     clock = StreamClock()
     live: Clock = MonotonicClock()
     used = live if arguments.microphone else clock
-    hearing = open_hearing(recogniser, "", profile, used, arguments.words)
+    hearing = open_hearing(selected, profile, used, arguments.words)
     try:
         if arguments.microphone:
             return _listen(arguments, hearing, live)
-        return _read(arguments, list(hear_recording(hearing, clock, sound_of(arguments.file))))
+        return _read(arguments, list(_heard(hearing, clock, sound_of(arguments.file))))
     finally:
         hearing.close()
 
@@ -76,9 +84,9 @@ def _profile(arguments: argparse.Namespace) -> Profile:
     return dataclasses.replace(profile, models={**profile.models, "speech_to_text": only})
 
 
-def _read(arguments: argparse.Namespace, phrases: list[Heard]) -> int:
+def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
     if arguments.json:
-        print(json.dumps([described(heard) for heard in phrases], indent=2))
+        print(json.dumps([_described(heard) for heard in phrases], indent=2))
         return 0
     for heard in phrases:
         print(_line(heard))
@@ -87,7 +95,18 @@ def _read(arguments: argparse.Namespace, phrases: list[Heard]) -> int:
     return 0
 
 
-def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> int:
+def _heard(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
+    """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
+    padded = np.concatenate((sound, np.zeros(count_of(_AFTER_S), np.float32)))
+    for at in range(0, len(padded), BLOCK):
+        samples = padded[at : at + BLOCK]
+        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
+        clock.ns = block.end_ns
+        hearing.feed(block, None)
+        yield from hearing.heard()
+
+
+def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -> int:
     """Follow the microphone until its time is over, or Ctrl-C."""
     robot = load_robot(arguments.robot)
     opened = linked_microphone(robot, device_links(robot), clock)
@@ -98,7 +117,7 @@ def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> in
     deadline_ns = began_ns + round((arguments.seconds or 1e9) * NS_PER_S)
     try:
         for heard in _live(microphone, hearing, clock, deadline_ns):
-            told = described(heard)
+            told = _described(heard)
             since_s = began_ns / NS_PER_S
             told |= {key: round(told[key] - since_s, 3) for key in ("began_s", "ended_s")}
             print(json.dumps(told) if arguments.json else _line(heard, began_ns), flush=True)
@@ -108,8 +127,8 @@ def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> in
 
 
 def _live(
-    microphone: Microphone, hearing: Hearing, clock: Clock, deadline_ns: int
-) -> Iterator[Heard]:
+    microphone: Microphone, hearing: AsrPipeline, clock: Clock, deadline_ns: int
+) -> Iterator[HeardPhrase]:
     """Yield phrases as they end.
 
     Raises:
@@ -125,7 +144,7 @@ def _live(
         clock.sleep_until(clock.now_ns() + _STEP_NS)
 
 
-def _line(heard: Heard, since_ns: int = 0) -> str:
+def _line(heard: HeardPhrase, since_ns: int = 0) -> str:
     began_s, ended_s = (
         (one - since_ns) / NS_PER_S for one in (heard.phrase.began_ns, heard.phrase.ended_ns)
     )
@@ -134,3 +153,15 @@ def _line(heard: Heard, since_ns: int = 0) -> str:
         f"{began_s:7.2f} to {ended_s:.2f} s  {heard.judgement.verdict:<8} "
         f"{heard.confidence:>4.0%}  {heard.text!r}{reason}"
     )
+
+
+def _described(heard: HeardPhrase) -> dict[str, Any]:
+    """Return what was heard as JSON takes it, its times in seconds since the stream began."""
+    return {
+        "began_s": round(heard.phrase.began_ns / NS_PER_S, 3),
+        "ended_s": round(heard.phrase.ended_ns / NS_PER_S, 3),
+        "text": heard.text,
+        "verdict": str(heard.judgement.verdict),
+        "reason": heard.judgement.reason,
+        **evidence(heard),
+    }

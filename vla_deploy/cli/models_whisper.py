@@ -4,23 +4,25 @@ import argparse
 import dataclasses
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from platforms import ModelChoice, Profile
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
-from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.store import Model
 from vla_deploy.perception.model_tools.verifying import Finding
 from vla_deploy.speech.errors import SpeechError
-from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, add_whisper
-from vla_deploy.speech.model_tools.benching import Bench, bench, noises, recordings
+from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, add_whisper, try_out
+from vla_deploy.speech.model_tools.benching import bench, noises, recordings
 from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings
-from vla_deploy.speech.model_tools.checks import Check, checks_of
-from vla_deploy.speech.model_tools.fetching import fetch
-from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.model_tools.fetching import LICENCE, fetch, summary_of
+from vla_deploy.speech.transcript import Transcript
 
 Told = tuple[dict[str, object], str]
 
@@ -46,13 +48,13 @@ def fetch_whisper(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     """Fetch a published Whisper, check it, try it out and keep it."""
     with tempfile.TemporaryDirectory(prefix="vla-deploy-fetch-") as directory:
         folder = Path(directory)
-        published = fetch(arguments.name, folder, arguments.endpoint)
+        fetch(arguments.name, folder, arguments.endpoint)
         request = Request(
             name=arguments.name,
             folder=folder,
-            whisper=Whisper(languages=published.languages, context=Context.PADDED, hot_words=True),
-            summary=published.summary,
-            licence=published.licence,
+            whisper=Whisper(languages=("en",), context=Context.PADDED, hot_words=True),
+            summary=summary_of(arguments.name),
+            licence=LICENCE,
         )
         return _told(
             *add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace)
@@ -75,7 +77,7 @@ def measure(
         rounds=arguments.rounds,
         clock=shelf.clock,
     )
-    return figures.document(), _bench_text(figures)
+    return figures, _bench_text(figures)
 
 
 def calibrate_whisper(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> Told:
@@ -98,18 +100,33 @@ def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterat
     """Check an installed Whisper."""
     name = model.manifest.name
     yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
-    for check, act in checks_of(shelf, model, profile):
-        yield _finding(name, check, act)
+    yield _finding(name, "files", lambda: _hashed(model))
+    yield _finding(name, "run int8", lambda: _tried(model, shelf, PLAIN_CHOICE))
+    if profile is not None:
+        choice = partial(choice_for, model.manifest.role, profile)
+        check = f"profile {profile.name}"
+        yield _finding(name, check, lambda: _tried(model, shelf, choice()))
 
 
-def _finding(model: str, check: str, act: Check) -> Finding:
+def _hashed(model: Model) -> str:
+    check_parts(model)
+    return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
+
+
+def _tried(model: Model, shelf: ModelShelf, choice: ModelChoice) -> str:
+    silence = try_out(model, shelf.clock, choice)
+    took = f"{choice.precision}, {choice.threads} threads, {1000 * silence.took_s:.0f} ms"
+    return f"reads {silence.text!r} in silence; {took}"
+
+
+def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
     try:
         return Finding(model=model, check=check, is_ok=True, detail=act())
     except (InferenceError, SpeechError) as error:
         return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
-def _told(model: Model, silence: Reading) -> Told:
+def _told(model: Model, silence: Transcript) -> Told:
     name = model.manifest.name
     document: dict[str, object] = {
         "name": name,
@@ -128,17 +145,17 @@ def _told(model: Model, silence: Reading) -> Told:
     return document, text
 
 
-def _bench_text(figures: Bench) -> str:
+def _bench_text(figures: dict[str, Any]) -> str:
     rows = [
-        f"{row.sound:<20} {row.duration_s:>5.1f} s {1000 * row.median_s:>8.1f} ms "
-        f"{1000 * row.p95_s:>8.1f} ms {row.real_time_factor:>6.3f}  {row.text}"
-        for row in figures.rows
+        f"{row['sound']:<20} {row['duration_s']:>5.1f} s {1000 * row['median_s']:>8.1f} ms "
+        f"{1000 * row['p95_s']:>8.1f} ms {row['real_time_factor']:>6.3f}  {row['text']}"
+        for row in figures["rows"]
     ]
     return "\n".join(
         [
             f"{'sound':<20} {'length':>7} {'median':>11} {'p95':>11} {'factor':>6}  text",
             *rows,
-            f"{figures.provider}, {figures.threads} threads, beam {figures.beam}; loaded in "
-            f"{figures.load_s:.2f} s, {figures.memory_mb:.0f} MB",
+            f"{figures['provider']}, {figures['threads']} threads, beam {figures['beam']}; "
+            f"loaded in {figures['load_s']:.2f} s, {figures['memory_mb']:.0f} MB",
         ]
     )

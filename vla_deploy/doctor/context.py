@@ -14,6 +14,7 @@ from platforms.board import Board, identify
 from platforms.tree import Missing, Tree
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import RobotDescription
+from vla_deploy.state_dir import system_models_dir
 
 COMMAND_TIMEOUT_S: Final = 10.0
 UNLIMITED: Final = -1
@@ -62,7 +63,7 @@ def live_context(
     models: Path,
     profile_fault: str = "",
 ) -> Context:
-    """Return this very computer; `models` is where a person has added some."""
+    """Return this very computer; `models` is where a person has added some, beside root's."""
     return Context(
         tree=Tree(),
         is_live=True,
@@ -72,7 +73,7 @@ def live_context(
         rights=read_rights(),
         ask=ask_command,
         clock=MonotonicClock(),
-        models=ModelStore(models),
+        models=ModelStore(models, system=system_models_dir()),
         profile_fault=profile_fault,
     )
 

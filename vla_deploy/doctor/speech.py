@@ -8,10 +8,11 @@ from vla_deploy.doctor.finding import Finding, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.stop_words.errors import StopWordsError
+from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.stop_words.listener import OFF
-from vla_deploy.speech.stop_words.opening import open_spotter
-from vla_deploy.state_dir import user_base
+from vla_deploy.speech.stop_words.spotter import open_spotter
+from vla_deploy.state_dir import engines_dir_of
+from vla_deploy.supervisor.runtime import default_base
 
 NAME: Final = "spoken stop"
 
@@ -27,12 +28,13 @@ def spoken_stop(context: Context) -> Iterator[Finding]:
         remedy = 'set speech.stop_words = "normal" in the profile'
         yield warn(NAME, "switched off: nobody can stop the robot by voice", remedy)
     else:
-        shelf = ModelShelf.of_base(user_base(), context.clock)
+        engines = engines_dir_of(default_base())
+        shelf = ModelShelf(store=context.models, engines=engines, clock=context.clock)
         try:
-            spotter, thresholds = open_spotter(shelf, profile)
-        except (InferenceError, StopWordsError) as error:
+            spotter = open_spotter(shelf, profile)
+        except (InferenceError, SpeechError) as error:
             yield warn(NAME, one_line(error), "vla-deploy models list")
             return
         chosen = profile.speech.stop_words
         words = ", ".join(spotter.words)
-        yield ok(NAME, f"{words}; sensitivity {chosen}, from {thresholds[chosen]:g} on")
+        yield ok(NAME, f"{words}; sensitivity {chosen}, from {spotter.thresholds[chosen]:g} on")

@@ -17,9 +17,8 @@ from vla_deploy.robots.schema import (
 )
 
 KEY_WORDS: Final = "key_words"
-THRESHOLDS: Final = ("low", "normal", "high", "own_voice")
-"""How easily a word is taken for said: high alarms at the slightest; the last one is for the time
-in which the robot itself speaks."""
+THRESHOLDS: Final = ("low", "normal", "high")
+"""How easily a word is taken for said: high alarms at the slightest."""
 
 _THRESHOLD: Final = Check(
     expected="a number above 0 and up to 1", holds=lambda value: is_number(value) and 0 < value <= 1

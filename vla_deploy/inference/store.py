@@ -25,15 +25,20 @@ class Model:
 
 
 class ModelStore:
-    """Look models up by name in both places; no name is in both."""
+    """Look models up by name: embedded ones, then added ones; no name is in both.
 
-    def __init__(self, user: Path, embedded: Path = EMBEDDED) -> None:
+    With `system` those that root has added are found, too, where a person has not.
+    """
+
+    def __init__(self, user: Path, embedded: Path = EMBEDDED, system: Path | None = None) -> None:
         self.user = user
         self.embedded = embedded
+        self._added = (user,) if system in (None, user) else (user, system)
 
     def names(self) -> tuple[str, ...]:
         """Return the name of every model, sorted; a spoiled manifest has one too."""
-        return tuple(sorted({*_names(self.embedded), *_names(self.user)}))
+        folders = (self.embedded, *self._added)
+        return tuple(sorted({name for folder in folders for name in _names(folder)}))
 
     def load(self, name: str) -> Model:
         """Return a model by its name.
@@ -42,13 +47,15 @@ class ModelStore:
             ModelUnknown: there is none of that name.
             ManifestInvalid: its manifest has faults.
         """
-        for folder, is_embedded in ((self.embedded / name, True), (self.user / name, False)):
+        places = ((self.embedded, True), *((added, False) for added in self._added))
+        for folder, is_embedded in ((place / name, embedded) for place, embedded in places):
             if is_name(name) and (folder / MANIFEST).is_file():
                 manifest = read_manifest(folder)
                 return Model(manifest=manifest, folder=folder, is_embedded=is_embedded)
         known = ", ".join(self.names()) or "none"
         raise ModelUnknown(
-            f"no model {name!r}: expected one of {known}, from {self.embedded} or {self.user}; "
+            f"no model {name!r}: expected one of {known}, from {self.embedded} or "
+            f"{' or '.join(map(str, self._added))}; "
             "add one by: vla-deploy models add"
         )
 

@@ -9,14 +9,16 @@ from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.devices import linked_microphone, linked_speaker
+from vla_deploy.speech.microphone import linked_microphone
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_page_stop_words, build_stop_words
-from vla_deploy.speech.voice.engines import build_voice
+from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
+from vla_deploy.speech.voice.audio_player import linked_speaker
+from vla_deploy.speech.voice.robot_voice import build_voice
 
 SYNTHESIS_S: Final = 0.1
 RECOGNITION_S: Final = 0.25
 """What a sentence takes, of simulated time."""
+LOADING_S: Final = 1.0
 
 
 def build(context: NodeContext) -> SpeechNode:
@@ -33,9 +35,10 @@ def build(context: NodeContext) -> SpeechNode:
         profile,
         linked_microphone(robot, links, clock),
         beside("recogniser", clock, RECOGNITION_S),
+        beside("loader", clock, LOADING_S),
         voice=voice,
-        listeners=[build_stop_words(context, profile, voice)],
-        page_listeners=[build_page_stop_words(context, profile)],
+        stop_words=build_stop_words(context, profile, voice),
+        page_stop_words=build_stop_words(context, profile, place=PAGE),
     )
 
 

@@ -3,87 +3,74 @@
 The rule, while the robot speaks and until its sound has died away:
 
 - A frame counts as a person's only if the voice network is sure of it, and if it is louder than the
-  robot's own voice may be at the microphone. Everything else is dropped.
-- The voice tells how loud the robot may be at its microphone, once its echo is taken out. Where it
-  cannot, that is learnt while it speaks, and a margin added: quickly when it is less loud than
-  thought, slowly when it is louder, since that may be a person.
-- Enough such frames within a short time are a person who barges in: the voice is told to fall
-  silent, and from then on everything is heard until the robot speaks again.
-- The listeners to the raw stream, such as the stop words, are not touched by any of this.
+  robot's own voice may be at the microphone once its echo is taken out. Everything else is dropped.
+- Enough such frames within a short time are a person who barges in: the voice falls silent, and
+  from then on everything is heard until the robot speaks again.
+- What still comes through may be the robot's own words: in a phrase that began while it sounded,
+  with nobody barging in, and that ended with that sound. A person who answers quickly goes on.
+- The keyword network for stops is not touched by any of this.
 """
 
 from collections import deque
 from typing import Final
 
-from vla_deploy.speech.companions import Playing
-from vla_deploy.speech.sound import SILENCE_DB
-from vla_deploy.speech.voice_activity import FRAME_S
+from drivers.clock import NS_PER_S
+from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.sound import Playing
 
 SURE: Final = 0.8
-MARGIN_DB: Final = 6.0
 BARGE_FRAMES: Final = 6
 WITHIN_FRAMES: Final = 10
-START_COUPLING_DB: Final = 0.0
-_DELAY_FRAMES: Final = 8
-_DOWN_DB_S: Final = 12.0
-_UP_DB_S: Final = 1.0
-_QUIET_DB: Final = -50.0
+OUTLASTS_NS: Final = 3 * NS_PER_S // 10
+"""A voice that goes on for so long after the robot's sound has died away is a person's."""
 
 
 class EchoGate:
     """Follow what the speaker plays, and judge each frame of the microphone by it."""
 
     def __init__(self) -> None:
-        self.coupling_db = START_COUPLING_DB
-        self._played_db: deque[float] = deque(maxlen=_DELAY_FRAMES)
-        self._taken_db: deque[float] = deque(maxlen=_DELAY_FRAMES)
+        self._playing: Playing | None = None
+        self._until_ns = 0
         self._persons: deque[bool] = deque(maxlen=WITHIN_FRAMES)
-        self._speaking = False
-        self._told_db: float | None = None
         self._opened = False
+        self._own_words = ""
 
     @property
     def is_shut(self) -> bool:
-        """Tell whether the robot can be heard at this moment, and nobody has barged in."""
-        return self._speaking and not self._opened
+        """Return whether the robot can be heard at this moment, and nobody has barged in."""
+        return self._playing is not None and not self._opened
 
-    @property
-    def echo_db(self) -> float:
-        """Return how loud the robot's own voice may be at the microphone."""
-        if self._told_db is not None:
-            return self._told_db
-        return max(self._played_db, default=SILENCE_DB) + self.coupling_db + MARGIN_DB
-
-    def follow(self, playing: Playing | None) -> None:
-        """Take what sounds, and what of it still hangs in the room, as the next frame is judged."""
-        self._played_db.append(SILENCE_DB if playing is None else playing.level_db)
-        self._speaking = playing is not None
-        self._told_db = None if playing is None else playing.echo_db
+    def follow(self, playing: Playing | None, end_ns: int) -> None:
+        """Take what sounds, the room's answer included, during the frame that ends at `end_ns`."""
+        self._playing = playing
         if playing is None:
             self._opened = False
             self._persons.clear()
-            self._taken_db.clear()
+        else:
+            self._until_ns = end_ns
 
     def is_person(self, level_db: float, voice: float) -> bool:
         """Judge one frame of the microphone while the gate is shut."""
-        self._learn(level_db)
-        is_person = voice >= SURE and level_db >= self.echo_db
+        loudest_db = level_db if self._playing is None else self._playing.echo_db
+        is_person = voice >= SURE and level_db >= loudest_db
         self._persons.append(is_person)
         return is_person
 
     def barges_in(self) -> bool:
-        """Tell, once, that a person speaks into what the robot says, and open the gate."""
+        """Return, once, that a person speaks into what the robot says, and open the gate."""
         if sum(self._persons) < BARGE_FRAMES:
             return False
         self._opened = True
         self._persons.clear()
+        self._own_words = ""
         return True
 
-    def _learn(self, level_db: float) -> None:
-        """Compare what was loudest of late on both sides: words have gaps, and sound takes time."""
-        self._taken_db.append(level_db)
-        loudest_db = max(self._played_db, default=SILENCE_DB)
-        if loudest_db < _QUIET_DB:
-            return
-        step_db = max(self._taken_db) - loudest_db - self.coupling_db
-        self.coupling_db += min(max(step_db, -_DOWN_DB_S * FRAME_S), _UP_DB_S * FRAME_S)
+    def note_begun(self) -> None:
+        """Note that a phrase begins."""
+        playing = None if self._opened else self._playing
+        self._own_words = "" if playing is None else playing.text
+
+    def own_words(self, phrase: Phrase) -> str:
+        """Return what the robot was saying in a phrase that pauses or ends; mostly nothing."""
+        outlasts = phrase.ended_ns > self._until_ns + OUTLASTS_NS
+        return "" if outlasts else self._own_words

@@ -1,14 +1,21 @@
-"""Group the errors of hearing by what the caller can do about them.
+"""Group the errors of hearing and speaking by what the caller can do about them.
 
 SpeechError
-├── SpeechMissing       the `speech` extra is not installed: install it
-├── RecordingsInvalid   recordings to learn from cannot be used: mend the folder
-└── NoRecogniser        no model can be opened: the robot is deaf to words, typed commands go on
+├── SpeechMissing         the `speech` extra is not installed: install it
+├── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
+├── SpotterMismatch       the model is not one that the spotter of stop words can run
+└── VoiceError
+    ├── EngineMissing     the program that speaks, or its voice, is not here: install it
+    ├── SynthesisFailed   the program ran and gave no sound: its own words are in the message
+    └── OrderRefused      what was to be said is no order: mend whoever gave it
 """
+
+from importlib import import_module
+from typing import Any
 
 
 class SpeechError(Exception):
-    """Base of everything that hearing raises."""
+    """Base of everything that hearing and speaking raise."""
 
 
 class SpeechMissing(SpeechError):
@@ -19,5 +26,35 @@ class RecordingsInvalid(SpeechError):
     """Say what is wrong with a folder of recordings."""
 
 
-class NoRecogniser(SpeechError):
-    """Say why no model turns speech into text."""
+class SpotterMismatch(SpeechError):
+    """Say what a model needs that the spotter does not give."""
+
+
+class VoiceError(SpeechError):
+    """Base of everything that keeps the robot silent."""
+
+
+class EngineMissing(VoiceError):
+    """Say which program or voice is missing, and how to get it."""
+
+
+class SynthesisFailed(VoiceError):
+    """Say why a text did not become sound."""
+
+
+class OrderRefused(VoiceError):
+    """Say what was expected in an order to speak."""
+
+
+def import_extra(module: str, purpose: str) -> Any:
+    """Return a module of the `speech` extra, or one of ours that needs it.
+
+    Raises:
+        SpeechMissing: it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise SpeechMissing(
+            f"{purpose} ({error}): pip install 'vla-deploy[speech]'; typed commands go on"
+        ) from error

@@ -1,18 +1,64 @@
 """Keep one microphone open, whichever kind it is, and give what it hears as one 16 kHz stream."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Final
 
-from drivers.audio.base import AudioBlock, AudioInput
+import numpy as np
+
+from drivers.audio.base import FULL_SCALE, AudioBlock, AudioFormat, AudioInput, Samples
+from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock
+from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.speech.resampling import Resampler
-from vla_deploy.speech.sound import SoundBlock
+from vla_deploy.robots.description import Audio, RobotDescription
+from vla_deploy.speech.errors import import_extra
+from vla_deploy.speech.sound import RATE_HZ, Sound, SoundBlock
 
 OpenInput = Callable[[], AudioInput]
 SILENT_NS: Final = 2 * NS_PER_S
 """A device that is there and gives nothing for so long is said to be silent."""
 _GAP_NS: Final = NS_PER_S // 20
+_MONO: Final = {"format": "flt", "layout": "mono"}
+
+
+class Resampler:
+    """Convert a stream block by block; what the filter still holds comes with the next block.
+
+    Channels are averaged, then FFmpeg's resampler changes the rate: it lets through nothing above
+    half of 16 kHz, and adds no delay.
+    """
+
+    def __init__(self, format_: AudioFormat) -> None:
+        """Prepare for one format.
+
+        Raises:
+            SpeechMissing: the rate is another one than 16 kHz, and PyAV is not installed.
+        """
+        self._rate_hz = format_.rate_hz
+        self._av: Any = None
+        if format_.rate_hz != RATE_HZ:
+            self._av = import_extra("av", "sound of another rate than 16 kHz needs PyAV")
+        self._resampler: Any = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what came before: the next block does not continue it."""
+        if self._av is not None:
+            self._resampler = self._av.AudioResampler(**_MONO, rate=RATE_HZ)
+
+    def feed(self, samples: Samples) -> Sound:
+        """Return what a block, (n, channels), makes at 16 kHz; it may be a little or nothing."""
+        mono: Sound = samples.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE)
+        if self._resampler is None or not len(mono):
+            return mono
+        return self._converted(mono)
+
+    def _converted(self, mono: Sound) -> Sound:
+        frame = self._av.AudioFrame.from_ndarray(mono[None], **_MONO)
+        frame.sample_rate = self._rate_hz
+        parts = [one.to_ndarray()[0] for one in self._resampler.resample(frame)]
+        return np.concatenate(parts, dtype=np.float32) if parts else np.zeros(0, np.float32)
 
 
 class Microphone:
@@ -75,3 +121,18 @@ class Microphone:
         samples = self._resampler.feed(block.samples)
         self._end_ns = block.stamp_ns + block.format.duration_ns(len(block.samples))
         return SoundBlock(stamp_ns=block.stamp_ns, samples=samples, follows=follows)
+
+
+def linked_microphone(
+    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
+) -> OpenInput | None:
+    """Return how to open the microphone by the path of its link; None where there is none."""
+    audio = robot.microphone
+    if audio is None:
+        return None
+    return partial(open_audio_input, links[audio.device].path, clock, format_of(audio))
+
+
+def format_of(audio: Audio) -> AudioFormat:
+    """Return the format that a robot file declares."""
+    return AudioFormat(rate_hz=audio.rate_hz, channels=audio.channels)

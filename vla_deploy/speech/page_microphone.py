@@ -12,51 +12,38 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.audio.base import AudioFormat
-from drivers.audio.pushed import PushedInput
-from drivers.clock import Clock
-from drivers.errors import LinkLost
+from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import BadPayload, RecordReader
 from vla_deploy.ipc.page_sound import PageSound, Step, unpacked
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.resampling import Resampler
-from vla_deploy.speech.sound import SoundBlock, count_of
-from vla_deploy.speech.voice_activity import FRAME
+from vla_deploy.speech.microphone import Resampler
+from vla_deploy.speech.sound import FRAME, Sound, SoundBlock, count_of, duration_ns
 
 TAIL_S: Final = 0.3
 """Silence beyond what ends a phrase: frames do not end where a turn does."""
+SILENT_NS: Final = 3 * NS_PER_S
 _log = logging.getLogger(__name__)
 
 
 class _Turn:
-    """Hold the turn of one speaker."""
+    """Hold the turn of one speaker; a browser's clock means nothing here."""
 
-    def __init__(self, sound: PageSound, clock: Clock) -> None:
-        format_ = AudioFormat(rate_hz=sound.rate_hz)
+    def __init__(self, sound: PageSound, now_ns: int) -> None:
         self.number = sound.turn
-        self.input = PushedInput(format_, clock)
-        self._resampler = Resampler(format_)
-        self._follows = False
-        self._end_ns = clock.now_ns()
+        self.heard_ns = now_ns
+        self._resampler = Resampler(AudioFormat(rate_hz=sound.rate_hz))
+        self._end_ns = 0
 
-    def block(self) -> SoundBlock | None:
-        """Return what has been pushed since the last call.
+    def heard(self, sound: PageSound, now_ns: int) -> SoundBlock:
+        """Return what has arrived now."""
+        self.heard_ns = now_ns
+        return self.block(self._resampler.feed(sound.samples[:, None]))
 
-        Raises:
-            LinkLost: nothing has been for too long.
-        """
-        pushed = self.input.poll()
-        if pushed is None:
-            return None
-        samples = self._resampler.feed(pushed.samples)
-        return self._stamped(samples, pushed.stamp_ns)
-
-    def silence(self, seconds: float) -> SoundBlock:
-        """Return so much silence after what was said."""
-        return self._stamped(np.zeros(count_of(seconds), np.float32), self._end_ns)
-
-    def _stamped(self, samples: "np.ndarray[Any, np.dtype[np.float32]]", at_ns: int) -> SoundBlock:
-        block = SoundBlock(stamp_ns=at_ns, samples=samples, follows=self._follows)
-        self._follows, self._end_ns = True, block.end_ns
+    def block(self, samples: Sound) -> SoundBlock:
+        """Return sound that ends now, behind what was heard before."""
+        stamp_ns = max(self._end_ns, self.heard_ns - duration_ns(len(samples)))
+        block = SoundBlock(stamp_ns=stamp_ns, samples=samples, follows=self._end_ns > 0)
+        self._end_ns = block.end_ns
         return block
 
 
@@ -68,11 +55,11 @@ class PageMicrophone:
         self._clock = clock
         self._turn: _Turn | None = None
         self._why = ""
-        self._turns = self._cut = self._lost = 0
+        self._turns = self._cut = 0
 
     @property
     def is_open(self) -> bool:
-        """Tell whether a person holds the button."""
+        """Return whether a person holds the button."""
         return self._turn is not None
 
     def poll(self, silence_s: float) -> Iterator[SoundBlock]:
@@ -82,18 +69,14 @@ class PageMicrophone:
                 yield from self._take(unpacked(record.payload), silence_s)
             except BadPayload as error:
                 _log.warning("dropped what the page sent: %s", error)
-        if self._turn is not None:
-            yield from self._heard(self._turn)
+        turn = self._turn
+        if turn is not None and self._clock.now_ns() - turn.heard_ns > SILENT_NS:
+            yield from self._cut_off()
 
     def document(self) -> dict[str, Any]:
         """Return how it fares, as `speech_status` tells it."""
-        return {
-            "speaking": self.is_open,
-            "why": self._why,
-            "turns": self._turns,
-            "cut": self._cut,
-            "lost_samples": self._lost,
-        }
+        counts = {"turns": self._turns, "cut": self._cut}
+        return {"speaking": self.is_open, "why": self._why, **counts}
 
     def _take(self, sound: PageSound, silence_s: float) -> Iterator[SoundBlock]:
         if self._turn is None or self._turn.number != sound.turn:
@@ -102,11 +85,11 @@ class PageMicrophone:
         turn = self._turn
         if turn is None:
             return
-        turn.input.push(sound.samples[:, None])
+        if len(sound.samples):
+            yield turn.heard(sound, self._clock.now_ns())
         if sound.step is Step.ENDED:
-            yield from self._heard(turn)
-            yield turn.silence(silence_s + TAIL_S)
-            self._close()
+            yield turn.block(np.zeros(count_of(silence_s + TAIL_S), np.float32))
+            self._turn = None
         elif sound.step is Step.CUT:
             yield from self._cut_off()
 
@@ -114,32 +97,17 @@ class PageMicrophone:
         if sound.step is not Step.SOUND:
             return  # the end of a turn of which nothing came
         try:
-            self._turn = _Turn(sound, self._clock)
+            self._turn = _Turn(sound, self._clock.now_ns())
         except SpeechMissing as error:
             self._why = str(error)
             return
         self._turns += 1
         self._why = ""
 
-    def _heard(self, turn: _Turn) -> Iterator[SoundBlock]:
-        try:
-            block = turn.block()
-        except LinkLost:
-            yield from self._cut_off()
-            return
-        if block is not None:
-            yield block
-
     def _cut_off(self) -> Iterator[SoundBlock]:
         """Leave a gap, by which whatever was begun is forgotten."""
         if self._turn is not None:
             self._cut += 1
-            self._close()
+            self._turn = None
             now_ns = self._clock.now_ns()
             yield SoundBlock(stamp_ns=now_ns, samples=np.zeros(FRAME, np.float32), follows=False)
-
-    def _close(self) -> None:
-        if self._turn is not None:
-            self._lost += self._turn.input.counters.lost_samples
-            self._turn.input.close()
-        self._turn = None

@@ -1,15 +1,15 @@
 """Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
 
 import math
-from collections import deque
-from importlib import import_module
+import os
 from typing import Any, Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from drivers.latency import LatencyHistogram
 from platforms import ModelChoice
+from vla_deploy.aside import background
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
@@ -18,14 +18,10 @@ from vla_deploy.inference.providers import CPU, CUDA
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.reading import Reading, others_of
-from vla_deploy.speech.sound import NOTHING, RATE_HZ, Sound
-from vla_deploy.speech.stop_ear import open_stop_ear
-from vla_deploy.speech.stop_odds import ASKED_FROM, stop_odds
+from vla_deploy.speech.errors import import_extra
+from vla_deploy.speech.sound import RATE_HZ, Sound
+from vla_deploy.speech.transcript import Transcript, others_of
 
-LATELY: Final = 16
-"""So many of the last readings tell how busy the computer is."""
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
@@ -39,6 +35,8 @@ _COMPUTE: Final = {
 }
 _DEVICES: Final = {CPU: "cpu", CUDA: "cuda"}
 _RUNTIME: Final = "vla_deploy.speech.whisper_runtime"
+_MODEL_ERRORS: Final = (RuntimeError, ValueError, OSError, KeyError, TypeError)
+"""What faster-whisper and CTranslate2 raise."""
 
 
 class Recogniser:
@@ -58,16 +56,12 @@ class Recogniser:
         self.memory_mb = 0.0
         self.claim = MemoryClaim()
         self.latency = LatencyHistogram()
-        self.lately_ns: deque[int] = deque(maxlen=LATELY)
         self._whisper: Any = whisper
         self._clock = clock
         self._beam = beam
-        self._stop_ear = open_stop_ear(model)
 
-    def read(self, samples: Sound, hot_words: str = "", earlier: Sound = NOTHING) -> Reading:
+    def read(self, samples: Sound, hot_words: str = "") -> Transcript:
         """Return what is said in a phrase of at most 29 s.
-
-        `earlier` is what was heard just before: it helps the ear for stop words.
 
         Raises:
             RunFailed: the model fails, or is closed.
@@ -77,26 +71,21 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
-            text = " ".join(one.text.strip() for one in segments).strip()
-            stop_surety = self._stop_surety(samples, earlier)
-            odds = self._stop_odds(text, stop_surety)
-        except _model_errors() as error:
+        except _MODEL_ERRORS as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
-        self.lately_ns.append(took_ns)
-        weights = [max(1, len(one.tokens)) for one in segments]
-        return Reading(
-            text=text,
-            log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
-            no_speech=_mean([one.no_speech_prob for one in segments], weights, 1.0),
-            compression=max((one.compression_ratio for one in segments), default=0.0),
+        # Without timestamps a window is one segment, and a phrase is one window.
+        segment = segments[0] if segments else None
+        return Transcript(
+            text="" if segment is None else segment.text.strip(),
+            log_probability=0.0 if segment is None else segment.avg_logprob,
+            no_speech=1.0 if segment is None else segment.no_speech_prob,
+            compression=0.0 if segment is None else segment.compression_ratio,
             language=info.language,
             duration_s=len(samples) / RATE_HZ,
             took_s=took_ns / NS_PER_S,
             others=others_of(self._whisper.hypotheses),
-            stop_surety=stop_surety,
-            stop_odds=odds,
         )
 
     def document(self) -> dict[str, Any]:
@@ -117,22 +106,8 @@ class Recogniser:
         """Release the memory; closing twice is allowed."""
         if self._whisper is not None:
             self._whisper.model.unload_model()
-            if self._stop_ear is not None:
-                self._stop_ear.close()
         self._whisper = None
         self.claim.release()
-
-    def _stop_surety(self, samples: Sound, earlier: Sound) -> float | None:
-        if self._stop_ear is None:
-            return None
-        return self._stop_ear.surety_of(samples, earlier, self._whisper.frames_of)
-
-    def _stop_odds(self, text: str, surety: float | None) -> float | None:
-        """Return how likely a stop word was said instead, where somebody suspects one."""
-        # Of several windows of sound only the last could be asked about.
-        if surety is None or surety < ASKED_FROM or len(self._whisper.hypotheses) != 1:
-            return None
-        return stop_odds(text, self._whisper.log_probabilities)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
@@ -157,8 +132,11 @@ class Recogniser:
         return list(segments), info
 
     def _language(self) -> str | None:
-        """Return the language to expect; None lets a model that knows several find out."""
-        return None if self._whisper.model.is_multilingual else "en"
+        """Return the language that is spoken; None finds out, at the cost of encoding twice."""
+        if not self._whisper.model.is_multilingual:
+            return "en"
+        declared = self.declared.languages
+        return declared[0] if len(declared) == 1 else None
 
 
 def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Clock) -> Recogniser:
@@ -171,22 +149,22 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
         RunFailed: it cannot run.
     """
     before_mb, started_ns = resident_mb(), clock.now_ns()
-    runtime = _runtime()
-    check_parts(model)
+    runtime = import_extra(_RUNTIME, "turning speech into text needs faster-whisper")
+    # Hashing half a gigabyte gives way to the steps. The model itself is made by this thread, since
+    # the threads that it starts inherit the priority, and phrases are to be read without delay.
+    with background(MonotonicClock()) as thread:
+        thread.submit(check_parts, model).result()
     provider = _provider(choice, runtime)
-    declared = model.manifest.whisper
-    is_trimmed = declared is not None and declared.context == Context.TRIMMED
-    kind = runtime.TrimmedWhisper if is_trimmed else runtime.Whisper
     try:
-        whisper = kind(
+        whisper = runtime.Whisper(
             str(model.folder),
             device=_DEVICES[provider],
             compute_type=_COMPUTE[provider, choice.precision],
-            cpu_threads=choice.threads,
+            cpu_threads=min(choice.threads, len(os.sched_getaffinity(0))),
             num_workers=1,
             local_files_only=True,
         )
-    except runtime.MODEL_ERRORS as error:
+    except _MODEL_ERRORS as error:
         raise ModelFileSpoiled(
             f"{model.folder}: {runtime.VERSION} cannot load it: {one_line(error)}; expected a "
             "Whisper converted by CTranslate2: add the model again"
@@ -194,7 +172,6 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     recogniser = Recogniser(model, whisper, clock, provider=provider, beam=beam)
     recogniser.read(np.zeros(RATE_HZ, np.float32))
     recogniser.latency.reset()
-    recogniser.lately_ns.clear()
     recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
     return recogniser
@@ -215,22 +192,3 @@ def _provider(choice: ModelChoice, runtime: Any) -> str:
         f"CTranslate2 here runs nothing of {', '.join(asked)} in {choice.precision}; "
         "allow the CPU in int8 or fp32, or install a CTranslate2 built with CUDA"
     )
-
-
-def _runtime() -> Any:
-    try:
-        return import_module(_RUNTIME)
-    except ImportError as error:
-        raise SpeechMissing(
-            f"turning speech into text needs faster-whisper ({error}): "
-            "pip install 'vla-deploy[speech]'"
-        ) from error
-
-
-def _model_errors() -> tuple[type[Exception], ...]:
-    errors: tuple[type[Exception], ...] = _runtime().MODEL_ERRORS
-    return errors
-
-
-def _mean(values: list[float], weights: list[int], nothing: float) -> float:
-    return float(np.average(values, weights=weights)) if values else nothing

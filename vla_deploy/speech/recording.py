@@ -1,23 +1,17 @@
-"""Hear a whole recording as the robot would hear it live, only faster."""
+"""Hear without a process around it: a recording, or a microphone of the command line."""
 
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from typing import Any, Final
+from typing import Final
 
-import numpy as np
-
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
-from vla_deploy.speech.hearing import Heard, Hearing, Suspicion, unsuspected
-from vla_deploy.speech.readings import Readings
-from vla_deploy.speech.recogniser import Recogniser
-from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
-from vla_deploy.speech.telling import evidence
+from vla_deploy.speech.asr_pipeline import AsrPipeline
+from vla_deploy.speech.model_selection import SelectedRecogniser
+from vla_deploy.speech.sound import count_of
+from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
 
 BLOCK: Final = count_of(0.02)
-AFTER_S: Final = 1.5
 
 
 class StreamClock:
@@ -36,46 +30,14 @@ class StreamClock:
 
 
 def open_hearing(
-    recogniser: Recogniser | None,
-    why: str,
-    profile: Profile,
-    clock: Clock,
-    hot_words: str = "",
-    suspicion: Suspicion = unsuspected,
-    executor: Executor | None = None,
-) -> Hearing:
+    selected: SelectedRecogniser, profile: Profile, clock: Clock, hot_words: str = ""
+) -> AsrPipeline:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
-
-    An `executor` of one thread, or one that works at once, may read in its own way.
 
     Raises:
         SpeechMissing: faster-whisper is not installed.
         InferenceError: its voice network cannot be opened.
     """
-    readings = Readings(executor or AtOnce(), clock)
-    readings.take(recogniser, why)
-    activity = open_voice_activity(clock)
-    return Hearing(activity, readings, profile.speech, lambda: hot_words, suspicion)
-
-
-def hear_recording(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterator[Heard]:
-    """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
-    padded = np.concatenate((sound, np.zeros(count_of(AFTER_S), np.float32)))
-    for at in range(0, len(padded), BLOCK):
-        samples = padded[at : at + BLOCK]
-        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
-        clock.ns = block.end_ns
-        hearing.feed(block, None)
-        yield from hearing.heard()
-
-
-def described(heard: Heard) -> dict[str, Any]:
-    """Return what was heard as JSON takes it, its times in seconds since the stream began."""
-    return {
-        "began_s": round(heard.phrase.began_ns / NS_PER_S, 3),
-        "ended_s": round(heard.phrase.ended_ns / NS_PER_S, 3),
-        "text": heard.text,
-        "verdict": str(heard.judgement.verdict),
-        "reason": heard.judgement.reason,
-        **evidence(heard),
-    }
+    queue = TranscriptionQueue(AtOnce(), clock)
+    queue.selected = selected
+    return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)

@@ -6,7 +6,6 @@ arithmetic that wait for work give their core away.
 
 import logging
 import os
-from collections.abc import Sequence
 from typing import Any
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
@@ -18,13 +17,11 @@ os.environ["KMP_BLOCKTIME"] = "0"
 import ctranslate2
 import faster_whisper
 import numpy as np
-from faster_whisper.audio import pad_or_trim
 from faster_whisper.transcribe import get_compression_ratio
 from numpy.typing import NDArray
 
 # It tells the log of every phrase; what was heard is told in `heard`, and nowhere else.
 logging.getLogger("faster_whisper").setLevel(logging.WARNING)
-MODEL_ERRORS: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError, KeyError, TypeError)
 VERSION: str = f"faster-whisper {faster_whisper.__version__}"
 _MARGIN_FRAMES = 40
 _FRAMES_PER_STATE = 2
@@ -34,18 +31,27 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     """Keep what else the search found beside what it read, which the library drops.
 
     `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
-    the best first. Whoever reads empties them before.
+    the best first. Whoever reads empties them before. With `content_frames` the encoder is given
+    only so many frames and a little silence, for weights that were trained so: the library itself
+    always pads to its window.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
-        self._read: tuple[ctranslate2.StorageView, list[int], Any] | None = None
+        self.content_frames: int | None = None
 
-    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what the encoder would be given of a phrase, (mel, frame)."""
-        frames: NDArray[np.float32] = pad_or_trim(self.feature_extractor(samples))
-        return frames
+    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
+        """Return what the encoder makes of features, (mel bands, frames)."""
+        if self.content_frames is None:
+            return super().encode(features)
+        kept = self.content_frames + _MARGIN_FRAMES
+        kept += kept % _FRAMES_PER_STATE
+        # CTranslate2 takes what has as many rows as there are mel bands for features, and would
+        # encode its own states once more (`WhisperEncoder::is_encoded`).
+        if kept // _FRAMES_PER_STATE == features.shape[-2]:
+            kept += _FRAMES_PER_STATE
+        return super().encode(np.ascontiguousarray(features[..., :kept]))
 
     def generate_with_fallback(
         self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any
@@ -72,7 +78,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
             suppress_tokens=how.suppress_tokens,
             max_initial_timestamp_index=round(how.max_initial_timestamp / self.time_precision),
         )[0]
-        self._read = encoder_output, prompt, tokenizer
         found = [
             (tokenizer.decode(tokens).strip(), score * len(tokens) ** how.length_penalty)
             for tokens, score in zip(result.sequences_ids, result.scores, strict=True)
@@ -82,63 +87,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
         # The end of the text is a token, too.
         mean = log_probability / (len(result.sequences_ids[0]) + 1)
         return result, mean, 0.0, get_compression_ratio(text)
-
-    def log_probabilities(self, texts: Sequence[str]) -> list[float]:
-        """Return the logarithm of each text's probability, given the window that was read last."""
-        assert self._read is not None, "nothing was read yet"
-        encoded, prompt, tokenizer = self._read
-        tokens = [tokenizer.encode(f" {text}") if text else [] for text in texts]
-        states = np.array(encoded.to_device(ctranslate2.Device.cpu))
-        results = self.model.generate(
-            ctranslate2.StorageView.from_array(np.repeat(states, len(texts), axis=0)),
-            [[*prompt, *each] for each in tokens],
-            beam_size=1,
-            # As above, it ends a text at half of that.
-            max_length=len(prompt) + 2 * (1 + max(map(len, tokens))),
-            return_logits_vocab=True,
-            suppress_blank=False,
-            suppress_tokens=[],
-        )
-        return [
-            _log_probability(result.logits[0], [*each, tokenizer.eot])
-            for result, each in zip(results, tokens, strict=True)
-        ]
-
-
-class TrimmedWhisper(Whisper):
-    """Give the encoder only the sound that is there, and a little silence.
-
-    For weights that were trained so: the library itself always pads to its window.
-    """
-
-    content_frames: int = 0
-
-    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
-        """Return what the encoder makes of features, (mel bands, frames)."""
-        return super().encode(_trimmed(features, self.content_frames))
-
-    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what the encoder would be given of a phrase, (mel, frame)."""
-        content_frames = len(samples) // self.feature_extractor.hop_length
-        return _trimmed(super().frames_of(samples), content_frames)
-
-
-def _log_probability(logits: "list[ctranslate2.StorageView]", tokens: list[int]) -> float:
-    """Return the logarithm of the probability of tokens, by what the model gave at each step."""
-    rows = np.stack([np.array(row) for row in logits[: len(tokens)]]).astype(np.float64)
-    rows -= rows.max(axis=1, keepdims=True)
-    chosen = rows[np.arange(len(tokens)), tokens]
-    return float((chosen - np.log(np.exp(rows).sum(axis=1))).sum())
-
-
-def _trimmed(features: NDArray[np.float32], content_frames: int) -> NDArray[np.float32]:
-    kept = content_frames + _MARGIN_FRAMES
-    kept += kept % _FRAMES_PER_STATE
-    # CTranslate2 takes what has as many rows as there are mel bands for features, and would
-    # encode its own states once more (`WhisperEncoder::is_encoded`).
-    if kept // _FRAMES_PER_STATE == features.shape[-2]:
-        kept += _FRAMES_PER_STATE
-    return np.ascontiguousarray(features[..., :kept])
 
 
 def cuda_devices() -> int:

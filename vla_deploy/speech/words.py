@@ -1,12 +1,10 @@
-"""Know the few words that hearing itself heeds: those that stop, and those that end no command."""
+"""Know the few words that hearing itself acts on: those that stop, those that end no command."""
 
 import re
+from collections.abc import Set
 from typing import Final
 
 STOPS: Final = frozenset({"stop", "halt", "freeze"})
-_FORMS: Final = re.compile(
-    r"\b(?:stop(?:ped|ping|per|s)|halt(?:ed|ing|er|s)|freez(?:ing|er|es)|froze|frozen)\b"
-)
 _POLITE: Final = frozenset(
     {
         "robot", "butler", "please", "now", "hey", "moving", "it", "that", "okay", "ok", "no", "oh",
@@ -31,31 +29,25 @@ def words_of(text: str) -> tuple[str, ...]:
     return tuple(_WORD.findall(text.lower()))
 
 
-def is_stop(text: str) -> bool:
-    """Tell whether a text is nothing but a call to stop, however often and politely."""
-    words = words_of(text)
-    return any(word in STOPS for word in words) and all(
-        word in STOPS or word in _POLITE for word in words
-    )
+def is_stop(text: str, names: Set[str] = frozenset()) -> bool:
+    """Return whether a text is nothing but a call to stop, however often and politely.
+
+    `names` are further ones that the robot answers to.
+    """
+    return holds_stop(text) and STOPS | _POLITE | names >= set(words_of(text))
 
 
-def holds_stop(text: str, *, is_all: bool = True) -> bool:
-    """Tell whether a call to stop is among the words; of words cut off the last may be another."""
-    words = words_of(text)
-    return any(word in STOPS for word in (words if is_all else words[:-1]))
-
-
-def holds_form_of_stop(text: str) -> bool:
-    """Tell whether a word is among the others that sounds like a call to stop and is none."""
-    return _FORMS.search(text.lower()) is not None
+def holds_stop(text: str) -> bool:
+    """Return whether a call to stop is among the words."""
+    return not STOPS.isdisjoint(words_of(text))
 
 
 def is_courtesy(text: str) -> bool:
-    """Tell whether a text has nothing in it to do or to answer."""
+    """Return whether a text has nothing in it to do or to answer."""
     return all(word in _COURTESIES for word in words_of(text))
 
 
 def is_unfinished(text: str) -> bool:
-    """Tell whether a speaker who pauses after these words has surely more to say."""
+    """Return whether a speaker who pauses after these words has surely more to say."""
     words = words_of(text)
     return not words or words[-1] in _UNFINISHED

@@ -3,13 +3,12 @@ import numpy as np
 from training.speech.calibration import fit
 from training.speech.judging import Read
 from training.voices.clip import Clip
-from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.transcript import Transcript, confidence
 
 
 def _read(text: str, log_probability: float) -> Read:
     clip = Clip(text="red cup", engine="none", voice="", samples=np.zeros(1, np.float32))
-    reading = Reading(
+    reading = Transcript(
         text=text,
         log_probability=log_probability,
         no_speech=0.0,

@@ -15,10 +15,9 @@ from training.voices.cast import Speaker, say
 from training.voices.clip import Clip, Style
 from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
-from vla_deploy.speech.stop_odds import stop_odds
+from vla_deploy.speech.transcript import confidence
 
 pytest.importorskip("faster_whisper")
 pytestmark = pytest.mark.skipif(not (SHIPPED / METRICS).exists(), reason="none is shipped yet")
@@ -49,32 +48,6 @@ def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: 
     reading = recogniser.read(by_espeak(text, 0, 20.0).samples)
     assert normal(reading.text) == normal(text)
     assert confidence(reading, recogniser.declared.calibration) >= LEAST_CONFIDENCE
-
-
-@pytest.mark.parametrize(
-    ("text", "is_stop"), [*((text, False) for text in COMMANDS[:2]), ("stop", True), ("halt", True)]
-)
-def test_the_ear_tells_stop_words_from_commands_in_noise(
-    recogniser: Recogniser, text: str, is_stop: bool
-) -> None:
-    reading = recogniser.read(by_espeak(text, 1, 15.0).samples)
-    assert reading.stop_surety is not None
-    assert (reading.stop_surety > 0.5) is is_stop
-    assert reading.stop_odds == (1.0 if is_stop else None)
-
-
-@pytest.mark.parametrize(
-    ("said", "text", "least", "most"),
-    [
-        ("you should halt", "you should hope", 0.9, 1.0),
-        ("go to the kitchen", "go to the kitchen", 0.0, 0.01),
-    ],
-)
-def test_a_stop_word_that_was_not_read_is_found_as_likely_as_it_is(
-    recogniser: Recogniser, said: str, text: str, least: float, most: float
-) -> None:
-    recogniser.read(by_espeak(said, 1, 15.0).samples)
-    assert least <= stop_odds(text, recogniser._whisper.log_probabilities) <= most
 
 
 def test_a_command_is_read_right_at_any_length(recogniser: Recogniser) -> None:

@@ -18,8 +18,8 @@ from vla_deploy.robots import load_robot
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.simple import speak
-from vla_deploy.speech.voice.espeak import EspeakEngine
 from vla_deploy.speech.voice.robot_voice import RobotVoice
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 TEXT = "The red cup is in the box"
 

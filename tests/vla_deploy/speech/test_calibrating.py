@@ -13,13 +13,12 @@ from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.store import ModelStore
-from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
 from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings, learn
-from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.transcript import Transcript, confidence
 
-READING = Reading(
+READING = Transcript(
     text="turn left",
     log_probability=-0.1,
     no_speech=0.0,
@@ -30,8 +29,8 @@ READING = Reading(
 )
 
 
-def drawn(count: int) -> tuple[list[Reading], list[bool]]:
-    """Readings that are right where their log-probability is above about -0.3."""
+def drawn(count: int) -> tuple[list[Transcript], list[bool]]:
+    """TranscriptionQueue that are right where their log-probability is above about -0.3."""
     draw = np.random.default_rng(4)
     values = -0.6 * draw.random(count)
     chances = 1.0 / (1.0 + np.exp(-25.0 * (values + 0.3)))

@@ -6,7 +6,7 @@ is left out.
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -15,6 +15,7 @@ from sim_twin.sound.speech_room import SpeechRoom
 from sim_twin.sound.talker import Talker
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.sound import RATE_HZ, SoundBlock
+from vla_deploy.speech.stop_words.listener import StopWords
 
 SENTENCES = (
     "I have put the red cup into the box",
@@ -34,18 +35,14 @@ class Raw:
     def start(self, space: SharedSpace) -> None:
         """Open nothing."""
 
-    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
+    def feed(self, block: SoundBlock) -> None:
         self.seconds += len(block.samples) / RATE_HZ
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:
         del began_ns, ended_ns
         return ""
 
-    def suspicion(self, began_ns: int, ended_ns: int) -> float:
-        del began_ns, ended_ns
-        return 0.0
-
-    def heed(self, settings: SpeechSettings) -> None:
+    def adopt(self, settings: SpeechSettings) -> None:
         """Go by no setting."""
 
     def document(self) -> Mapping[str, Any]:
@@ -62,7 +59,7 @@ def raw() -> Raw:
 
 @pytest.fixture
 def room(tmp_path: Path, raw: Raw) -> Iterator[SpeechRoom]:
-    made = SpeechRoom(tmp_path, [raw])
+    made = SpeechRoom(tmp_path, cast("StopWords", raw))
     yield made
     made.close()
 

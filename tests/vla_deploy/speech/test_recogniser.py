@@ -14,8 +14,8 @@ from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, R
 from vla_deploy.inference.manifest import Context
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.reading import others_of
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+from vla_deploy.speech.transcript import others_of
 
 CHOICE = ModelChoice(
     tiers=("ours",),
@@ -118,28 +118,26 @@ def test_a_wide_search_tells_other_readings_than_the_best(scripted_whisper: Any)
     assert all(one.text != reading.text and 0 < one.odds <= 1 for one in reading.others)
 
 
-@pytest.mark.parametrize("context", [Context.TRIMMED, Context.PADDED])
-def test_any_text_is_as_likely_as_the_search_would_tell(
-    scripted_whisper: Any, context: Context
+@pytest.mark.parametrize(("languages", "detections", "language"), [
+    (("en",), 0, "en"), (("de",), 0, "de"), (("en", "fr"), 1, "fr"),
+])  # fmt: skip
+def test_the_language_is_found_out_only_where_several_are_declared(
+    scripted_whisper: Any, languages: tuple[str, ...], detections: int, language: str
 ) -> None:
-    recogniser = opened(scripted_whisper.model("ours", "pick up the red cup", context=context))
-    reading = recogniser.read(SECOND)
-    whisper = recogniser._whisper
-    ((text, log_probability),) = whisper.hypotheses[0]
-    right, wrong, longer, nothing = whisper.log_probabilities(
-        [text, "pick up the red halt", "pick up the red cup please", ""]
-    )
-    assert right == pytest.approx(log_probability, abs=0.01)
-    assert max(wrong, longer, nothing) < right - 1.0
-    assert reading.stop_odds is None, "nobody suspected a stop"
-
-
-def test_a_model_of_many_languages_tells_which_one_was_spoken(scripted_whisper: Any) -> None:
     recogniser = opened(scripted_whisper.model("ours", "tournez a gauche"))
+    recogniser.declared = dataclasses.replace(recogniser.declared, languages=languages)
+    asked: list[str] = []
+
     model = recogniser._whisper
     heard = [[("<|fr|>", 0.97), ("<|en|>", 0.03)]]
-    model.model = _Spied(model.model, is_multilingual=True, detect_language=lambda _: heard)
-    assert recogniser.read(SECOND).language == "fr"
+
+    def detect(_: Any) -> Any:
+        asked.append("")
+        return heard
+
+    model.model = _Spied(model.model, is_multilingual=True, detect_language=detect)
+    assert recogniser.read(SECOND).language == language
+    assert len(asked) == detections
 
 
 def test_hot_words_are_given_to_a_model_that_takes_them(scripted_whisper: Any) -> None:

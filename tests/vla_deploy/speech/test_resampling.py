@@ -8,7 +8,7 @@ import pytest
 
 from drivers.audio.base import AudioFormat, Samples
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.resampling import Resampler
+from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.sound import Sound, level_db
 
 Tone = Callable[..., Samples]

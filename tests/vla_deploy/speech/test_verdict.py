@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from vla_deploy.inference.manifest import Calibration
-from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.reading import Reading
-from vla_deploy.speech.verdict import Case, Verdict, judge
+from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.transcript import Transcript, confidence
+from vla_deploy.speech.verdict import Case, Verdict, judge, stops
 from vla_deploy.speech.words import is_stop, is_unfinished, words_of
 
-READING = Reading(
+TRANSCRIPT = Transcript(
     text="Pick up the red cup.",
     log_probability=-0.1,
     no_speech=0.01,
@@ -31,13 +30,15 @@ PHRASE = Phrase(
     voice=0.95,
     samples=np.zeros(32_000, np.float32),
 )
-CASE = Case(reading=READING, phrase=PHRASE, confidence=0.9, least_confidence=0.5, languages=("en",))
+CASE = Case(
+    transcript=TRANSCRIPT, phrase=PHRASE, confidence=0.9, least_confidence=0.5, languages=("en",)
+)
 
 
-def case(reading: Any = None, phrase: Any = None, **changes: Any) -> Case:
+def case(transcript: Any = None, phrase: Any = None, **changes: Any) -> Case:
     return replace(
         CASE,
-        reading=replace(READING, **(reading or {})),
+        transcript=replace(TRANSCRIPT, **(transcript or {})),
         phrase=replace(PHRASE, **(phrase or {})),
         **changes,
     )
@@ -51,24 +52,17 @@ def test_a_sure_reading_is_a_command() -> None:
 @pytest.mark.parametrize(
     ("changed", "reason", "ask_again"),
     [
-        ({"reading": {"text": " ... "}}, "a sound without words", False),
-        ({"reading": {"text": "Please. Thank you!"}}, "a courtesy", False),
+        ({"transcript": {"text": " ... "}}, "a sound without words", False),
+        ({"transcript": {"text": "Please. Thank you!"}}, "a courtesy", False),
         ({"confidence": 0.2}, "understood by 20%, at least 50% is needed", True),
-        (
-            {"reading": {"text": "..."}, "phrase": {"clipped_ratio": 0.1}},
-            "a sound without words; the microphone is overdriven",
-            False,
-        ),
         (
             {"confidence": 0.2, "phrase": {"clipped_ratio": 0.1}},
             "overdriven: turn its gain down",
             True,
         ),
-        ({"reading": {"language": "fr"}}, "spoken in fr, but only en is understood", True),
-        ({"reading": {"no_speech": 0.93}}, "nobody spoke, by 93%", False),
-        ({"reading": {"compression": 4.2}}, "the text repeats itself (compression 4.2", False),
-        ({"phrase": {"voiced_s": 0.4}}, "12 words a second were read, at most 7", False),
-        ({"music": True, "phrase": {"voice": 0.6}}, "music, or another sound", False),
+        ({"transcript": {"language": "fr"}}, "spoken in fr, but only en is understood", True),
+        ({"transcript": {"no_speech": 0.93}}, "nobody spoke, by 93%", False),
+        ({"transcript": {"compression": 4.2}}, "the text repeats itself, compression 4.2", False),
         ({"phrase": {"own_words": "I pick up the red cup"}}, "the robot heard itself", False),
         (
             {"phrase": {"own_words": "Shall I go and pick up the red cup, and then the blue one?"}},
@@ -97,7 +91,7 @@ def test_what_is_only_not_sure_enough_is_for_the_planner_to_make_sense_of(
 
 
 def test_what_else_speaks_against_it_is_no_doubt() -> None:
-    judgement = judge(case(confidence=0.4, reading={"no_speech": 0.93}))
+    judgement = judge(case(confidence=0.4, transcript={"no_speech": 0.93}))
     assert judgement.verdict is Verdict.REJECTED
 
 
@@ -114,7 +108,7 @@ def test_what_else_speaks_against_it_is_no_doubt() -> None:
     ],
 )
 def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: str) -> None:
-    spoken = case(reading={"text": answer}, phrase={"own_words": said, "voiced_s": 3.0})
+    spoken = case(transcript={"text": answer}, phrase={"own_words": said, "voiced_s": 3.0})
     assert judge(spoken).verdict is Verdict.ACCEPTED
 
 
@@ -129,8 +123,30 @@ def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: st
     ],
 )
 def test_what_the_robot_said_itself_is_no_command(said: str, echo: str) -> None:
-    judgement = judge(case(reading={"text": echo}, phrase={"own_words": said}))
+    judgement = judge(case(transcript={"text": echo}, phrase={"own_words": said}))
     assert judgement.reason == "the robot heard itself"
+
+
+@pytest.mark.parametrize(
+    ("text", "confidence", "own_words", "is_one"),
+    [
+        ("robot stop", 0.66, "", True),
+        ("stop", 0.25, "", True),
+        ("Stop, please!", 0.25, "I am on my way", True),
+        ("stop", 0.24, "", False),
+        ("rover, halt", 0.3, "", True),
+        ("stop before you hit the chair", 0.6, "", True),
+        ("stop before you hit the chair", 0.59, "", False),
+        ("do not stop", 0.9, "", True),
+        ("he stopped at the freezer", 1.0, "", False),
+        ("stop", 0.9, "All right, I stop.", False),
+        ("stop", 0.9, "I have stopped", True),
+    ],
+)
+def test_words_stop_the_robot_whatever_any_network_says_but_for_its_own(
+    text: str, confidence: float, own_words: str, is_one: bool
+) -> None:
+    assert stops(text, confidence, own_words, {"rover"}) is is_one
 
 
 @pytest.mark.parametrize("text", ["Stop!", "stop stop stop", "robot, freeze", "Please halt now"])
@@ -165,7 +181,7 @@ def test_words_are_told_from_punctuation() -> None:
 
 def test_confidence_grows_with_what_speaks_for_a_reading() -> None:
     def sure(**changes: Any) -> float:
-        return confidence(replace(READING, **changes), None)
+        return confidence(replace(TRANSCRIPT, **changes), None)
 
     assert sure() > 0.9
     assert sure() > sure(log_probability=-0.5) > sure(log_probability=-1.0) > sure(no_speech=1e3)
@@ -176,4 +192,4 @@ def test_confidence_grows_with_what_speaks_for_a_reading() -> None:
 
 def test_a_calibration_of_the_manifest_is_used() -> None:
     flat = Calibration(bias=0.0, log_probability=0.0, no_speech=0.0, compression=0.0)
-    assert confidence(READING, flat) == 0.5
+    assert confidence(TRANSCRIPT, flat) == 0.5

@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from drivers.clock import MonotonicClock
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.voice_activity import FRAME, open_voice_activity
+from vla_deploy.speech.sound import FRAME
+from vla_deploy.speech.voice_activity import open_voice_activity
 
 
 def test_a_stream_gives_bit_for_bit_what_the_library_says_of_the_whole() -> None:
@@ -15,7 +15,7 @@ def test_a_stream_gives_bit_for_bit_what_the_library_says_of_the_whole() -> None
 
     sound = np.random.default_rng(3).standard_normal(60 * FRAME).astype(np.float32) * 0.1
     sound *= np.abs(np.sin(np.arange(len(sound)) / 3_000)).astype(np.float32)
-    activity = open_voice_activity(MonotonicClock())
+    activity = open_voice_activity()
     frames = sound.reshape(-1, FRAME)
     streamed = [activity.probability(frame) for frame in frames]
     whole = get_vad_model()(sound.copy())  # which silences the end of its last frame
@@ -28,4 +28,4 @@ def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "faster_whisper", raising=False)
     monkeypatch.setattr(sys, "path", [])
     with pytest.raises(SpeechMissing, match="typed commands go on"):
-        open_voice_activity(MonotonicClock())
+        open_voice_activity()

@@ -11,6 +11,7 @@ from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.plan import MOST_CHARACTERS, Plan
+from vla_deploy.planning.understanding.quantities import numbers_in
 
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5
@@ -45,6 +46,16 @@ class UserCommand:
     awaits_word: bool = False
     is_answer: bool = False
     recovers: bool = False
+
+    @property
+    def has_unsure_number(self) -> bool:
+        """Return whether a number in it may have been another one, as "90" may be heard as "19".
+
+        A "one" where no number was read mostly stands for a thing: "the red one".
+        """
+        numbers = numbers_in(self.text)
+        others = {numbers_in(text) for text, _ in self.others}
+        return bool(others - {numbers, (), (1.0,) if not numbers else ()})
 
     @property
     def is_spoken(self) -> bool:

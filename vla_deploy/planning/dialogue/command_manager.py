@@ -245,6 +245,9 @@ class CommandManager:
 
     def _takes_as_answer(self, command: UserCommand, pending: PendingQuestion) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
+        if command.has_unsure_number:
+            doubted = replace(pending.command, heard_confidence=READ_BACK)
+            pending = replace(pending, command=doubted)
         go_on = self._continuation(command, pending)
         if go_on is not None:
             self._events.answered(command, pending.command)

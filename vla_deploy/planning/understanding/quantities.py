@@ -61,6 +61,18 @@ _NUMBER_WORD: Final = "|".join(
 NUMBER: Final = rf"(?:{_FIGURES}|(?:{_NUMBER_WORD})(?:[ -](?:and )?(?:{_NUMBER_WORD}))*)"
 """A number, in figures or words, before a unit."""
 _TOKEN: Final = re.compile(r"-?\d+(?:[.,]\d+)?|[a-z/]+|\S")
+_FIGURES_OR_WORD: Final = re.compile(r"\d+(?:[.,]\d+)?|[a-z]+")
+
+
+def numbers_in(text: str) -> tuple[float, ...]:
+    """Return the numbers of a sentence in their order, in figures or as words that name one."""
+    values = {word: value for word, value in _VALUES.items() if word not in ("a", "an")}
+    tokens = _FIGURES_OR_WORD.findall(text.lower())
+    return tuple(
+        values[token] if token in values else float(token.replace(",", "."))
+        for token in tokens
+        if token in values or token[0].isdigit()
+    )
 
 
 def quantity_of(text: str, dimension: str) -> float | None:

@@ -15,12 +15,11 @@ from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Manifest, ModelFile, Whisper
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.inference.whisper_schema import NEEDED_PARTS, SPEECH_TO_TEXT, VOCABULARIES
-from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import RATE_HZ
+from vla_deploy.speech.transcript import Transcript
 
-OPTIONAL_PARTS: Final = ("preprocessor_config.json",)
-PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, *OPTIONAL_PARTS)
+PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, "preprocessor_config.json")
 PLAIN_CHOICE: Final = replace(opening.PLAIN_CHOICE, precision="int8")
 """To look at a model by itself, as no profile is needed for."""
 
@@ -39,7 +38,7 @@ class Request:
 
 def add_whisper(
     store: ModelStore, request: Request, *, clock: Clock, replace: bool = False
-) -> tuple[Model, Reading]:
+) -> tuple[Model, Transcript]:
     """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
 
     Returns the model, and what it reads in a second of silence.
@@ -84,7 +83,7 @@ def describe(request: Request) -> Manifest:
     )
 
 
-def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Reading:
+def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Transcript:
     """Return what a model reads in a second of silence.
 
     Raises:

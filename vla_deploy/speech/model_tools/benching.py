@@ -1,52 +1,21 @@
 """Measure what a Whisper costs on phrases of several lengths, or on recordings of one's own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from drivers.audio.wav import read_wav
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from platforms import ModelChoice
 from vla_deploy.inference.store import Model
+from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
-from vla_deploy.speech.resampling import Resampler
 from vla_deploy.speech.sound import RATE_HZ, Sound
 
 LENGTHS_S: Final = (1.0, 3.0, 6.0)
 MOST_S: Final = 29.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """Hold the figures of one sound; `real_time_factor` is time taken per time of sound."""
-
-    sound: str
-    duration_s: float
-    reads: int
-    median_s: float
-    p95_s: float
-    real_time_factor: float
-    text: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
-    """Hold the figures of one model; `memory_mb` is by how much the process grew to load it."""
-
-    model: str
-    provider: str
-    threads: int
-    beam: int
-    load_s: float
-    memory_mb: float
-    rows: tuple[Row, ...]
-
-    def document(self) -> dict[str, Any]:
-        """Return the figures, as JSON takes them."""
-        return asdict(self)
 
 
 def bench(
@@ -57,8 +26,11 @@ def bench(
     beam: int,
     rounds: int,
     clock: Clock,
-) -> Bench:
-    """Read each sound so many times, in turn.
+) -> dict[str, Any]:
+    """Read each sound so many times; return the figures, as JSON takes them.
+
+    `memory_mb` is by how much the process grew to load the model; a row has the figures of one
+    sound, `real_time_factor` is time taken per time of sound.
 
     Raises:
         InferenceError: the model cannot be opened, or fails.
@@ -66,15 +38,15 @@ def bench(
     """
     recogniser = open_recogniser(model, choice, beam=beam, clock=clock)
     try:
-        return Bench(
-            model=model.manifest.name,
-            provider=recogniser.provider,
-            threads=choice.threads,
-            beam=beam,
-            load_s=recogniser.load_s,
-            memory_mb=recogniser.memory_mb,
-            rows=_rows(recogniser, sounds, rounds, clock),
-        )
+        return {
+            "model": model.manifest.name,
+            "provider": recogniser.provider,
+            "threads": choice.threads,
+            "beam": beam,
+            "load_s": recogniser.load_s,
+            "memory_mb": recogniser.memory_mb,
+            "rows": [_row(recogniser, name, sounds[name], rounds) for name in sounds],
+        }
     finally:
         recogniser.close()
 
@@ -110,25 +82,15 @@ def sound_of(path: Path) -> Sound:
     return Resampler(format_).feed(samples)
 
 
-def _rows(
-    recogniser: Recogniser, sounds: Mapping[str, Sound], rounds: int, clock: Clock
-) -> tuple[Row, ...]:
-    took_s: dict[str, list[float]] = {name: [] for name in sounds}
-    texts: dict[str, str] = {}
-    for _ in range(rounds):
-        for name, sound in sounds.items():
-            started_ns = clock.now_ns()
-            texts[name] = recogniser.read(sound).text
-            took_s[name].append((clock.now_ns() - started_ns) / NS_PER_S)
-    return tuple(
-        Row(
-            sound=name,
-            duration_s=len(sound) / RATE_HZ,
-            reads=rounds,
-            median_s=float(np.median(took_s[name])),
-            p95_s=float(np.percentile(took_s[name], 95)),
-            real_time_factor=float(np.median(took_s[name])) * RATE_HZ / max(1, len(sound)),
-            text=texts[name],
-        )
-        for name, sound in sounds.items()
-    )
+def _row(recogniser: Recogniser, name: str, sound: Sound, rounds: int) -> dict[str, Any]:
+    read = [recogniser.read(sound) for _ in range(rounds)]
+    took_s, duration_s = [one.took_s for one in read], len(sound) / RATE_HZ
+    return {
+        "sound": name,
+        "duration_s": duration_s,
+        "reads": rounds,
+        "median_s": float(np.median(took_s)),
+        "p95_s": float(np.percentile(took_s, 95)),
+        "real_time_factor": float(np.median(took_s)) / max(duration_s, 1e-3),
+        "text": read[-1].text,
+    }

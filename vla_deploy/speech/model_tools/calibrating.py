@@ -20,26 +20,18 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.confidence import UNCALIBRATED, confidence, evidence_of
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import Sound
+from vla_deploy.speech.transcript import UNCALIBRATED, Transcript, confidence, evidence_of
 from vla_deploy.speech.words import words_of
 
 LEAST: Final = 20
 _PULL: Final = 0.2
 _STEPS: Final = 50
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Known:
-    """Hold a recording and its words; none for sound of which nothing should be understood."""
-
-    name: str
-    sound: Sound
-    words: tuple[str, ...]
+KnownSound = tuple[Sound, tuple[str, ...]]
+"""A recording and its words; none for sound of which nothing should be understood."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +45,7 @@ class Calibrated:
     error_after: float
 
 
-def known_recordings(folder: Path) -> list[Known]:
+def known_recordings(folder: Path) -> list[KnownSound]:
     """Return the WAV files of a folder, each with the words of the text file beside it.
 
     Raises:
@@ -69,17 +61,13 @@ def known_recordings(folder: Path) -> list[Known]:
             f"it (empty for other sound); got {len(paths)}, without words: {wordless[:3]}"
         )
     return [
-        Known(
-            name=path.name,
-            sound=sound_of(path),
-            words=words_of(path.with_suffix(".txt").read_text(encoding="utf-8")),
-        )
+        (sound_of(path), words_of(path.with_suffix(".txt").read_text(encoding="utf-8")))
         for path in paths
     ]
 
 
 def calibrate(
-    model: Model, choice: ModelChoice, known: Sequence[Known], *, beam: int, clock: Clock
+    model: Model, choice: ModelChoice, known: Sequence[KnownSound], *, beam: int, clock: Clock
 ) -> Calibrated:
     """Read every recording and learn how sure the model's words are.
 
@@ -89,30 +77,24 @@ def calibrate(
     """
     recogniser = open_recogniser(model, choice, beam=beam, clock=clock)
     try:
-        readings = [recogniser.read(one.sound) for one in known]
+        readings = [recogniser.read(sound) for sound, _ in known]
     finally:
         recogniser.close()
     right = [
-        bool(one.words) and words_of(reading.text) == one.words
-        for one, reading in zip(known, readings, strict=True)
+        bool(words) and words_of(reading.text) == words
+        for (_, words), reading in zip(known, readings, strict=True)
     ]
     return learn(readings, right, recogniser.declared.calibration)
 
 
 def learn(
-    readings: Sequence[Reading], right: Sequence[bool], before: Calibration | None = None
+    readings: Sequence[Transcript], right: Sequence[bool], before: Calibration | None = None
 ) -> Calibrated:
     """Fit the weights to readings and whether they are right; those without words teach nothing."""
     pairs = [pair for pair in zip(readings, right, strict=True) if pair[0].text]
     evidence = np.array([evidence_of(reading) for reading, _ in pairs]).reshape(-1, 4)
     truth = np.array([float(is_right) for _, is_right in pairs])
-    bias, log_probability, no_speech, compression = _fitted(evidence, truth)
-    fitted = Calibration(
-        bias=bias,
-        log_probability=log_probability,
-        no_speech=no_speech,
-        compression=compression,
-    )
+    fitted = _fitted(evidence, truth)
     return Calibrated(
         calibration=fitted,
         recordings=len(readings),
@@ -136,7 +118,7 @@ def keep(model: Model, calibration: Calibration) -> None:
     write_manifest(model.folder, dataclasses.replace(model.manifest, whisper=whisper))
 
 
-def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> list[float]:
+def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> Calibration:
     """Return the weights by Newton's method, pulled towards those of an unmeasured model."""
     start = np.array(dataclasses.astuple(UNCALIBRATED))
     weights = start.copy()
@@ -146,11 +128,12 @@ def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> list[f
         curve = (evidence.T * (sure * (1.0 - sure))) @ evidence + _PULL * np.eye(len(start))
         step = np.linalg.solve(curve, slope)
         weights -= step / max(1.0, float(np.abs(step).max()))
-    return [round(float(weight), 4) for weight in weights]
+    names = [field.name for field in dataclasses.fields(Calibration)]
+    return Calibration(**dict(zip(names, (round(float(one), 4) for one in weights), strict=True)))
 
 
 def _error(
-    readings: Sequence[Reading], right: Sequence[bool], calibration: Calibration | None
+    readings: Sequence[Transcript], right: Sequence[bool], calibration: Calibration | None
 ) -> float:
     sure = np.array([confidence(reading, calibration) for reading in readings])
     return float(np.mean((sure - np.array(right, dtype=float)) ** 2))

@@ -7,9 +7,6 @@ what does not have its hash is refused. Nothing about this robot is sent but the
 import hashlib
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -17,44 +14,31 @@ from typing import Any, Final
 from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, ModelUnknown
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.errors import SpeechMissing
+from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.model_tools.adding import PARTS
 
-ENGLISH: Final = ("en",)
 TIMEOUT_S: Final = 20.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Published:
-    """Name where a model is published, and what it understands."""
-
-    repository: str
-    summary: str
-    licence: str = "MIT"
-    languages: tuple[str, ...] = ENGLISH
-
-
-def _whisper(size: str, memory: str) -> Published:
-    return Published(
-        repository=f"Systran/faster-whisper-{size}",
-        summary=f"OpenAI's Whisper {size}, converted by SYSTRAN; {memory} of memory in int8",
-    )
-
-
-PUBLISHED: Final[Mapping[str, Published]] = MappingProxyType(
+LICENCE: Final = "MIT"
+PUBLISHED: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "whisper-tiny.en": _whisper("tiny.en", "220 MB"),
-        "whisper-base.en": _whisper("base.en", "300 MB"),
-        "whisper-small.en": _whisper("small.en", "540 MB"),
-        "whisper-medium.en": _whisper("medium.en", "1.1 GB"),
-        "whisper-tiny": _whisper("tiny", "220 MB"),
-        "whisper-base": _whisper("base", "300 MB"),
-        "whisper-small": _whisper("small", "540 MB"),
+        "whisper-tiny.en": "220 MB",
+        "whisper-base.en": "300 MB",
+        "whisper-small.en": "540 MB",
+        "whisper-medium.en": "1.1 GB",
+        "whisper-tiny": "220 MB",
+        "whisper-base": "300 MB",
+        "whisper-small": "540 MB",
     }
 )
+"""OpenAI's Whispers as SYSTRAN converted them, and the memory that each takes in int8."""
 
 
-def fetch(name: str, folder: Path, endpoint: str | None = None) -> Published:
+def summary_of(name: str) -> str:
+    """Return what a published model is, for people."""
+    return f"OpenAI's {name}, converted by SYSTRAN; {PUBLISHED[name]} of memory in int8"
+
+
+def fetch(name: str, folder: Path, endpoint: str | None = None) -> None:
     """Fetch a model's files into an empty folder, and check them.
 
     Raises:
@@ -63,26 +47,33 @@ def fetch(name: str, folder: Path, endpoint: str | None = None) -> Published:
         ModelFileSpoiled: a file is not what the hub says it is.
         SpeechMissing: faster-whisper, which brings the hub's client, is not installed.
     """
-    published = PUBLISHED.get(name)
-    if published is None:
+    if name not in PUBLISHED:
         raise ModelUnknown(f"no model {name!r} to fetch: expected one of {', '.join(PUBLISHED)}")
-    hub = _hub()
-    with _told(hub, published.repository):
-        api = hub.HfApi(endpoint=endpoint, token=False)
-        info = api.model_info(published.repository, files_metadata=True, timeout=TIMEOUT_S)
-    files = [one for one in info.siblings or () if one.rfilename in PARTS]
+    os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
+    os.environ["HF_HUB_DISABLE_PROGRESS_BARS"] = "1"
+    hub = import_extra("huggingface_hub", "fetching needs the hub's client")
+    repository = f"Systran/faster-{name}"
+    try:
+        files = list(_downloaded(hub, repository, folder, endpoint))
+    except (hub.errors.HTTPError, OSError, ValueError) as error:
+        raise FetchFailed(
+            f"{repository}: the hub was not reached or does not have it: {one_line(error)[:300]}; "
+            "this computer needs a way to huggingface.co for this once; or copy the files here by "
+            "hand, then: vla-deploy models add NAME --whisper FOLDER"
+        ) from error
     for file in files:
-        with _told(hub, published.repository):
-            hub.hf_hub_download(
-                published.repository,
-                file.rfilename,
-                revision=info.sha,
-                local_dir=folder,
-                endpoint=endpoint,
-                token=False,
-            )
         _check(folder / file.rfilename, file)
-    return published
+
+
+def _downloaded(hub: Any, repository: str, folder: Path, endpoint: str | None) -> Iterator[Any]:
+    """Fetch each file of the newest commit, and yield what the hub says of it."""
+    api = hub.HfApi(endpoint=endpoint, token=False)
+    info = api.model_info(repository, files_metadata=True, timeout=TIMEOUT_S)
+    at = {"revision": info.sha, "local_dir": folder, "endpoint": endpoint, "token": False}
+    for file in info.siblings or ():
+        if file.rfilename in PARTS:
+            hub.hf_hub_download(repository, file.rfilename, **at)
+            yield file
 
 
 def _check(path: Path, file: Any) -> None:
@@ -99,31 +90,3 @@ def _check(path: Path, file: Any) -> None:
         expected, got = str(file.blob_id), hashlib.sha1(blob, usedforsecurity=False).hexdigest()
     if expected != got:
         raise ModelFileSpoiled(f"{path.name}: expected the hash {expected}, got {got}; try again")
-
-
-@contextmanager
-def _told(hub: Any, repository: str) -> Iterator[None]:
-    """Turn what the hub's client raises into one line.
-
-    Raises:
-        FetchFailed: the hub was not reached, or does not have it.
-    """
-    try:
-        yield
-    except (hub.errors.HTTPError, OSError, ValueError) as error:
-        raise FetchFailed(
-            f"{repository}: the hub was not reached or does not have it: {one_line(error)[:300]}; "
-            "this computer needs a way to huggingface.co for this once; or copy the files here by "
-            "hand, then: vla-deploy models add NAME --whisper FOLDER"
-        ) from error
-
-
-def _hub() -> Any:
-    os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
-    os.environ["HF_HUB_DISABLE_PROGRESS_BARS"] = "1"
-    try:
-        return import_module("huggingface_hub")
-    except ImportError as error:
-        raise SpeechMissing(
-            "fetching needs the hub's client: pip install 'vla-deploy[speech]'"
-        ) from error

@@ -1,36 +1,43 @@
-"""Listen for stop words on the raw stream, and press the stop button the moment one is heard."""
+"""Listen for stop words on the raw stream, and press the stop button the moment one is heard.
+
+The robot must hear "stop" while it speaks, too, and not from itself. So from when it begins to
+speak until its sound has died away, a stop word that the spoken text itself holds is expected as
+often as it is there: so many times it is taken for the robot's own. The next time it is a person's.
+A form of such a word, as in "I have stopped", is no stop word and takes nothing off.
+"""
 
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from platforms import SpeechSettings
+from platforms import Profile, SpeechSettings
 from vla_deploy.inference.errors import InferenceError, RunFailed
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
-from vla_deploy.speech.companions import Playing
-from vla_deploy.speech.sound import SoundBlock
-from vla_deploy.speech.stop_words.errors import StopWordsError
-from vla_deploy.speech.stop_words.own_voice import OwnVoice
-from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
+from vla_deploy.node import NodeContext
+from vla_deploy.speech.errors import SpeechError
+from vla_deploy.speech.sound import Playing, SoundBlock
+from vla_deploy.speech.stop_words.spotter import Spotted, Spotter, open_spotter
+from vla_deploy.speech.voice.robot_voice import RobotVoice
+from vla_deploy.speech.words import words_of
 
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
 KEPT: Final = 8
 OVERLAP_NS: Final = NS_PER_S // 2
 """A phrase that ends so long before a word was settled may still have held it."""
+TAIL_NS: Final = NS_PER_S // 2
+"""For so long what the robot has said may still be heard."""
 _log = logging.getLogger(__name__)
-
-OpenSpotter = Callable[[], tuple[Spotter, Mapping[str, float]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ear:
+class Place:
     """Name where a listener listens: in `speech_status`, as a source of stops, and in the log."""
 
     name: str
@@ -38,8 +45,8 @@ class Ear:
     how: str
 
 
-ROOM: Final = Ear(name="stop_words", source="voice", how="by voice")
-PAGE: Final = Ear(name="page_stop_words", source="page_voice", how="by voice into the page")
+ROOM: Final = Place(name="stop_words", source="voice", how="by voice")
+PAGE: Final = Place(name="page_stop_words", source="page_voice", how="by voice into the page")
 
 
 class State(StrEnum):
@@ -59,23 +66,23 @@ class StopWords:
 
     def __init__(
         self,
-        open_spotter: OpenSpotter,
+        open_spotter: Callable[[], Spotter],
         settings: SpeechSettings,
         clock: Clock,
         playing: Callable[[], Playing | None] = lambda: None,
-        ear: Ear = ROOM,
+        place: Place = ROOM,
     ) -> None:
-        """Take how the model is opened, which of its thresholds holds, and what the robot says."""
-        self.name = ear.name
-        self._ear = ear
+        """Take how the network is opened, which of its thresholds holds, what the robot says."""
+        self.name = place.name
+        self._place = place
         self._open_spotter = open_spotter
         self._sensitivity = settings.stop_words
         self._clock = clock
         self._playing = playing
-        self._own = OwnVoice()
-        self._suspicions = Suspicions()
+        self._say_id = ""
+        self._expected: Counter[str] = Counter()
+        self._sounds_until_ns = 0
         self._spotter: Spotter | None = None
-        self._thresholds: Mapping[str, float] = {}
         self._pressed: deque[Spotted] = deque(maxlen=KEPT)
         self._counts = {"spotted": 0, "own_voice": 0, "failed_runs": 0}
         self._broken = ""
@@ -88,49 +95,46 @@ class StopWords:
         return State.BROKEN if self._broken else State.LIVE
 
     def start(self, space: SharedSpace) -> None:
-        """Open button and model; why it cannot be opened is told, and the robot goes on."""
-        self._button = StopButton(space, self._ear.source, self._clock)
+        """Open button and network; why it cannot be opened is told, and the robot goes on."""
+        self._button = StopButton(space, self._place.source, self._clock)
         self._heard = space.ring_writer("heard")
         try:
-            self._spotter, self._thresholds = self._open_spotter()
-        except (InferenceError, StopWordsError) as error:
+            self._spotter = self._open_spotter()
+        except (InferenceError, SpeechError) as error:
             self._break(str(error))
         self._warn_if_off()
 
-    def heed(self, settings: SpeechSettings) -> None:
+    def adopt(self, settings: SpeechSettings) -> None:
         """Go by the sensitivity of another profile from now on."""
         changed, self._sensitivity = self._sensitivity != settings.stop_words, settings.stop_words
         if changed:
             self._warn_if_off()
 
-    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
+    def feed(self, block: SoundBlock) -> None:
         """Take the next block, and press the button where a stop word was heard in it.
 
-        `is_read` tells that the recogniser reads it too: then a word alone must be clear.
+        It runs within the node's step and takes a small part of it.
         """
-        self._own.follow(self._playing(), self._clock.now_ns())
-        if self._spotter is None or self._sensitivity == OFF:
+        self._follow_own_voice()
+        spotter = self._spotter
+        if spotter is None or self._sensitivity == OFF:
             return
         if not block.follows:
-            self._spotter.reset()
-            self._suspicions.clear()
-        own = self._own.sounds(block.end_ns)
-        sensitivity = "own_voice" if own else self._sensitivity
-        threshold = self._thresholds[sensitivity]
-        runs = self._spotter.runs
+            spotter.reset()
+        runs = spotter.runs
         try:
-            enough = alone(sensitivity, threshold) if is_read else threshold
-            spotted = self._spotter.feed(block.samples, block.end_ns, enough)
+            threshold = spotter.thresholds[self._sensitivity]
+            spotted = spotter.feed(block.samples, block.end_ns, threshold)
         except RunFailed as error:
             self._counts["failed_runs"] += 1
             self._break(str(error))
             return
-        if self._spotter.runs > runs:
+        if spotter.runs > runs:
             self._broken = ""
-        if not own and self._spotter.runs > runs:
-            self._suspicions.note(block.end_ns, self._spotter.score, threshold)
-        if spotted is not None:
-            self._take(spotted)
+        if spotted is not None and self._is_own(spotted):
+            self._counts["own_voice"] += 1
+        elif spotted is not None:
+            self._press(spotted)
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:
         """Return that a stop word was heard in a phrase of that time, if so: it is no command."""
@@ -139,12 +143,8 @@ class StopWords:
                 return f"{spotted.word!r} was heard in it: the robot has stopped"
         return ""
 
-    def suspicion(self, began_ns: int, ended_ns: int) -> float:
-        """Return how near its threshold a stop word came in what was said from then to then."""
-        return 0.0 if self.state is not State.LIVE else self._suspicions.highest(began_ns, ended_ns)
-
     def document(self) -> Mapping[str, Any]:
-        """Return what `speech_status` tells under "stop_words"."""
+        """Return what `speech_status` tells under the listener's name."""
         newest = self._pressed[-1] if self._pressed else None
         return {
             "state": self.state,
@@ -160,14 +160,26 @@ class StopWords:
         self._button.close()
         self._heard.close()
 
-    def _take(self, spotted: Spotted) -> None:
-        if self._own.takes(spotted.word, spotted.stamp_ns):
-            self._counts["own_voice"] += 1
+    def _follow_own_voice(self) -> None:
+        playing = self._playing()
+        if playing is None:
             return
+        self._sounds_until_ns = self._clock.now_ns() + TAIL_NS
+        if playing.say_id != self._say_id:
+            self._say_id = playing.say_id
+            self._expected = Counter(words_of(playing.text))
+
+    def _is_own(self, spotted: Spotted) -> bool:
+        """Return whether the robot says this word itself now, and expect it once less."""
+        if spotted.stamp_ns >= self._sounds_until_ns or not self._expected[spotted.word]:
+            return False
+        self._expected[spotted.word] -= 1
+        return True
+
+    def _press(self, spotted: Spotted) -> None:
         self._button.press(f"heard {spotted.word!r}")
         self._counts["spotted"] += 1
         self._pressed.append(spotted)
-        now_ns = self._clock.now_ns()
         self._heard.publish(
             {
                 "text": spotted.word,
@@ -176,16 +188,31 @@ class StopWords:
                 "reason": "a stop word on the stream",
                 "began_ns": spotted.stamp_ns,
                 "ended_ns": spotted.stamp_ns,
-                "told_ns": now_ns,
+                "told_ns": self._clock.now_ns(),
             }
         )
         _log.warning("stopped: heard %r, score %.2f", spotted.word, spotted.score)
 
     def _break(self, why: str) -> None:
         if not self._broken:
-            _log.error("degraded: nobody can stop the robot %s: %s", self._ear.how, why)
+            _log.error("degraded: nobody can stop the robot %s: %s", self._place.how, why)
         self._broken = why
 
     def _warn_if_off(self) -> None:
         if self._sensitivity == OFF:
-            _log.warning("degraded: nobody can stop the robot %s: %s", self._ear.how, OFF_WHY)
+            _log.warning("degraded: nobody can stop the robot %s: %s", self._place.how, OFF_WHY)
+
+
+def build_stop_words(
+    context: NodeContext, profile: Profile, voice: RobotVoice | None = None, place: Place = ROOM
+) -> StopWords:
+    """Return the listener to a place; it opens the profile's network when the node starts."""
+    # It claims no memory: what hears a spoken stop is never refused for want of it.
+    shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
+    return StopWords(
+        lambda: open_spotter(shelf, profile),
+        profile.speech,
+        context.clock,
+        lambda: None if voice is None else voice.playing,
+        place,
+    )

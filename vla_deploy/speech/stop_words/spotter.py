@@ -2,24 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from platforms import Profile
 from vla_deploy.inference.manifest import KeyWords, Manifest
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.session import ModelSession
+from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import Sound, duration_ns
 from vla_deploy.speech.stop_words import features
-from vla_deploy.speech.stop_words.errors import SpotterMismatch
 
-
-class Scorer(Protocol):
-    """Run the model, as `ModelSession` does."""
-
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
-        """Return the outputs by name."""
-        ...
+ROLE: Final = "key_words"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,13 +31,13 @@ class Spotted:
 class Spotter:
     """Follow one stream of sound at 16 kHz; `score` is that of the likeliest word by now."""
 
-    def __init__(self, scorer: Scorer, manifest: Manifest) -> None:
+    def __init__(self, session: ModelSession, manifest: Manifest) -> None:
         """Take the model and what its manifest says of it.
 
         Raises:
             SpotterMismatch: it wants other features than there are, or none at all.
         """
-        self._scorer = scorer
+        self._session = session
         self._words = _checked(manifest)
         self._input = manifest.inputs[0].name
         self._output = manifest.outputs[0].name
@@ -48,9 +45,13 @@ class Spotter:
         self._moments = int(manifest.outputs[0].shape[2])
         self._step = self._moments * features.STRIDE
         self.runs = 0
-        self.score = 0.0
         self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
         self.reset()
+
+    @property
+    def thresholds(self) -> Mapping[str, float]:
+        """Return from which score on a word was said, by how easily it is to be taken for said."""
+        return self._words.thresholds
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -83,7 +84,7 @@ class Spotter:
 
     def _judge(self, new: features.Frames, stamp_ns: int, threshold: float) -> Spotted | None:
         self._frames = np.concatenate([self._frames[len(new) :], new])
-        outputs = self._scorer.run({self._input: self._frames.T[None]})
+        outputs = self._session.run({self._input: self._frames.T[None]})
         self.runs += 1
         scores = outputs[self._output][0, 1:].T
         kept = self._words.smoothing_frames - 1 + self._moments
@@ -106,16 +107,25 @@ def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
 
 
 def _checked(manifest: Manifest) -> KeyWords:
-    words, shapes = manifest.key_words, [tensor.shape for tensor in manifest.inputs]
+    words, shapes = manifest.key_words, [one.shape for one in (*manifest.inputs, *manifest.outputs)]
     if words is None or words.features != features.NAME:
         got = "no [key_words]" if words is None else repr(words.features)
         raise SpotterMismatch(f"{manifest.name}: expected features {features.NAME!r}, got {got}")
-    whole = len(shapes) == 1 and len(shapes[0]) == 3 and shapes[0][:2] == (1, features.BANDS)
-    if not whole or not all(
-        isinstance(shape[2], int) for shape in (shapes[0], manifest.outputs[0].shape)
-    ):
+    is_counted = all(isinstance(shape[-1], int) for shape in shapes)
+    if len(shapes) != 2 or shapes[0][:2] != (1, features.BANDS) or not is_counted:
         raise SpotterMismatch(
             f"{manifest.name}: expected one input of shape (1, {features.BANDS}, frames) and a "
-            f"count of moments, got {shapes} and {manifest.outputs[0].shape}"
+            f"count of moments, got {shapes}"
         )
     return words
+
+
+def open_spotter(shelf: ModelShelf, profile: Profile) -> Spotter:
+    """Open the network that a profile chooses.
+
+    Raises:
+        InferenceError: the profile's model cannot be opened.
+        SpotterMismatch: it is not one that a spotter can run.
+    """
+    session = shelf.open(ROLE, profile, 0)
+    return Spotter(session, session.model.manifest)

@@ -1,6 +1,9 @@
-"""Hold a piece of sound, and bring it to another rate: that of a speaker, or of a room."""
+"""Hold a piece of sound, read one from a program, bring it to the rate of a speaker or a room."""
 
+import io
 import math
+import struct
+import wave
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -8,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
+from vla_deploy.speech.errors import SynthesisFailed
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""
 # Silence behind the sound: the transform is a circle, and the end must not ring into the beginning.
 _APART_ROWS: Final = 256
+_BITS: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,3 +60,40 @@ def _cut(spectrum: NDArray[np.complexfloating[Any, Any]], rows: int) -> NDArray[
     kept = min(wanted, len(spectrum))
     fitted[:kept] = spectrum[:kept]
     return fitted
+
+
+def read_wav_stream(data: bytes) -> Clip:
+    """Return the sound of a WAV from a pipe: to the end of what is there, as its header knows none.
+
+    Raises:
+        SynthesisFailed: it is no WAV of 16-bit samples, or has none.
+    """
+    try:
+        told = data[:4] + struct.pack("<I", len(data)) + data[8:]
+        with wave.open(io.BytesIO(told)) as sound:
+            bits, channels, rate_hz = (
+                8 * sound.getsampwidth(),
+                sound.getnchannels(),
+                sound.getframerate(),
+            )
+            rows = sound.readframes(len(data))
+    except (wave.Error, EOFError) as error:
+        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}: {error}") from error
+    if bits != _BITS:
+        raise SynthesisFailed(f"expected PCM of {_BITS} bits, got {bits} bits")
+    return Clip(rate_hz=rate_hz, wave=pcm_wave(rows, channels))
+
+
+def pcm_wave(data: bytes, channels: int = 1) -> Wave:
+    """Return 16-bit little-endian samples as one wave, the mean of the channels.
+
+    Raises:
+        SynthesisFailed: there is not one whole row.
+    """
+    row_bytes = 2 * channels
+    whole = len(data) - len(data) % row_bytes
+    if not whole:
+        raise SynthesisFailed("expected sound, got no sample")
+    rows = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
+    wave: Wave = (rows.mean(axis=1) / 32_768.0).astype(np.float32)
+    return wave

@@ -3,6 +3,12 @@
 What is handed to the speaker is noted with the time at which it will sound; the filter learns what
 arrives of it, takes it out, and says how much may be left. What is no louder than that is the rest
 of the echo, and is turned down; what is louder is somebody else.
+
+It is a partitioned-block adaptive filter in the frequency domain with a Kalman gain (Enzner and
+Vary, "Frequency-domain adaptive Kalman filter for acoustic echo control", Signal Processing 86,
+2006; its partitioned form: Kuech, Mabande, Enzner, ICASSP 2014). The gain follows from how unsure
+each tap is and how loud everything else is, so a person who speaks into the echo does not lead it
+astray. The same doubt says how much of the echo may be left.
 """
 
 from collections import deque
@@ -10,12 +16,21 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.speech.sound import RATE_HZ, SoundBlock, duration_ns
 from vla_deploy.speech.voice.clip import Wave
-from vla_deploy.speech.voice.echo_filter import BLOCK, PARTITIONS, EchoFilter
 
+BLOCK: Final = 256
+PARTITIONS: Final = 16
+_FORGETTING: Final = 0.999
+_FIRST_DOUBT: Final = 1.0
+_NEW_DOUBT: Final = 0.3
+_CONFIRMED_DOUBT: Final = 0.03
+_CONFIRMED_SHARE: Final = 0.4  # what is left is less than the bound by as much, 99 times of 100
+_REST_SMOOTHING: Final = 0.8
+_TINY: Final = 1e-9
 HEAD_START_NS: Final = NS_PER_S // 200
 """The reference comes this much early, in case stamps of speaker and microphone disagree."""
 RINGS_NS: Final = duration_ns(BLOCK * PARTITIONS)
@@ -30,6 +45,63 @@ _SILENT_POWER: Final = 1e-10
 _SAME_NS: Final = NS_PER_S // 10_000
 
 
+class EchoFilter:
+    """Learn one path of up to 4096 samples; feed blocks of 256 that follow each other."""
+
+    def __init__(self) -> None:
+        self.left_power = 0.0
+        """What of the echo may be left in the newest block at most: mean square of a sample."""
+        bins = BLOCK + 1
+        self._known = np.zeros(2 * BLOCK)
+        self._spectra = np.zeros((PARTITIONS, bins), np.complex128)
+        self._path = np.zeros((PARTITIONS, bins), np.complex128)
+        self._doubt = np.full((PARTITIONS, bins), _FIRST_DOUBT)
+        self._doubt_before = self._doubt.copy()
+        self._left_share = 1.0
+        self._rest = np.zeros(bins)
+
+    def begin(self) -> None:
+        """Begin anew with silence; the path is as it was, and may have changed a little."""
+        self._known[:] = 0.0
+        self._spectra[:] = 0.0
+        self._doubt_before = self._doubt
+        self._doubt = np.maximum(self._doubt, _NEW_DOUBT)
+        self._left_share = 1.0
+
+    def confirm(self) -> None:
+        """Take the path for what it was before `begin`: it has been seen to hold."""
+        known = np.maximum(self._doubt_before, _CONFIRMED_DOUBT)
+        self._doubt = np.minimum(self._doubt, known)
+        self._left_share = _CONFIRMED_SHARE
+
+    def feed(self, known: Wave, heard: Wave) -> Wave:
+        """Return what was heard without the echo of `known`; both are 256 samples of one moment."""
+        self._shift_in(known)
+        echo = np.fft.irfft((self._path * self._spectra).sum(axis=0))[BLOCK:]
+        rest = heard - echo
+        self._learn(np.fft.rfft(np.concatenate((np.zeros(BLOCK), rest))))
+        return rest.astype(np.float32)
+
+    def _shift_in(self, known: Wave) -> None:
+        self._known[:BLOCK] = self._known[BLOCK:]
+        self._known[BLOCK:] = known
+        self._spectra[1:] = self._spectra[:-1]
+        self._spectra[0] = np.fft.rfft(self._known)
+
+    def _learn(self, rest: NDArray[np.complex128]) -> None:
+        self._rest += (1.0 - _REST_SMOOTHING) * (np.abs(rest) ** 2 - self._rest)
+        powers = np.abs(self._spectra) ** 2
+        left = (powers * self._doubt).sum(axis=0)
+        self.left_power = self._left_share * float(left.sum()) / BLOCK**2
+        gain = self._doubt / (left + self._rest + _TINY)
+        taps = np.fft.irfft(gain * self._spectra.conj() * rest, axis=1)
+        taps[:, BLOCK:] = 0.0
+        self._path += np.fft.rfft(taps, axis=1)
+        self._path *= _FORGETTING
+        self._doubt *= _FORGETTING**2 * (1.0 - 0.5 * gain * powers)
+        self._doubt += (1.0 - _FORGETTING**2) * np.abs(self._path) ** 2
+
+
 @dataclass(slots=True, kw_only=True)
 class _Played:
     """Hold a sound at 16 kHz whose first sample sounds, or would have, at `zero_ns`."""
@@ -38,26 +110,6 @@ class _Played:
     zero_ns: int
     from_ns: int
     until_ns: int
-
-
-@dataclass(slots=True)
-class _Trial:
-    """Add up how much of what is heard the filter takes out since the robot began to speak."""
-
-    blocks: int = 0
-    heard_power: float = 0.0
-    rest_power: float = 0.0
-
-    @property
-    def fits(self) -> bool:
-        return (
-            self.blocks >= _FITS_AFTER_BLOCKS and self.heard_power > _FITS_RATIO * self.rest_power
-        )
-
-    def add(self, heard_power: float, rest_power: float) -> None:
-        self.blocks += 1
-        self.heard_power += heard_power
-        self.rest_power += rest_power
 
 
 class OwnEcho:
@@ -71,7 +123,8 @@ class OwnEcho:
         self._is_active = False
         self._follows = False
         self._is_confirmed = False
-        self._trial = _Trial()
+        self._tried_powers = np.zeros(2)
+        self._tried_blocks = 0
         self._gain = 1.0
         self._left: deque[float] = deque(maxlen=_FRAME_BLOCKS)
         self._heard_power = 0.0
@@ -125,7 +178,7 @@ class OwnEcho:
         self._pending, self._pending_ns = self._pending[:0], block.stamp_ns
         self._follows = block.follows
         self._is_active, self._gain = True, 1.0
-        self._is_confirmed, self._trial = False, _Trial()
+        self._is_confirmed, self._tried_powers, self._tried_blocks = False, np.zeros(2), 0
 
     def _pass_on(self, block: SoundBlock) -> SoundBlock:
         """Return a block as it is, behind what still waits."""
@@ -151,8 +204,11 @@ class OwnEcho:
 
     def _try(self, heard_power: float, rest_power: float) -> None:
         """Find out whether the path still holds: the speaker may have begun later than before."""
-        self._trial.add(heard_power, rest_power)
-        if not self._is_confirmed and self._trial.fits:
+        self._tried_blocks += 1
+        self._tried_powers += heard_power, rest_power
+        heard, rest = self._tried_powers
+        fits = self._tried_blocks >= _FITS_AFTER_BLOCKS and heard > _FITS_RATIO * rest
+        if fits and not self._is_confirmed:
             self._is_confirmed = True
             self._filter.confirm()
 

@@ -2,24 +2,30 @@
 
 import logging
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from drivers.audio.base import AudioFormat
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
-from vla_deploy.speech.companions import Playing
-from vla_deploy.speech.sound import RATE_HZ, SoundBlock, level_db
-from vla_deploy.speech.voice.engine import Engine
-from vla_deploy.speech.voice.errors import EngineMissing, OrderRefused, VoiceError
-from vla_deploy.speech.voice.mouth import Mouth, OpenOutput, Prepared
-from vla_deploy.speech.voice.orders import LONGEST_ID, Order, Withdrawal, read_order
+from vla_deploy.robots.description import VoiceSettings
+from vla_deploy.speech.errors import EngineMissing, OrderRefused, VoiceError
+from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
+from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.waiting import LONGEST_WAIT_NS, WaitingLine
+from vla_deploy.speech.voice.say_queue import (
+    LONGEST_ID,
+    LONGEST_WAIT_NS,
+    Order,
+    SayQueue,
+    read_order,
+)
+from vla_deploy.speech.voice.tts import Engine, chosen_engine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""
@@ -33,8 +39,8 @@ class _Saying:
     """Hold what is being said: it is in preparation first, and `sound` comes with its end."""
 
     order: Order
-    prepared: "Future[Prepared]"
-    sound: Prepared | None = None
+    prepared: "Future[PreparedSound]"
+    sound: PreparedSound | None = None
     has_begun: bool = False
 
 
@@ -59,22 +65,20 @@ class RobotVoice:
         self._clock = clock
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
-        self._mouth = Mouth(open_output, clock, self._echo.note)
-        self._waiting = WaitingLine()
+        self._player = AudioPlayer(open_output, clock, self._echo.note)
+        self._waiting = SayQueue()
         self._saying: _Saying | None = None
-        self._sounding: Playing | None = None
+        self._sounding: Order | None = None
         self._missing = ""
         self._counts: Counter[str] = Counter()
-        self._orders: RingReader
-        self._operator: RingReader
-        self._events: RingWriter
 
     @property
     def playing(self) -> Playing | None:
         """Return what sounds at this moment, the room's answer to it included."""
-        if self._sounding is None or self._clock.now_ns() >= self._mouth.sounds_until_ns + TAIL_NS:
+        order, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
+        if order is None or self._clock.now_ns() >= until_ns:
             return None
-        return replace(self._sounding, echo_db=self._echo.left_db)
+        return Playing(say_id=order.say_id, text=order.text, echo_db=self._echo.left_db)
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics, and try the engine for the first time."""
@@ -90,11 +94,12 @@ class RobotVoice:
                 self.fall_silent("the robot was stopped")
         for event in self._orders.drain():
             self._take(event.payload, event.stamp_ns)
-        while (late := self._waiting.expired(self._clock.now_ns())) is not None:
-            self._tell(late, "dropped", f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s")
+        oldest_ns = self._clock.now_ns() - LONGEST_WAIT_NS
+        waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
+        self._drop(lambda order: order.given_ns < oldest_ns, waited)
         if self._saying is None:
             self._begin_next()
-        self._mouth.step()
+        self._player.step()
         if self._saying is not None:
             self._advance(self._saying)
 
@@ -109,13 +114,12 @@ class RobotVoice:
 
     def fall_silent(self, reason: str) -> None:
         """Break off what is being said and drop what waits."""
-        while (waiting := self._waiting.take()) is not None:
-            self._tell(waiting, "dropped", reason)
+        self._drop(lambda _: True, reason)
         self._break_off(reason)
 
     def document(self) -> dict[str, Any]:
         """Return what `speech_status` tells under "voice"."""
-        why = self._missing or self._mouth.away
+        why = self._missing or self._player.away
         state = "missing" if self._missing else "away" if why else "ready"
         return {
             "state": state,
@@ -129,11 +133,9 @@ class RobotVoice:
 
     def close(self) -> None:
         """Fall silent and release everything; closing twice is allowed."""
-        self._mouth.cut()
-        self._mouth.close()
+        self._player.cut()
+        self._player.close()
         self._aside.shutdown(wait=False, cancel_futures=True)
-
-    # --- orders -------------------------------------------------------------------------------
 
     def _take(self, payload: dict[str, Any], stamp_ns: int) -> None:
         try:
@@ -142,52 +144,50 @@ class RobotVoice:
             _log.warning("say: %s", error)
             self._publish(str(payload.get("say_id", ""))[:LONGEST_ID], "failed", str(error))
             return
-        if isinstance(order, Withdrawal):
-            self._withdraw(order.say_id)
+        said = None if self._saying is None else self._saying.order
+        if order.withdraws:
+            self._drop(lambda waiting: waiting.say_id == order.say_id, "it was taken back")
+            if said is not None and said.say_id == order.say_id:
+                self._break_off("it was taken back")
             return
-        saying = self._saying
-        if order.interrupt and saying is not None and order.priority >= saying.order.priority:
+        if order.interrupt and said is not None and order.priority >= said.priority:
             self._break_off(f"{order.say_id} came first")
         dropped = self._waiting.add(order)
         if dropped is not None:
-            self._tell(dropped, "dropped", "too much waits to be said")
+            self._publish(dropped.say_id, "dropped", "too much waits to be said")
 
-    def _withdraw(self, say_id: str) -> None:
-        if self._saying is not None and self._saying.order.say_id == say_id:
-            self._break_off("it was taken back")
-        elif (order := self._waiting.withdraw(say_id)) is not None:
-            self._tell(order, "dropped", "it was taken back")
-
-    # --- saying -------------------------------------------------------------------------------
+    def _drop(self, is_dropped: Callable[[Order], bool], reason: str) -> None:
+        for order in self._waiting.drop(is_dropped):
+            self._publish(order.say_id, "dropped", reason)
 
     def _begin_next(self) -> None:
         order = self._waiting.take()
         if order is None:
             return
-        format_ = self._mouth.format
-        if format_ is None or self._mouth.away:
-            self._tell(order, "failed", self._mouth.away)
+        format_ = self._player.format
+        if format_ is None or self._player.away:
+            self._publish(order.say_id, "failed", self._player.away)
             return
         self._saying = _Saying(
             order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
         )
 
-    def _prepare(self, text: str, format_: AudioFormat) -> Prepared:
+    def _prepare(self, text: str, format_: AudioFormat) -> PreparedSound:
         clip = self._engine.synthesise(text)
         wave = clip.at_rate(RATE_HZ).wave * np.float32(self._volume_ratio)
-        return Prepared(samples=clip.samples(format_, self._volume_ratio), wave=wave)
+        return PreparedSound(samples=clip.samples(format_, self._volume_ratio), wave=wave)
 
     def _advance(self, saying: _Saying) -> None:
         if saying.sound is None:
             self._play_once_prepared(saying)
             return
-        if self._mouth.away:
-            self._end(saying, "failed", self._mouth.away)
-        elif not saying.has_begun and self._mouth.has_begun:
+        if self._player.away:
+            self._end(saying, "failed", self._player.away)
+        elif not saying.has_begun and self._player.has_begun:
             saying.has_begun = True
-            self._sounding = _playing(saying.order, saying.sound)
-            self._tell(saying.order, "began", "")
-        elif self._mouth.is_done:
+            self._sounding = saying.order
+            self._publish(saying.order.say_id, "began", "")
+        elif self._player.is_done:
             cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
             self._end(saying, "finished", cut)
 
@@ -201,8 +201,8 @@ class RobotVoice:
             self._end(saying, "failed", str(error))
             return
         self._missing = ""
-        self._mouth.play(saying.sound)
-        self._mouth.step()
+        self._player.play(saying.sound)
+        self._player.step()
 
     def _break_off(self, reason: str) -> None:
         saying = self._saying
@@ -210,11 +210,9 @@ class RobotVoice:
             self._end(saying, "interrupted" if saying.has_begun else "dropped", reason)
 
     def _end(self, saying: _Saying, event: str, reason: str) -> None:
-        self._mouth.cut()
+        self._player.cut()
         self._saying = None
-        self._tell(saying.order, event, reason)
-
-    # --- telling ------------------------------------------------------------------------------
+        self._publish(saying.order.say_id, event, reason)
 
     def _tried(self, first_words: "Future[Any]") -> None:
         """Remember why the engine cannot speak; called beside the steps, once."""
@@ -223,13 +221,16 @@ class RobotVoice:
             self._missing = str(error)
             _log.error("degraded: the robot has no voice: %s", error)
 
-    def _tell(self, order: Order, event: str, reason: str) -> None:
-        self._publish(order.say_id, event, reason)
-
     def _publish(self, say_id: str, event: str, reason: str) -> None:
         self._counts[event] += 1
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
 
 
-def _playing(order: Order, sound: Prepared) -> Playing:
-    return Playing(say_id=order.say_id, text=order.text, level_db=level_db(sound.wave))
+def build_voice(
+    settings: VoiceSettings, open_output: OpenOutput | None, clock: Clock, aside: Executor
+) -> RobotVoice | None:
+    """Return the voice of a robot; None where it has no speaker."""
+    if open_output is None:
+        return None
+    engine = chosen_engine(settings)
+    return RobotVoice(engine, open_output, clock, aside, volume_ratio=settings.volume_ratio)

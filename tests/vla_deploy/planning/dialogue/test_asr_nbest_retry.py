@@ -43,6 +43,27 @@ def test_words_that_make_sense_are_not_replaced(open_desk):
     assert plan["plan"]["actions"][0]["parameters"]["place"] == "bedroom"
 
 
+@pytest.mark.parametrize(
+    ("text", "other", "asks"),
+    [
+        ("turn left 19 degrees", "turn left 90 degrees", True),
+        ("turn left ninety degrees", "turn left nineteen degrees", True),
+        ("turn left", "turn left twenty degrees", True),
+        ("turn left ninety degrees", "turn left 90 degrees", False),
+        ("turn left ninety degrees", "turn left mighty degrees", False),
+        ("go to the kitchen", "go to the kitchen one", False),
+    ],
+)
+def test_a_number_that_may_have_been_another_one_is_read_back(open_desk, text, other, asks):
+    desk = open_desk()
+    desk.give(**spoken(text, (other, 0.05), confidence=0.99))
+    assert ("asked" in [event for event, _ in events(desk.answers())]) is asks
+    assert (desk.plans() == []) is asks
+    desk.give(command_id="c2", text="yes", source="voice")
+    desk.answers()
+    assert len(desk.plans()) == int(asks)
+
+
 def test_where_nothing_makes_sense_the_first_reading_is_refused(open_desk):
     desk = open_desk()
     desk.give(**spoken("go to the chicken", ("go to the kitten", 0.6)))

@@ -24,7 +24,7 @@ MANIFEST = Manifest(
         words=("stop", "halt"),
         smoothing_frames=3,
         refractory_s=1.0,
-        thresholds={"low": 0.9, "normal": 0.7, "high": 0.5, "own_voice": 0.95},
+        thresholds={"low": 0.97, "normal": 0.7, "high": 0.5},
     ),
 )
 
@@ -60,5 +60,5 @@ def manifest() -> Manifest:
 
 
 @pytest.fixture
-def spotter(scorer: LoudnessScorer) -> Spotter:
+def spotter(scorer: Any) -> Spotter:
     return Spotter(scorer, MANIFEST)

@@ -1,5 +1,6 @@
 """A stop word said into the page stops the robot at once, by a listener of the page's own."""
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,12 @@ from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import SoundBlock, duration_ns
-from vla_deploy.speech.stop_words.listener import PAGE, StopWords
-from vla_deploy.speech.stop_words.opening import build_page_stop_words
+from vla_deploy.speech.stop_words.listener import PAGE, StopWords, build_stop_words
 from vla_deploy.speech.stop_words.spotter import Spotter
-from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 RATE_HZ = 16_000
-THRESHOLDS = {"low": 0.9, "normal": 0.7, "high": 0.5, "own_voice": 0.95}
+NORMAL = dataclasses.replace(load_profile("desktop").speech, stop_words="normal")
 
 
 class Page:
@@ -43,7 +43,7 @@ class Page:
             load_robot("butler"),
             load_profile("desktop"),
             None,
-            page_listeners=[listener],
+            page_stop_words=listener,
         )
         self.node.start()
 
@@ -91,8 +91,7 @@ def page(context: NodeContext, clock: ManualClock) -> Iterator[MakePage]:
 
 @pytest.fixture
 def listener(clock: ManualClock, spotter: Spotter) -> StopWords:
-    opened = (spotter, THRESHOLDS)
-    return StopWords(lambda: opened, load_profile("desktop").speech, clock, ear=PAGE)
+    return StopWords(lambda: spotter, NORMAL, clock, place=PAGE)
 
 
 def loud(seconds: float) -> Samples:
@@ -103,7 +102,7 @@ def loud(seconds: float) -> Samples:
 def test_the_shipped_model_hears_a_stop_before_the_button_is_let_go(
     page: MakePage, context: NodeContext
 ) -> None:
-    held = page(build_page_stop_words(context, load_profile("desktop")))
+    held = page(build_stop_words(context, load_profile("desktop"), place=PAGE))
     talker = Talker(engine=EspeakEngine(voice="en-us"))
     wave = arrival("stop", talker, RATE_HZ, Acoustics()).sound.wave
     held.say((32_767 * wave.clip(-1.0, 1.0)).astype(np.int16))
@@ -136,24 +135,22 @@ def test_half_a_word_of_a_turn_that_was_cut_off_does_not_count_in_the_next(
 def test_two_listeners_keep_their_states_apart(
     tmp_path: Path, clock: ManualClock, scorer: Any, manifest: Manifest
 ) -> None:
-    space, settings = SharedSpace(tmp_path / "ipc", clock), load_profile("desktop").speech
-    room, page = (Spotter(scorer, manifest), THRESHOLDS), (Spotter(scorer, manifest), THRESHOLDS)
+    space = SharedSpace(tmp_path / "ipc", clock)
+    room, page = Spotter(scorer, manifest), Spotter(scorer, manifest)
     listeners = (
-        StopWords(lambda: room, settings, clock),
-        StopWords(lambda: page, settings, clock, ear=PAGE),
+        StopWords(lambda: room, NORMAL, clock),
+        StopWords(lambda: page, NORMAL, clock, place=PAGE),
     )
     for listener in listeners:
         listener.start(space)
     in_room, in_page = listeners
     sound = (loud(0.4)[: 10 * 512] / 32_768).astype(np.float32)
     for at in range(0, len(sound), 512):
-        in_room.feed(SoundBlock(stamp_ns=clock.ns, samples=sound[at : at + 512]), is_read=False)
-        in_page.feed(
-            SoundBlock(stamp_ns=clock.ns, samples=np.zeros(512, np.float32)), is_read=False
-        )
+        in_room.feed(SoundBlock(stamp_ns=clock.ns, samples=sound[at : at + 512]))
+        in_page.feed(SoundBlock(stamp_ns=clock.ns, samples=np.zeros(512, np.float32)))
         clock.ns += duration_ns(512)
     assert (in_room.document()["spotted"], in_page.document()["spotted"]) == (1, 0)
-    assert room[0].runs == page[0].runs > 0
+    assert room.runs == page.runs > 0
     for listener in listeners:
         listener.close()
     space.close()

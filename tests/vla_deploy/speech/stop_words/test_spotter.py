@@ -8,8 +8,8 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.inference.manifest import Manifest
+from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import RATE_HZ, Sound, duration_ns
-from vla_deploy.speech.stop_words.errors import SpotterMismatch
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 
 THRESHOLD = 0.7

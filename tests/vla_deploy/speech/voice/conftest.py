@@ -13,9 +13,8 @@ from sim_twin.lines import MemoryLine
 from sim_twin.sensors.sound import SpeakerDevice
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.speech.voice.engine import Engine
-from vla_deploy.speech.voice.espeak import EspeakEngine
 from vla_deploy.speech.voice.robot_voice import RobotVoice
+from vla_deploy.speech.voice.tts import Engine, EspeakEngine
 
 STEP_NS = NS_PER_S // 50
 FORMAT = AudioFormat(rate_hz=16_000)

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
-from vla_deploy.speech.voice.clip import Clip
-from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
-from vla_deploy.speech.voice.espeak import EspeakEngine
-from vla_deploy.speech.voice.piper import PiperEngine
-from vla_deploy.speech.voice.wav_stream import read_wav_stream
+from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.voice.clip import Clip, read_wav_stream
+from vla_deploy.speech.voice.tts import EspeakEngine, PiperEngine
 
 
 def wav(rows: bytes, *, channels: int = 1, bits: int = 16, told_bytes: int = 0x7FFFF000) -> bytes:
@@ -75,7 +73,7 @@ def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
         (b"<html>not found</html>", "expected a WAV"),
         (wav(b""), "no sample"),
         (wav(b"\0" * 8, bits=24), "24 bits"),
-        (wav(b"\0" * 8)[:30], "with a format and samples"),
+        (wav(b"\0" * 8)[:30], "expected a WAV"),
     ],
 )
 def test_what_is_no_sound_is_refused(data: bytes, told: str) -> None:

@@ -9,8 +9,8 @@ from sim_twin.sound.acoustics import Acoustics, path, through
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.speech.sound import RATE_HZ, SoundBlock, duration_ns
 from vla_deploy.speech.voice.clip import Wave
-from vla_deploy.speech.voice.espeak import EspeakEngine
 from vla_deploy.speech.voice.own_echo import OwnEcho
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 ROOM = Acoustics()
 STEP = 320

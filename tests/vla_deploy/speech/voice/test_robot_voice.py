@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.speech.voice.espeak import EspeakEngine
-from vla_deploy.speech.voice.playback import LEAD_NS
+from vla_deploy.speech.voice.audio_player import LEAD_NS
 from vla_deploy.speech.voice.robot_voice import TAIL_NS
-from vla_deploy.speech.voice.waiting import MOST_WAITING
+from vla_deploy.speech.voice.say_queue import MOST_WAITING
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 if TYPE_CHECKING:
     from conftest import VoiceRig
@@ -121,7 +121,7 @@ def test_while_it_speaks_and_rings_out_it_says_what_sounds(rig: VoiceRig) -> Non
     playing = rig.voice.playing
     assert playing is not None
     assert (playing.say_id, playing.text) == ("a", "I am on my way")
-    assert -40.0 < playing.level_db < -3.0
+    assert playing.echo_db < 0.0
     rig.run_until("a", "finished")
     assert rig.voice.playing == playing
     rig.run(TAIL_NS / NS_PER_S)

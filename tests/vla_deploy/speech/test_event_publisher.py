@@ -1,0 +1,153 @@
+"""Commands, stops, refusals and a polite question leave by their own ways, and not too often."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.speech.asr_pipeline import HeardPhrase
+from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.event_publisher import EventPublisher
+from vla_deploy.speech.hot_words import HotWords, hot_words_of
+from vla_deploy.speech.transcript import Alternative, Transcript
+from vla_deploy.speech.verdict import Judgement, Verdict
+
+TOPICS = ("heard", "utterance", "say", "operator")
+
+
+def heard(
+    text: str,
+    verdict: Verdict,
+    *,
+    ask_again: bool = False,
+    others: tuple[Alternative, ...] = (),
+) -> HeardPhrase:
+    reading = Transcript(
+        text=text,
+        log_probability=-0.25,
+        no_speech=0.02,
+        compression=0.9,
+        language="en",
+        duration_s=1.5,
+        took_s=0.03,
+        others=others,
+    )
+    phrase = Phrase(
+        number=1,
+        began_ns=NS_PER_S // 2,
+        ended_ns=NS_PER_S,
+        voiced_s=0.5,
+        clipped_ratio=0.0,
+        voice=0.9,
+        samples=np.zeros(100, np.float32),
+    )
+    return HeardPhrase(
+        phrase=phrase,
+        transcript=reading,
+        confidence=0.83,
+        judgement=Judgement(verdict=verdict, reason="because", ask_again=ask_again),
+    )
+
+
+@pytest.fixture
+def space(tmp_path: Path, clock: ManualClock) -> Iterator[SharedSpace]:
+    space = SharedSpace(tmp_path / "ipc", clock)
+    yield space
+    space.close()
+
+
+@pytest.fixture
+def told(space: SharedSpace) -> Callable[[str], list[Any]]:
+    readers = {name: space.ring_reader(name, from_start=True) for name in TOPICS}
+    return lambda name: [dict(event.payload) for event in readers[name].drain()]
+
+
+@pytest.fixture
+def publisher(space: SharedSpace, clock: ManualClock) -> EventPublisher:
+    return EventPublisher(space, clock)
+
+
+def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
+    publisher: EventPublisher, told: Any, clock: ManualClock
+) -> None:
+    clock.ns = NS_PER_S + 300_000_000
+    publisher.publish(heard("pick up the red cup", Verdict.ACCEPTED))
+    (utterance,) = told("utterance")
+    assert (utterance["text"], utterance["source"]) == ("pick up the red cup", "voice")
+    assert utterance["command_id"].startswith("voice-")
+    assert utterance["heard"]["confidence"] == 0.83
+    assert utterance["heard"]["no_speech"] == 0.02
+    (event,) = told("heard")
+    assert (event["verdict"], event["text"]) == ("accepted", "pick up the red cup")
+    assert event["told_ns"] - event["ended_ns"] == 300_000_000
+    assert told("say") == told("operator") == []
+    assert publisher.document()["end_to_text_p95_s"] == pytest.approx(0.3, rel=0.13)
+
+
+def test_a_stop_presses_the_button_and_is_no_command(publisher: EventPublisher, told: Any) -> None:
+    publisher.publish(heard("stop!", Verdict.STOP))
+    (press,) = told("operator")
+    assert (press["act"], press["source"], press["reason"]) == ("estop", "voice", 'heard "stop!"')
+    assert told("utterance") == []
+    assert [event["verdict"] for event in told("heard")] == ["stop"]
+
+
+def test_a_refusal_is_never_a_command(publisher: EventPublisher, told: Any) -> None:
+    publisher.publish(heard("nice weather", Verdict.REJECTED))
+    assert told("utterance") == told("operator") == told("say") == []
+    assert told("heard")[0]["reason"] == "because"
+
+
+def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
+    publisher: EventPublisher, told: Any
+) -> None:
+    others = (Alternative("put it in the box", 0.7), Alternative("word " * 60, 0.1))
+    publisher.publish(heard("put it in the boss", Verdict.DOUBTED, others=others))
+    (utterance,) = told("utterance")
+    given = utterance["heard"]
+    assert given["others"] == [{"text": "put it in the box", "odds": 0.7}]
+    assert (given["doubted"], given["ask_again"]) == (True, True)
+    assert told("say") == [], "the planner asks, if it makes no sense of them"
+    publisher.publish(heard("put it in the boss", Verdict.DOUBTED))
+    assert told("utterance")[0]["heard"]["ask_again"] is False, "nobody is asked again so soon"
+
+
+def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
+    publisher: EventPublisher, told: Any, clock: ManualClock
+) -> None:
+    asked = []
+    for second in range(120):
+        clock.ns = (10 + second) * NS_PER_S
+        publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
+        asked += [second] * len(told("say"))
+    assert asked == [0, 10, 30, 70]
+    publisher.publish(heard("turn left", Verdict.ACCEPTED))
+    publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
+    (order,) = told("say")
+    assert "say it again" in order["text"]
+    assert (order["interrupt"], order["source"]) == (False, "speech")
+
+
+def test_hot_words_are_the_things_seen_and_the_places(
+    space: SharedSpace, clock: ManualClock
+) -> None:
+    words = HotWords(["kitchen", "living_room"], space.cell_reader("scene"))
+    assert words.text() == "kitchen, living room"
+    objects = [
+        {"class": "cup", "colour": "red"},
+        {"class": "cup", "colour": "red"},
+        {"class": "keys", "colour": ""},
+    ]
+    space.cell_writer("scene").put_document({"objects": objects})
+    assert words.text() == "red cup, keys, kitchen, living room"
+
+
+def test_hot_words_are_bounded() -> None:
+    objects = [{"class": "cup", "colour": f"c{number}"} for number in range(500)]
+    assert len(hot_words_of({"objects": objects}, ()).split()) == 40
+    assert hot_words_of({}, ()) == ""
