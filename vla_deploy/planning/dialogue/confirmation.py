@@ -35,8 +35,9 @@ def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()
     reasons = _reasons(plan, request)
     if reasons.keys() <= agreed:
         return ""
-    question = Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
-    return " ".join([question, *(f"{reason}." for reason in reasons.values() if reason)])
+    return " ".join(
+        [question_about(plan, request), *(f"{reason}." for reason in reasons.values() if reason)]
+    )
 
 
 def agreement_to(plan: Plan, request: Request) -> frozenset[str]:
@@ -53,6 +54,11 @@ def _reasons(plan: Plan, request: Request) -> dict[str, str]:
     whys = {kind: risk(plan, request) for kind, risk in risks.items()}
     found = {why if kind in _EACH else kind: why for kind, why in whys.items() if why}
     return {"any motion": "", **found} if wanted is Confirm.ALWAYS else found
+
+
+def question_about(plan: Plan, request: Request) -> str:
+    """Return a plan as a question, in a person's words."""
+    return Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
 
 
 def _called_by_words(plan: Plan, request: Request) -> Plan:
