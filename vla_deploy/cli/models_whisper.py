@@ -4,7 +4,7 @@ import argparse
 import dataclasses
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from platforms import ModelChoice, Profile
@@ -42,11 +42,13 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     return _told(*add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace))
 
 
-def fetch_whisper(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
+def fetch_whisper(
+    arguments: argparse.Namespace, shelf: ModelShelf, tell: Callable[[str], None]
+) -> Told:
     """Fetch a published Whisper, check it, try it out and keep it."""
     with tempfile.TemporaryDirectory(prefix="vla-deploy-fetch-") as directory:
         folder = Path(directory)
-        published = fetch(arguments.name, folder, arguments.endpoint)
+        published = fetch(arguments.name, folder, tell, arguments.endpoint)
         request = Request(
             name=arguments.name,
             folder=folder,
