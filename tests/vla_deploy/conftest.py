@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from platforms import ModelChoice
+from tests.vla_deploy.hub import Hub, served
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     Context,
@@ -398,6 +399,22 @@ def loopback() -> Iterator[LoopbackServer]:
     server.shutdown()
     thread.join()
     server.server_close()
+
+
+@pytest.fixture
+def open_hub(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Hub]]:
+    """Return what serves a folder's files as a repository, in a folder `under` its root."""
+    import huggingface_hub.constants
+
+    monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_OFFLINE", False)
+    with contextlib.ExitStack() as stack:
+
+        def open_hub(folder: Path, under: str = "") -> Hub:
+            hub = Hub(folder, under)
+            hub.url = stack.enter_context(served(hub))
+            return hub
+
+        yield open_hub
 
 
 @dataclass(frozen=True, slots=True)

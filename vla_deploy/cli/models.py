@@ -6,6 +6,7 @@ import json
 import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +30,7 @@ from vla_deploy.perception.model_tools.labelled import read_labelled
 from vla_deploy.perception.model_tools.quantising import quantise
 from vla_deploy.perception.model_tools.trial import empty_images
 from vla_deploy.perception.model_tools.verifying import Finding, verify
+from vla_deploy.speech.model_tools.fetching import PUBLISHED as WHISPERS
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -74,7 +76,7 @@ def add(arguments: argparse.Namespace) -> int:
     if arguments.whisper is not None:
         return _tell(arguments, *models_whisper.add(arguments, shelf))
     if arguments.language is not None:
-        return _tell(arguments, *models_language.add(arguments, shelf))
+        return _tell(arguments, *models_language.add(arguments, shelf, _profile(arguments)))
     model, trial = add_model(
         shelf.store,
         _request(arguments),
@@ -103,7 +105,19 @@ def add(arguments: argparse.Namespace) -> int:
 
 def fetch(arguments: argparse.Namespace) -> int:
     """Fetch a published model, check it, try it out and keep it."""
-    return _tell(arguments, *models_whisper.fetch_whisper(arguments, _shelf(arguments)))
+    if (arguments.name is None) is (arguments.language is None):
+        raise UsageError(
+            "expected the NAME of a published model, or --language OWNER/REPO[:FOLDER]"
+        )
+    shelf = _shelf(arguments)
+    if arguments.name in WHISPERS:
+        if arguments.new_name or arguments.revision or arguments.licence:
+            raise UsageError("--as, --revision and --licence are for language models")
+        done = models_whisper.fetch_whisper(arguments, shelf, partial(_progress, arguments))
+    else:
+        profile = _profile(arguments)
+        done = models_language.fetch(arguments, shelf, profile, partial(_progress, arguments))
+    return _tell(arguments, *done)
 
 
 def remove(arguments: argparse.Namespace) -> int:
@@ -217,6 +231,11 @@ def _findings(shelf: ModelShelf, name: str, profile: Profile | None) -> Iterator
     if model.manifest.language is not None:
         return models_language.findings(shelf, model, profile)
     return verify(shelf, name, profile)
+
+
+def _progress(arguments: argparse.Namespace, line: str) -> None:
+    if not arguments.json:
+        print(line, file=sys.stderr, flush=True)
 
 
 def _profile(arguments: argparse.Namespace) -> Profile:

@@ -11,7 +11,8 @@ from vla_deploy.cli.number_arguments import number_within
 from vla_deploy.inference.manifest import Fit
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.perception.detectors.adapters import ADAPTERS
-from vla_deploy.speech.model_tools.fetching import PUBLISHED
+from vla_deploy.planning.language_model.fetching import PUBLISHED as LANGUAGE_MODELS
+from vla_deploy.speech.model_tools.fetching import PUBLISHED as WHISPERS
 
 EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models add mugs --onnx best.onnx --classes classes.txt
@@ -19,6 +20,7 @@ EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models calibrate mugs --labelled validation
   vla-deploy models bench mugs
   vla-deploy models fetch whisper-small.en
+  vla-deploy models fetch llama-3.2-1b-gpu
   vla-deploy models verify
 """
 _SIZE: Final = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
@@ -69,12 +71,8 @@ def _add(acts: Any) -> None:
         metavar="DIR",
         help="a language model in the layout of onnxruntime-genai",
     )
-    add.add_argument(
-        "--most-tokens",
-        type=_count,
-        default=512,
-        help="of one answer of a language model (default: 512)",
-    )
+    _most_tokens(add)
+    _profile(add)
     _add_whisper_arguments(add)
     add.add_argument(
         "--classes",
@@ -96,6 +94,15 @@ def _add(acts: Any) -> None:
     add.add_argument("--licence", default="not stated", help="the licence of its weights")
     add.add_argument("--card", type=Path, metavar="FILE", help="a model card to keep with it")
     add.add_argument("--replace", action="store_true", help="replace one of that name")
+
+
+def _most_tokens(act: argparse.ArgumentParser) -> None:
+    act.add_argument(
+        "--most-tokens",
+        type=_count,
+        default=512,
+        help="of one answer of a language model (default: 512)",
+    )
 
 
 def _add_whisper_arguments(add: argparse.ArgumentParser) -> None:
@@ -151,11 +158,30 @@ def _fetch(acts: Any) -> None:
     fetch = add_command(
         acts,
         "fetch",
-        "fetch a published Whisper from the Hugging Face hub, checked by its hashes",
-        "  vla-deploy models fetch whisper-small.en\n",
+        "fetch a published Whisper or language model from the Hugging Face hub, checked by its "
+        "hashes",
+        "  vla-deploy models fetch whisper-small.en\n"
+        "  vla-deploy models fetch llama-3.2-1b-gpu\n"
+        "  vla-deploy models fetch --language OWNER/REPO:FOLDER --as mine\n",
     )
-    fetch.add_argument("name", choices=[*PUBLISHED], help="of the model")
+    fetch.add_argument(
+        "name",
+        nargs="?",
+        metavar="NAME",
+        choices=[*WHISPERS, *LANGUAGE_MODELS],
+        help=f"Whispers: {', '.join(WHISPERS)}; language models: {', '.join(LANGUAGE_MODELS)}",
+    )
+    fetch.add_argument(
+        "--language",
+        metavar="OWNER/REPO[:FOLDER]",
+        help="a language model of any repository, in the layout of onnxruntime-genai",
+    )
+    fetch.add_argument("--as", dest="new_name", metavar="NAME", help="call it by another name")
+    fetch.add_argument("--revision", help="branch, tag or commit (default: main)")
+    fetch.add_argument("--licence", help="of its weights (default: as the hub states it)")
+    _most_tokens(fetch)
     fetch.add_argument("--endpoint", metavar="URL", help="a mirror of the hub")
+    _profile(fetch)
     fetch.add_argument("--replace", action="store_true", help="replace one of that name")
 
 

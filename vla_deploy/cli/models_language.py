@@ -2,12 +2,17 @@
 
 import argparse
 import dataclasses
+import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 
 from platforms import ModelChoice, Profile
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.inference.adding import require_free
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.file_check import check_parts
+from vla_deploy.inference.language_schema import PLANNER
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.store import Model
@@ -18,12 +23,14 @@ from vla_deploy.planning.language_model.adding import (
     try_out,
 )
 from vla_deploy.planning.language_model.benching import LanguageModelBench, bench
+from vla_deploy.planning.language_model.fetching import PUBLISHED, PublishedLanguageModel
+from vla_deploy.planning.language_model.fetching import fetch as fetch_files
 
 Told = tuple[dict[str, object], str]
 
 
-def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
-    """Check a language model, try it out and keep it."""
+def add(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> Told:
+    """Check a language model, try it out as a profile says and keep it."""
     request = LanguageModelSource(
         name=arguments.name,
         folder=arguments.language,
@@ -32,8 +39,52 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
         licence=arguments.licence,
         card=arguments.card,
     )
+    return _kept(arguments, shelf, profile, request)
+
+
+def fetch(
+    arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile, tell: Callable[[str], None]
+) -> Told:
+    """Fetch a published language model, check it, try it out as a profile says and keep it."""
+    name = arguments.new_name or arguments.name
+    if name is None:
+        raise UsageError("expected --as NAME: what to call the model; profiles name it as a tier")
+    require_free(shelf.store, name, replace=arguments.replace)
+    published = _published(arguments)
+    # Beside the models: there is room for gigabytes, which a folder in memory has not.
+    shelf.store.user.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=shelf.store.user) as directory:
+        folder, licence = fetch_files(published, Path(directory), tell, arguments.endpoint)
+        request = LanguageModelSource(
+            name=name,
+            folder=folder,
+            most_tokens=arguments.most_tokens,
+            summary=f"{published.summary}: {published}",
+            licence=arguments.licence or licence,
+        )
+        return _kept(arguments, shelf, profile, request)
+
+
+def _published(arguments: argparse.Namespace) -> PublishedLanguageModel:
+    if arguments.language is None:
+        found = PUBLISHED[arguments.name]
+    else:
+        found = PublishedLanguageModel.named(arguments.language)
+    return dataclasses.replace(found, revision=arguments.revision or found.revision)
+
+
+def _kept(
+    arguments: argparse.Namespace,
+    shelf: ModelShelf,
+    profile: Profile,
+    request: LanguageModelSource,
+) -> Told:
     model, answer = add_language_model(
-        shelf.store, request, clock=shelf.clock, replace=arguments.replace
+        shelf.store,
+        request,
+        clock=shelf.clock,
+        replace=arguments.replace,
+        choice=profile.models.get(PLANNER, PLAIN_CHOICE),
     )
     name = model.manifest.name
     document: dict[str, object] = {
@@ -45,7 +96,7 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     text = (
         f'added {name} in {model.folder}; asked to "go to the kitchen" it answers {answer.text}\n'
         f"next: vla-deploy models bench {name}, then name it in a profile: "
-        f'[models.planner] tiers = ["{name}"]'
+        f'[models.planner] tiers = ["{name}", "command_parser"]'
     )
     return document, text
 
@@ -66,8 +117,9 @@ def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterat
     name = model.manifest.name
     yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
     yield _finding(name, "parts", partial(_whole, model))
-    yield _finding(name, "run", partial(_tried, shelf, model, PLAIN_CHOICE))
-    if profile is not None:
+    if profile is None:
+        yield _finding(name, "run", partial(_tried, shelf, model, PLAIN_CHOICE))
+    else:
         choice = choice_for(model.manifest.role, profile)
         yield _finding(name, f"profile {profile.name}", partial(_tried, shelf, model, choice))
 

@@ -44,11 +44,13 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     return _told(*add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace))
 
 
-def fetch_whisper(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
+def fetch_whisper(
+    arguments: argparse.Namespace, shelf: ModelShelf, tell: Callable[[str], None]
+) -> Told:
     """Fetch a published Whisper, check it, try it out and keep it."""
     with tempfile.TemporaryDirectory(prefix="vla-deploy-fetch-") as directory:
         folder = Path(directory)
-        fetch(arguments.name, folder, arguments.endpoint)
+        fetch(arguments.name, folder, tell, arguments.endpoint)
         request = Request(
             name=arguments.name,
             folder=folder,

@@ -31,6 +31,12 @@ class Deadline:
         end_ns = self.clock.now_ns() + round(given_s * NS_PER_S)
         return replace(self, end_ns=end_ns, given_s=given_s)
 
+    def sooner(self, by_s: float) -> "Deadline":
+        """Return a deadline that ends so much earlier: the time is for something else."""
+        return replace(
+            self, end_ns=self.end_ns - round(by_s * NS_PER_S), given_s=self.given_s - by_s
+        )
+
     def call_in(self) -> None:
         """Let nobody wait for the answer any more, where that can still be said."""
         if self.recall is not None:

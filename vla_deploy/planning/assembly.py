@@ -59,10 +59,11 @@ def open_planner(
     local: Sequence[BackEnd] = (),
     models_away: Mapping[str, str] | None = None,
 ) -> Planner:
-    """Return a planner for a robot: patterns, cache, the `local` models, then the servers.
+    """Return a planner for a robot: patterns, cache, models on board, servers, the parser.
 
-    `base` is the runtime directory, where `servers.toml` lies; `models_away` maps models that could
-    not be opened to the reason. Nothing is sent yet.
+    Of `local` and the servers, in this order, `max_rungs` are taken. `base` is the runtime
+    directory, where `servers.toml` lies; `models_away` maps models that could not be opened to the
+    reason. Nothing is sent yet.
     """
     away: dict[str, str] = {}
     servers = list(_servers(robot, settings, base, away))
@@ -77,8 +78,8 @@ def open_local_models(
 ) -> tuple[tuple[CommandParser | LocalModel, ...], dict[str, str]]:
     """Open the models on board that plan; return them, and why others are away.
 
-    The command parser that comes with the software goes before any larger model, since it answers
-    in a fraction of the time.
+    The command parser that comes with the software is the first of them, so that no bound on their
+    number leaves it out; the planner asks it last.
     """
     choice = profile.models.get(ROLE)
     if choice is None:

@@ -105,12 +105,14 @@ class PlanningResult:
     """Hold what came of a command: a `plan` that may run, or why there is none.
 
     `proposal` is the plan as its back end proposed it, before it was grounded and checked.
+    `is_unchecked` is set while a language model has still to check what the plan moves.
     """
 
     attempts: tuple[Attempt, ...] = ()
     plan: Plan | None = None
     proposal: Proposal | None = None
     error: PlanningError | None = None
+    is_unchecked: bool = False
 
     @property
     def read_back(self) -> str:
@@ -131,10 +133,13 @@ run."""
 class BackEnd(Protocol):
     """Plan a command, or decline it so that the next back end is asked.
 
-    `name` is what it is called in events and status, `uses` what its prompts can hold.
+    `name` is what it is called in events and status, `uses` what its prompts can hold. One that
+    `is_language_model` is asked before the others that take time, and checks what quicker ones
+    plan.
     """
 
     name: str
+    is_language_model: bool = False
     uses: frozenset[Aid] = frozenset()
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:

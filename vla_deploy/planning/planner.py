@@ -1,4 +1,10 @@
-"""Ask the back ends for a plan, one after the other, and check what each proposes."""
+"""Ask the back ends for a plan, one after the other, and check what each proposes.
+
+The order: exact patterns and kept plans, language models, the command parser. What patterns make of
+a sentence with words that change its scope is checked by a language model where there is one; what
+the parser makes of it, where a language model saw no way. Where they move other things, the person
+is asked.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,7 +13,9 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
+from vla_deploy.planning.dialogue.confirmation import question_about
 from vla_deploy.planning.errors import (
     Ambiguous,
     Declined,
@@ -29,11 +37,13 @@ from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
 from vla_deploy.planning.prohibitions import held_to
-from vla_deploy.planning.scope import guarded
+from vla_deploy.planning.scope import doubt, guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
 WITHIN_S: Final = 20.0
+# What language models leave of the time to the command parser, which needs a fraction of that.
+PARSER_S: Final = 2.0
 _REASON_CHARACTERS: Final = 200
 # What an error is called in events, and its rank: a person reads the error of the least rank.
 _ERRORS: Final = (
@@ -43,6 +53,9 @@ _ERRORS: Final = (
     (Declined, AttemptOutcome.DECLINED, 4),
     (PlanningError, AttemptOutcome.REFUSED, 1),
 )
+
+# Outcomes of a back end that leave open what it would have planned.
+_SILENT: Final = frozenset({AttemptOutcome.DECLINED, AttemptOutcome.LATE})
 
 
 def checked(plan: Plan, request: Request) -> Plan:
@@ -61,7 +74,8 @@ def checked(plan: Plan, request: Request) -> Plan:
 class Planner:
     """Hold the chain of back ends; those in `slow` are asked outside the node's steps.
 
-    `away` maps models and servers that it should ask and cannot to the reason.
+    Of these the language models come first, whatever their order in `slow`. `away` maps models and
+    servers that it should ask and cannot to the reason.
     """
 
     def __init__(
@@ -79,7 +93,9 @@ class Planner:
         self.check = check
         self._clock = clock
         self._quick: tuple[BackEnd, ...] = (Patterns(), self.cache)
-        self._slow = tuple(slow)
+        self._models = tuple(one for one in slow if one.is_language_model)
+        self._parsers = tuple(one for one in slow if not one.is_language_model)
+        self._slow = (*self._models, *self._parsers)
 
     @property
     def back_ends(self) -> tuple[str, ...]:
@@ -115,18 +131,42 @@ class Planner:
         """Return the answer of all back ends together; blocks until then."""
         deadline = Deadline.within(self._clock, self.within_s)
         answer = self.plan_at_once(request, deadline)
-        return answer if answer.is_final else self.plan_slowly(request, deadline, answer)
+        return self.plan_slowly(request, deadline, answer) if self.goes_on(answer) else answer
 
     def plan_at_once(self, request: Request, deadline: Deadline) -> PlanningResult:
         """Return the answer of the back ends that take no time."""
         answer = self.first_plan(self._quick, request, deadline)
-        return answer if self._slow else _worded(answer, request)
+        if not self._slow:
+            return _worded(answer, request)
+        return replace(answer, is_unchecked=bool(self._models) and _needs_check(answer, request))
+
+    def goes_on(self, answer: PlanningResult) -> bool:
+        """Return whether the back ends that take time are to be asked after those that do not."""
+        return bool(self._slow) and (answer.is_unchecked or not answer.is_final)
 
     def plan_slowly(
         self, request: Request, deadline: Deadline, before: PlanningResult
     ) -> PlanningResult:
-        """Return the answer of the others too; blocks until the deadline at most."""
-        return _worded(self.first_plan(self._slow, request, deadline, before), request)
+        """Return the answer of the others too; blocks until the deadline at most.
+
+        A plan of `before` stands, as the language models find it; without one the parser is asked
+        where they have none either.
+        """
+        has_plan = before.plan is not None
+        reserved_s = 0.0 if has_plan or not self._parsers else PARSER_S
+        models_by = deadline.sooner(min(reserved_s, deadline.left_s / 2))
+        begun = PlanningResult(attempts=before.attempts) if has_plan else before
+        found = self.first_plan(self._models, request, models_by, begun)
+        if not has_plan and found.is_final:
+            return found
+        if has_plan:
+            quick = replace(before, attempts=found.attempts, is_unchecked=False)
+        else:
+            quick = self.first_plan(self._parsers, request, deadline, found)
+        said = found.attempts[len(before.attempts) :]
+        if _needs_check(quick, request) and any(one.outcome not in _SILENT for one in said):
+            quick = _checked_by(found.plan, quick, request)
+        return _worded(quick, request)
 
     def check_given(self, document: Json | list[object] | str, request: Request) -> PlanningResult:
         """Return the answer to a plan that was made elsewhere, in any dialect."""
@@ -206,6 +246,28 @@ def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
     outcome = next(outcome for kind, outcome, _ in _ERRORS if isinstance(error, kind))
     is_late = outcome is AttemptOutcome.DECLINED and share.left_s <= 0.0
     return AttemptOutcome.LATE if is_late else outcome
+
+
+def _needs_check(answer: PlanningResult, request: Request) -> bool:
+    """Return whether a plan would move something unasked that words of its command may change."""
+    plan, proposal = answer.plan, answer.proposal
+    if plan is None or proposal is None or proposal.knows_grammar or proposal.read_back:
+        return False
+    return moves_anything(plan) and bool(scope_words(request.text))
+
+
+def _checked_by(model_plan: Plan | None, quick: PlanningResult, request: Request) -> PlanningResult:
+    """Return a quick plan, read back unless the plan of a language model moves the same.
+
+    `model_plan` is None where the model was asked and has none.
+    """
+    plan, proposal = quick.plan, quick.proposal
+    assert plan is not None, "only plans are checked"
+    assert proposal is not None, "a plan was proposed"
+    if model_plan is not None and move_the_same(plan, model_plan, request):
+        return quick
+    question = doubt(scope_words(request.text), question_about(plan, request))
+    return replace(quick, proposal=replace(proposal, read_back=question))
 
 
 def _worded(answer: PlanningResult, request: Request) -> PlanningResult:

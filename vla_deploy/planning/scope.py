@@ -14,6 +14,7 @@ from typing import Final
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import Proposal, Request
+from vla_deploy.planning.plan import Plan
 
 
 class ScopeGroup(StrEnum):
@@ -113,18 +114,30 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
     Raises:
         CannotBeDone: without them it may be the very thing that was not to be done.
     """
-    if all(action.skill in {*MOTIONLESS, "look_at"} for action in proposal.plan.actions):
+    if not moves_anything(proposal.plan):
         return proposal
     left_out = _without(scope_words(request.text), proposal.covers)
     if not left_out:
         return proposal
-    listed = " and ".join(f'"{word}"' for word in dict.fromkeys(left_out))
     denies = any(group_of(word) is ScopeGroup.NEGATION for word in left_out)
     if denies and not proposal.knows_grammar and _DENIED.match(_plain(request.text)):
-        raise CannotBeDone(f"I would leave out {listed}; say just what to do now")
+        raise CannotBeDone(f"I would leave out {_listed(left_out)}; say just what to do now")
     question = proposal.read_back or f"Shall I {proposal.plan.summary or 'do that'}?"
-    asked = f"You said {listed}, which I may not have understood. {question}"
-    return replace(proposal, read_back=asked)
+    return replace(proposal, read_back=doubt(left_out, question))
+
+
+def moves_anything(plan: Plan) -> bool:
+    """Return whether a plan moves more than the head."""
+    return any(action.skill not in {*MOTIONLESS, "look_at"} for action in plan.actions)
+
+
+def doubt(words: Iterable[str], question: str) -> str:
+    """Return a question about a plan, with the words that it may have been made without."""
+    return f"You said {_listed(words)}, which I may not have understood. {question}"
+
+
+def _listed(words: Iterable[str]) -> str:
+    return " and ".join(f'"{word}"' for word in dict.fromkeys(words))
 
 
 def _without(words: Iterable[str], covered: frozenset[str] | None) -> tuple[str, ...]:

@@ -1,10 +1,7 @@
 """A person's Whisper is added, fetched, checked and measured by the same commands as a detector."""
 
-import hashlib
 import json
-import threading
-from collections.abc import Callable, Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +11,6 @@ from vla_deploy.cli.main import main
 from vla_deploy.state_dir import models_dir_of
 
 Vla = Callable[..., tuple[int, str, str]]
-SHA = "0123456789012345678901234567890123456789"
 
 
 @pytest.fixture
@@ -88,88 +84,25 @@ def test_verify_tells_a_part_that_has_changed(vla: Vla, files: Path, base: Path)
     assert "expected SHA-256" in out
 
 
-class Hub:
-    """Serve one repository as the hub does: what it holds, then each file of that commit."""
-
-    def __init__(self, folder: Path) -> None:
-        self.files = {path.name: path.read_bytes() for path in folder.iterdir()}
-        self.files["README.md"] = b"not asked for"
-        self.asked: list[str] = []
-        self.tells_wrong_hash = False
-
-    def siblings(self) -> list[dict[str, Any]]:
-        return [self._sibling(name, data) for name, data in self.files.items()]
-
-    def _sibling(self, name: str, data: bytes) -> dict[str, Any]:
-        blob = hashlib.sha1(b"blob %d\0" % len(data) + data).hexdigest()
-        told: dict[str, Any] = {"rfilename": name, "size": len(data), "blobId": blob}
-        if name == "model.bin":
-            digest = hashlib.sha256(data + b"x" * self.tells_wrong_hash).hexdigest()
-            told["lfs"] = {"sha256": digest, "size": len(data), "pointerSize": 130}
-        return told
-
-
 @pytest.fixture
-def hub(files: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Hub, str]]:
-    import huggingface_hub.constants
-
-    monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_OFFLINE", False)
-    served = Hub(files)
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            served.asked.append(self.path)
-            if self.path.startswith("/api/"):
-                answer = {"id": "a/b", "sha": SHA, "siblings": served.siblings()}
-                self._send(json.dumps(answer).encode(), "application/json")
-            else:
-                self._send(served.files[self.path.rpartition("/")[2]], "application/octet-stream")
-
-        do_HEAD = do_GET  # noqa: N815 - http.server's name
-
-        def _send(self, body: bytes, kind: str) -> None:
-            self.send_response(200)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("X-Repo-Commit", SHA)
-            self.send_header("ETag", f'"{hashlib.sha256(body).hexdigest()}"')
-            self.end_headers()
-            if self.command == "GET":
-                self.wfile.write(body)
-
-        def log_message(self, *args: Any) -> None:
-            """Say nothing on the terminal."""
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-    thread.start()
-    yield served, f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    thread.join()
-    server.server_close()
+def hub(files: Path, open_hub: Callable[[Path], Any]) -> Any:
+    return open_hub(files)
 
 
-def test_a_published_whisper_is_fetched_at_one_commit_and_checked(
-    vla: Vla, hub: tuple[Hub, str]
-) -> None:
-    served, endpoint = hub
-    code, out, errors = vla("fetch", "whisper-tiny.en", "--endpoint", endpoint, "--json")
+def test_a_published_whisper_is_fetched_at_one_commit_and_checked(vla: Vla, hub: Any) -> None:
+    code, out, errors = vla("fetch", "whisper-tiny.en", "--endpoint", hub.url, "--json")
     assert (code, errors) == (0, "")
     assert json.loads(out)["reads_in_silence"] == "turn left"
-    fetched = [path for path in served.asked if not path.startswith("/api/")]
-    assert all(f"Systran/faster-whisper-tiny.en/resolve/{SHA}/" in path for path in fetched)
-    assert not any(path.endswith("README.md") for path in fetched)
+    assert all(f"Systran/faster-whisper-tiny.en/resolve/{hub.SHA}/" in path for path in hub.fetched)
+    assert not any(path.endswith("README.md") for path in hub.fetched)
     shown = json.loads(vla("show", "whisper-tiny.en", "--json")[1])
     assert shown["whisper"]["context"] == "padded"
     assert vla("verify", "whisper-tiny.en", "--profile", "desktop")[0] == 0
 
 
-def test_a_file_that_is_not_what_the_hub_says_is_refused(
-    vla: Vla, hub: tuple[Hub, str], base: Path
-) -> None:
-    served, endpoint = hub
-    served.tells_wrong_hash = True
-    code, _, errors = vla("fetch", "whisper-tiny.en", "--endpoint", endpoint)
+def test_a_file_that_is_not_what_the_hub_says_is_refused(vla: Vla, hub: Any, base: Path) -> None:
+    hub.wrong_hash_of = "model.bin"
+    code, _, errors = vla("fetch", "whisper-tiny.en", "--endpoint", hub.url)
     assert code == 2
     assert "model.bin: expected the hash" in errors
     assert not (models_dir_of(base) / "whisper-tiny.en").exists()

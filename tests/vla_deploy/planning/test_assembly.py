@@ -85,6 +85,29 @@ def test_no_more_rungs_are_asked_than_the_profile_allows(open_with):
     assert open_with('servers = ["bench"]\nmax_rungs = 0').slow_back_ends == ()
 
 
+@pytest.mark.parametrize(
+    ("max_rungs", "slow"), [(4, ("server bench", "command_parser")), (1, ("command_parser",))]
+)
+def test_the_shipped_parser_is_asked_last_and_no_bound_leaves_it_out(
+    tmp_path, loopback, ask, max_rungs, slow
+):
+    config = tmp_path / "base-config"
+    config.mkdir()
+    (config / "servers.toml").write_text(SERVERS.format(url=loopback.url))
+    profile = tmp_path / "mine.toml"
+    profile.write_text(
+        f'inherits = "desktop"\n[planning]\nservers = ["bench"]\nmax_rungs = {max_rungs}\n'
+    )
+    clock, robot = MonotonicClock(), load_robot("butler")
+    planner = planner_for(robot, load_profile(profile), clock, tmp_path / "base")
+    assert planner.slow_back_ends == slow
+    loopback.then(loopback.sends(500, b""))
+    answer = planner.plan(ask("would you mind heading over to the kitchen"))
+    planner.close()
+    assert answer.proposal.back_end == "command_parser"
+    assert [one.back_end for one in answer.attempts[2:]] == list(slow)
+
+
 def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_with, loopback, ask):
     loopback.then(loopback.says(json.dumps(ANSWER)))
     open_with('servers = ["bench"]').plan(ask("make it nice in here"))

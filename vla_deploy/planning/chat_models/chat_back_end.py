@@ -16,6 +16,7 @@ SURE: Final = 0.75
 class ChatBackEnd(BackEnd):
     """Hold how the answers of one chat model become proposals; `shape` is that of an answer."""
 
+    is_language_model = True
     uses = frozenset({Aid.MEMORY})
 
     def __init__(self, name: str, robot: str, places: Sequence[str], check: Check) -> None:

@@ -1,7 +1,7 @@
-"""Plan by the embedded command parser: the rung between patterns and larger models.
+"""Plan by the embedded command parser: the last back end, after any larger model.
 
 Its mistakes do not show in their form, so each answer is weighed: what is unsure is read back and
-waits for a yes, what is very unsure is left to the next rung.
+waits for a yes, of what is very unsure there is no plan.
 """
 
 import json

@@ -3,7 +3,7 @@
 A recogniser that is unsure has several readings; the one with a plan in this room and this moment
 is the likeliest. It is read back before anything moves. Each is tried without its commas, too,
 which may be pauses only. A plan about things that have not been seen gives way to one about things
-that are there, and what the command parser makes of unsure words to words that a pattern covers.
+that are there, and what a model makes of unsure words to words that a pattern covers.
 """
 
 import re
@@ -16,6 +16,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
+from vla_deploy.planning.interfaces import Proposal
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to back ends that take time, too."""
@@ -86,15 +87,19 @@ class NBestRetry:
 def _gives_way(done: PlannedCommand) -> bool:
     """Return whether other words may make more sense: of things that are there, or to a pattern.
 
-    The command parser makes something of misheard words, too.
+    The command parser and language models make something of misheard words, too.
     """
     proposal, plan, scene = done.answer.proposal, done.answer.plan, done.request.scene
-    if proposal is not None and proposal.back_end == COMMAND_PARSER:
+    if proposal is not None and not proposal.origin and _is_of_a_model(proposal):
         return True
     if plan is None or scene is None or not scene.things:
         return False
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
     return not all(is_seen(str(text), done.request) for text in sought)
+
+
+def _is_of_a_model(proposal: Proposal) -> bool:
+    return proposal.knows_grammar or proposal.back_end == COMMAND_PARSER
 
 
 def _is_unsure(command: UserCommand) -> bool:

@@ -180,7 +180,8 @@ class CommandManager:
         else:
             deadline = self._deadline(self._retry.within_s(command, self.planner.within_s))
             answer = self.planner.plan_at_once(request, deadline)
-        if answer.is_final or not self.planner.slow_back_ends or self._retry.is_urgent(command):
+        urgent = self._retry.is_urgent(command) and not answer.is_unchecked
+        if urgent or not self.planner.goes_on(answer):
             self._conclude(PlannedCommand(command, request, answer))
             return
         self._events.planning(command, self.planner.slow_back_ends)

@@ -1,6 +1,5 @@
 """Add a person's language model: describe its folder, try it out, and only then keep it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -23,8 +22,8 @@ from vla_deploy.planning.language_model.model_folder import (
     read_genai_config,
 )
 
-# What such a folder has besides, some of it only for other runtimes.
-_WEIGHTS: Final = ("*.onnx", "*.onnx.data", "*.onnx_data")
+_PARTS: Final = (GENAI_CONFIG, TOKENIZER, CONFIG, TEMPLATE)
+_WEIGHTS: Final = (".onnx", ".onnx.data", ".onnx_data")
 TRIAL_S: Final = 120.0
 TRIAL_SCHEMA: Final = {
     "type": "object",
@@ -51,9 +50,14 @@ class LanguageModelSource:
 
 
 def add_language_model(
-    store: ModelStore, request: LanguageModelSource, *, clock: Clock, replace: bool = False
+    store: ModelStore,
+    request: LanguageModelSource,
+    *,
+    clock: Clock,
+    replace: bool = False,
+    choice: ModelChoice = PLAIN_CHOICE,
 ) -> tuple[Model, ModelAnswer]:
-    """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
+    """Check a model, try it out as `choice` says, keep it; when anything is wrong, nothing changes.
 
     Returns the model, and its answer to a small command.
 
@@ -66,7 +70,9 @@ def add_language_model(
     require_free(store, request.name, replace=replace)
     manifest = describe(request)
     files = {part.path: request.folder / part.path for part in manifest.parts}
-    return keep_tried(store, manifest, files, request.card, lambda model: try_out(model, clock))
+    return keep_tried(
+        store, manifest, files, request.card, lambda model: try_out(model, clock, choice)
+    )
 
 
 def describe(request: LanguageModelSource) -> Manifest:
@@ -78,7 +84,7 @@ def describe(request: LanguageModelSource) -> Manifest:
     """
     folder = request.folder
     graph = read_genai_config(folder).file_name
-    names = sorted({path.name for path in _parts(folder)})
+    names = sorted(path.name for path in folder.iterdir() if is_part(path.name))
     missing = [name for name in (GENAI_CONFIG, TOKENIZER, graph) if name not in names]
     if missing:
         raise ModelFolderInvalid(
@@ -120,9 +126,6 @@ def ask(model: LanguageModel, clock: Clock) -> ModelAnswer:
     return model.answer(_TRIAL, bounds, dict(TRIAL_SCHEMA))
 
 
-def _parts(folder: Path) -> Iterator[Path]:
-    for name in (GENAI_CONFIG, TOKENIZER, CONFIG, TEMPLATE):
-        if (folder / name).is_file():
-            yield folder / name
-    for pattern in _WEIGHTS:
-        yield from folder.glob(pattern)
+def is_part(name: str) -> bool:
+    """Return whether a file of such a folder is used; the others are for other runtimes."""
+    return name in _PARTS or name.endswith(_WEIGHTS)

@@ -24,6 +24,9 @@ from vla_deploy.planning.language_model.model_folder import GenaiConfig
 
 # A weak model would else go on with tabs and blanks for ever.
 _GUIDANCE: Final = {"whitespace_flexible": False}
+# Tokens of one run. Exports score every token that they read: 3000 of a prompt at once would be
+# gigabytes of scores, of which the last is wanted, and seconds that nothing can break off.
+PIECE_TOKENS: Final = 128
 JsonSchema = dict[str, Any]
 Scores = NDArray[np.float32]
 
@@ -72,7 +75,8 @@ def generate(
 ) -> Generated:
     """Answer a prompt; without a constraint, until the model ends by itself.
 
-    Forced tokens go in with the next token that the model is asked for, in one run.
+    Forced tokens go in with the next token that the model is asked for, in one run. A long prompt
+    is read piece by piece.
 
     Raises:
         AnswerLate: the deadline passed, or the answer is not awaited any more.
@@ -94,9 +98,11 @@ def generate(
             waiting += forced
         if constraint is not None and constraint.is_done:
             break
-        _check_bounds(len(tokens), bounds)
-        scores = decoder.feed(waiting)
-        runs += 1
+        decoder.check_room(len(waiting))
+        for begin in range(0, len(waiting), PIECE_TOKENS):
+            _check_bounds(len(tokens), bounds)
+            scores = decoder.feed(waiting[begin : begin + PIECE_TOKENS])
+            runs += 1
         token = _likeliest(scores, constraint)
         if token.number in end_ids:
             break
@@ -154,13 +160,9 @@ class Decoder:
             PromptTooLong: the text would be longer than the model's context.
             RunFailed: the run failed, or gave scores that are no numbers.
         """
+        self.check_room(len(tokens))
         config, known = self._config, len(self.tokens)
         length = known + len(tokens)
-        if length > config.context_tokens:
-            raise PromptTooLong(
-                f"{self._session.path.parent.name}: the text has {length} tokens, expected "
-                f"{config.context_tokens} at most; shorten the prompt"
-            )
         inputs: dict[str, NDArray[Any]] = {
             config.input_ids: np.asarray([tokens], dtype=np.int64),
             config.attention_mask: np.ones((1, length), dtype=np.int64),
@@ -178,6 +180,19 @@ class Decoder:
         }
         self.tokens += tokens
         return scores
+
+    def check_room(self, count: int) -> None:
+        """Accept that so many tokens are added to the text.
+
+        Raises:
+            PromptTooLong: it would be longer than the model's context.
+        """
+        length, most = len(self.tokens) + count, self._config.context_tokens
+        if length > most:
+            raise PromptTooLong(
+                f"{self._session.path.parent.name}: the text has {length} tokens, expected "
+                f"{most} at most; shorten the prompt"
+            )
 
     def keep(self, tokens: Sequence[int]) -> int:
         """Forget the text but for what it has in common with the beginning of tokens.

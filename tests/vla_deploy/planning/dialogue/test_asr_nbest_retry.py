@@ -189,11 +189,12 @@ def test_a_thing_that_is_there_is_likelier_meant_than_one_that_nobody_saw(
 
 
 @pytest.mark.parametrize(("confidence", "place"), [(0.65, "bedroom"), (0.9, "kitchen")])
-def test_what_the_parser_makes_of_unsure_words_gives_way_to_words_that_the_rules_know(
-    open_desk, back_end, propose, confidence, place
+@pytest.mark.parametrize(("name", "knows_grammar"), [("command_parser", False), ("chat", True)])
+def test_what_a_model_makes_of_unsure_words_gives_way_to_words_that_the_rules_know(
+    open_desk, back_end, propose, confidence, place, name, knows_grammar
 ):
-    parser = back_end("command_parser", propose(GO, back_end="command_parser"))
-    desk = open_desk(parser)
+    model = back_end(name, propose(GO, back_end=name, knows_grammar=knows_grammar))
+    desk = open_desk(model)
     desk.give(**spoken("go where one cooks", ("go to the bedroom", 0.5), confidence=confidence))
     desk.answers()
     desk.give(command_id="c2", text="yes", source="voice")

@@ -50,3 +50,19 @@ def test_a_chat_model_is_told_what_is_remembered(
     desk.answers()
     ((recollection,),) = told
     assert "water the yellow tulips" in recollection
+
+
+def test_a_chat_model_that_has_no_answer_is_followed_by_the_parser(
+    clock, chat: LocalModel, ask: Callable, back_end: Callable, propose: Callable
+) -> None:
+    go = ("navigate_to", {"place": "kitchen"})
+    planner = Planner(clock, (back_end("parser", propose(go, back_end="parser")), chat))
+    assert planner.slow_back_ends == ("chat", "parser")
+    answer = planner.plan(ask("make it nice in here"))
+    assert [(one.back_end, one.outcome) for one in answer.attempts[2:]] == [
+        ("chat", "declined"),
+        ("parser", "planned"),
+    ]
+    checked_by_none = planner.plan(ask("pick up both cups"))
+    assert [one.back_end for one in checked_by_none.attempts] == ["patterns", "chat"]
+    assert (checked_by_none.proposal.back_end, checked_by_none.read_back) == ("patterns", "")

@@ -21,6 +21,7 @@ from vla_deploy.planning.language_model import (
     ModelFolderInvalid,
     PromptTooLong,
     SchemaUnusable,
+    decoding,
 )
 from vla_deploy.planning.language_model.decoding import Constraint, generate, grammar_of
 
@@ -101,6 +102,33 @@ def test_another_ending_is_read_from_where_the_prompts_part(model: LanguageModel
     parted = model.decoder.feed(other[same:])
     model.decoder.keep([])
     np.testing.assert_allclose(parted, model.decoder.feed(other), rtol=1e-4, atol=1e-4)
+
+
+def test_a_long_prompt_is_read_in_pieces_with_the_same_answer(
+    model: LanguageModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once = model.answer(ASKED, bounds(), SCHEMA)
+    model.decoder.keep([])
+    monkeypatch.setattr(decoding, "PIECE_TOKENS", 16)
+    piecewise = model.answer(ASKED, bounds(), SCHEMA)
+    assert piecewise.text == at_once.text
+    assert piecewise.runs - at_once.runs == (at_once.prompt_tokens - 1) // 16
+
+
+def test_a_recalled_prompt_is_not_read_to_its_end(
+    model: LanguageModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(decoding, "PIECE_TOKENS", 16)
+    recall, feed = Event(), model.decoder.feed
+
+    def read(tokens: Sequence[int]) -> Any:
+        recall.set()
+        return feed(tokens)
+
+    monkeypatch.setattr(model.decoder, "feed", read)
+    with pytest.raises(AnswerLate, match="nobody waits"):
+        model.answer(ASKED, bounds(recall=recall), SCHEMA)
+    assert len(model.decoder.tokens) == 16
 
 
 def test_an_answer_ends_when_its_time_is_up(model: LanguageModel) -> None:

@@ -1,0 +1,180 @@
+"""A language model is asked before the parser, and checks what patterns make of scope words."""
+
+import json
+from typing import Any
+
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.planner import Planner
+from vla_deploy.robots import load_robot
+
+SERVERS = """
+[servers.bench]
+api = "openai_compatible"
+url = "{url}"
+model = "tiny"
+location = "local"
+max_attempts = 1
+"""
+NICE = "make it nice in here"
+BOTH = "pick up both cups"
+KITCHEN = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}
+RED = {"skill": "pick_up", "object": "red cup", "arm": None}
+BLUE = {"skill": "pick_up", "object": "blue cup", "arm": None}
+TO_HALL = ("navigate_to", {"place": "hall"})
+NO_WAY = {"steps": [], "feasible": False, "reasoning": "I cannot reach it"}
+DOUBT = 'You said "both", which I may not have understood. Shall I pick up the red cup and pick up'
+
+
+def says(*steps: dict[str, Any], **changes: Any) -> str:
+    told = {"reasoning": "so", "question": None, "feasible": True, "confidence": 0.95}
+    return json.dumps(told | {"steps": list(steps)} | changes)
+
+
+@pytest.fixture
+def parser(back_end, propose):
+    return back_end("parser", propose(TO_HALL, back_end="parser", covers=None))
+
+
+@pytest.fixture
+def planner(tmp_path, loopback, parser):
+    """Return a planner whose profile names a server, beside a parser on board."""
+
+    def planner(url: str = loopback.url, within_s: float = 5.0) -> Planner:
+        config = tmp_path / "base-config"
+        config.mkdir(exist_ok=True)
+        (config / "servers.toml").write_text(SERVERS.format(url=url))
+        profile = tmp_path / "mine.toml"
+        profile.write_text(
+            f'inherits = "desktop"\n[planning]\nservers = ["bench"]\nwithin_s = {within_s}\n'
+            "candidates = 1\n"
+        )
+        settings, clock = load_profile(profile).planning, MonotonicClock()
+        return open_planner(load_robot("butler"), settings, clock, tmp_path / "base", (parser,))
+
+    return planner
+
+
+def outcomes(answer) -> list[tuple[str, str]]:
+    return [(one.back_end, one.outcome) for one in answer.attempts]
+
+
+def test_the_server_plans_and_the_parser_is_not_asked(planner, loopback, parser, ask) -> None:
+    loopback.then(loopback.says(says(KITCHEN)))
+    asked = planner()
+    assert asked.back_ends == ("patterns", "cache", "server bench", "parser")
+    assert asked.plan(ask(NICE)).proposal.back_end == "server bench"
+    assert parser.asked == []
+
+
+@pytest.mark.parametrize("text", ["no JSON", says(KITCHEN, place="narnia")])
+def test_a_server_that_has_no_plan_is_followed_by_the_parser(
+    planner, loopback, ask, text: str
+) -> None:
+    loopback.then(loopback.says(text.replace('"kitchen"', '"narnia"')))
+    answer = planner().plan(ask(NICE))
+    assert (answer.proposal.back_end, answer.read_back) == ("parser", "")
+    assert [name for name, _ in outcomes(answer)[2:]] == ["server bench", "parser"]
+
+
+def test_a_server_that_is_away_or_late_leaves_time_for_the_parser(planner, loopback, ask) -> None:
+    away = planner("http://127.0.0.1:9").plan(ask(NICE))
+    assert outcomes(away)[2:] == [("server bench", "declined"), ("parser", "planned")]
+    loopback.then(loopback.raw(b"HTTP/1.1 200 OK\r\n", pause_s=0.8))
+    late = planner(within_s=1.0).plan(ask(NICE))
+    assert outcomes(late)[2:] == [("server bench", "late"), ("parser", "planned")]
+
+
+def test_a_server_may_take_all_the_time_but_what_the_parser_needs(
+    clock, back_end, propose, ask
+) -> None:
+    model = back_end("model", propose(TO_HALL), takes_s=17.0)
+    model.is_language_model = True
+    planner = Planner(clock, (back_end("parser", propose(TO_HALL)), model), within_s=20.0)
+    assert planner.plan(ask(NICE)).proposal.plan == propose(TO_HALL).plan
+    assert planner.back_ends[2:] == ("model", "parser")
+
+
+@pytest.mark.parametrize(
+    ("text", "asks"),
+    [("make it nice, except the hall", True), ("make it nice in the hall", False)],
+)
+def test_what_a_server_finds_impossible_is_asked_about_where_words_change_the_scope(
+    planner, loopback, ask, text: str, *, asks: bool
+) -> None:
+    loopback.then(loopback.says(says(**NO_WAY)))
+    answer = planner().plan(ask(text))
+    assert answer.proposal.back_end == "parser"
+    assert bool(answer.read_back) is asks
+
+
+@pytest.mark.parametrize(
+    "steps", [(RED, BLUE), (BLUE, RED), (RED, BLUE, RED | {"skill": "look_at"})]
+)
+def test_a_plan_that_a_server_shares_runs_unasked(planner, loopback, ask, steps) -> None:
+    loopback.then(loopback.says(says(*[_fit(one) for one in steps])))
+    answer = planner().plan(ask(BOTH))
+    assert outcomes(answer) == [("patterns", "planned"), ("server bench", "planned")]
+    assert (answer.proposal.back_end, answer.read_back) == ("patterns", "")
+
+
+def _fit(step: dict[str, Any]) -> dict[str, Any]:
+    return {"skill": "look_at", "object": step["object"]} if step["skill"] == "look_at" else step
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        says(RED),
+        says(RED, BLUE, KITCHEN),
+        says(KITCHEN),
+        says(**NO_WAY),
+        says(question="Which two?"),
+        says(KITCHEN | {"place": "narnia"}),
+    ],
+)
+def test_a_plan_that_a_server_does_not_share_is_read_back(planner, loopback, ask, text) -> None:
+    loopback.then(loopback.says(text))
+    answer = planner().plan(ask(BOTH))
+    assert answer.read_back.startswith(DOUBT)
+    assert answer.proposal.back_end == "patterns"
+    assert [one.skill for one in answer.plan.actions].count("pick_up") == 2
+
+
+def test_a_plan_stands_where_no_server_can_check_it(planner, ask) -> None:
+    answer = planner("http://127.0.0.1:9").plan(ask(BOTH))
+    assert outcomes(answer) == [("patterns", "planned"), ("server bench", "declined")]
+    assert answer.read_back == ""
+
+
+def test_what_moves_nothing_is_not_checked(planner, loopback, ask) -> None:
+    asked = planner()
+    assert asked.plan(ask("don't touch the keys")).proposal.back_end == "patterns"
+    assert loopback.heard == []
+
+
+def test_a_check_is_made_outside_the_steps_and_a_stop_overtakes_it(
+    open_desk, later, back_end, propose
+) -> None:
+    model = back_end("model", propose(TO_HALL))
+    model.is_language_model = True
+    desk = open_desk(model, aside=later)
+    desk.sees("red cup_1", "blue cup_2")
+    desk.give(text=BOTH)
+    assert [one["event"] for one in desk.answers()] == ["planning"]
+    later.do_one()
+    (asked,) = desk.answers()
+    assert asked["question"].startswith(DOUBT)
+    assert desk.plans() == []
+    desk.give(command_id="c2", text="yes")
+    assert [one["event"] for one in desk.answers()] == ["answered", "accepted", "plan"]
+    desk.give(command_id="c3", text=BOTH)
+    desk.answers()
+    desk.give(command_id="c4", text="stop")
+    assert [one["command_id"] for one in desk.answers()] == ["c3"]
+    later.do_one()
+    assert desk.answers() == []
+    assert desk.plans()[1:] == [{"command_id": "c4", "cancel": True}]

@@ -1,0 +1,88 @@
+"""Compare what two plans move: which things, to where, and where the robot goes.
+
+Two back ends say the same in other steps: one looks for a thing that is in sight, the other drives
+to it. What leads up to taking and putting a thing is left out, and so is what moves nothing.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from vla_deploy.planning.catalogue import MOTIONLESS
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.plan import Action, Plan, execution_order
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.symbolic.simulation import end_state
+from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.world.thing import Rest
+
+_HANDLING: Final = frozenset({"pick_up", "place"})
+_LEADING_UP: Final = frozenset({"find_object", "navigate_to"})
+_NOT_COMPARED: Final = frozenset({*MOTIONLESS, "look_at"})
+# Digits of metres and radians that are compared.
+_DIGITS: Final = 1
+# How a way is driven; which hand gives shows in what the hands hold then.
+_HOW: Final = frozenset(
+    {("navigate_to", "yaw_rad"), ("navigate_to", "speed_m_s"), ("move", "speed_m_s"),
+     ("hand_over", "arm")}
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Effects:
+    """Hold what a plan moves.
+
+    `taken` are the things that a hand takes, `rests` what they are put on or in, `held` what the
+    hands hold in the end, `ways` everything else that the robot does, in its order.
+    """
+
+    taken: frozenset[str]
+    rests: Mapping[str, Rest]
+    held: frozenset[str]
+    ways: tuple[str, ...]
+
+
+def move_the_same(one: Plan, other: Plan, request: Request) -> bool:
+    """Return whether two plans move the same things to the same places, and the robot alike.
+
+    Both must have been grounded and checked in the world of the request.
+    """
+    return _effects(one, request) == _effects(other, request)
+
+
+def _effects(plan: Plan, request: Request) -> _Effects:
+    actions = execution_order(plan.actions)
+    state = end_state(actions, request.world, request.scene, request.here)
+    taken = (one.parameters["object"] for one in actions if one.skill == "pick_up")
+    return _Effects(
+        taken=frozenset(subject_of(str(name), request.scene).key for name in taken),
+        rests=dict(state.rests),
+        held=frozenset(held.key for held in state.held),
+        ways=tuple(_ways(actions, request)),
+    )
+
+
+def _ways(actions: list[Action], request: Request) -> Iterator[str]:
+    """Yield what is done besides handling things and what leads up to that."""
+    compared = [one for one in actions if one.skill not in _NOT_COMPARED]
+    for number, action in enumerate(compared):
+        if action.skill in _HANDLING:
+            continue
+        following = (one.skill for one in compared[number:] if one.skill not in _LEADING_UP)
+        if action.skill in _LEADING_UP and next(following, "") in _HANDLING:
+            continue
+        yield " ".join([action.skill, *_values(action, request)])
+
+
+def _values(action: Action, request: Request) -> Iterator[str]:
+    for name, value in sorted(action.parameters.items()):
+        if value is not None and (action.skill, name) not in _HOW:
+            yield f"{name}={_value(name, value, request)}"
+
+
+def _value(name: str, value: Any, request: Request) -> str:
+    if isinstance(value, int | float):
+        return f"{float(value):.{_DIGITS}f}"
+    if name == "object":
+        return subject_of(str(value), request.scene).key
+    return match_place(str(value), request.world.places) or str(value)
