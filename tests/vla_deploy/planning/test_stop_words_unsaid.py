@@ -16,7 +16,7 @@ from vla_deploy.planning.phrasing import first_part, spoken_refusal, steps_in_wo
 from vla_deploy.speech.words import STOPS
 
 PACKAGE: Final = Path(vla_deploy.__file__).parent
-SPEAKERS: Final = ("planning", "memory", "world", "speech/telling.py")
+SPEAKERS: Final = ("planning", "memory", "world", "speech/event_publisher.py")
 """Where sentences stand that are said aloud."""
 NOT_SAID: Final = frozenset(
     {
