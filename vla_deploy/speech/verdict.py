@@ -17,8 +17,8 @@ from vla_deploy.speech.words import STOPS, holds_stop, is_courtesy, is_stop, wor
 
 STOP_CONFIDENCE: Final = 0.25
 """A phrase of nothing but stop words stops the robot from here on, whatever any network says."""
-STOP_WITHIN_CONFIDENCE: Final = 0.6
-"""The same, of a stop word among others: more words are more easily misread as one."""
+STOP_WITHIN_CONFIDENCE: Final = 0.5
+"""The same, of a stop word among others: below that, other talk is often misread as one."""
 MOST_COMPRESSION: Final = 2.4
 NO_SPEECH: Final = 0.8
 CLIPPED_RATIO: Final = 0.01
