@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
+from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope
 from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
@@ -57,8 +58,9 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     if read.support:
         found = [one for one in found if _rests_on(one, read.support)]
     if read.is_other:
-        before = setting.latest_id(replace(query, is_named=query.kind != ANY_CLASS))
-        found = [one for one in found if before is None or not one.is_called(before)]
+        spoken = (one for one in setting.spoken_of() if query.kind in (ANY_CLASS, one.kind))
+        before = next((one.thing_id for one in spoken if one.thing_id), "")
+        found = [one for one in found if not before or not one.is_called(before)]
     for other in read.besides:
         meant = _described_by(other, found, setting)
         found = [one for one in found if one not in meant]
@@ -70,7 +72,8 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
     may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
     match use:
         case Use.ONTO:
-            return not thing.held_by and not setting.is_object_here(thing)
+            moved = [one.thing_id for one in setting.mentions if one.role is Role.OBJECT]
+            return not thing.held_by and thing.thing_id not in moved
         case Use.TAKE:
             return may_move and (not thing.held_by or bool(query.thing_id))
         case Use.PUT:

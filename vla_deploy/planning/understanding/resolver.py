@@ -252,15 +252,12 @@ class Resolver:
     ) -> Referent:
         """Log what an expression was taken for, and remember that it was mentioned."""
         self.note(read.said, chosen, why)
+        role = Role.DESTINATION if use is Use.ONTO else Role.OBJECT
+        thing, kind, colour = referent.thing, referent.kind, referent.colour
         self.setting.mentions.append(
-            Mention(
-                said=read.said,
-                means=referent.words,
-                role=Role.DESTINATION if use is Use.ONTO else Role.OBJECT,
-                thing_id="" if referent.thing is None else referent.thing.thing_id,
-                kind=referent.kind,
-                colour=referent.colour,
-            )
+            Mention(said=read.said, means=referent.words, role=role, kind=kind, colour=colour)
+            if thing is None
+            else Mention.of(thing, read.said, role)
         )
         return referent
 
