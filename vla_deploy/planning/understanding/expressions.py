@@ -127,7 +127,9 @@ _SAME: Final = tuple(
          r"\1"),
         (r"\b(?:from|off(?: of)?) (?!(?:the )?(?:left|right)\b)", "on "),
         (r"\bout of ", "in "),
-        *((rf"\b{spoken}\b", word) for spoken, word in phrases.COMPOUNDS.items()),
+        (r"\b(?:set|bunch) of (?=keys\b)", ""),
+        (r"\bremote control(?:ler)?\b", "remote"),
+        (r"\b(glass|cup|bottle|can) of (?:water|tea|coffee|coke)\b", r"\1"),
     )
 )  # fmt: skip
 _BY: Final = re.compile(r"(?P<own>.+?)(?: over| just| right)? by (?P<other>(?:the|my|your) .+)")

@@ -149,7 +149,8 @@ def test_what_is_only_like_a_known_word_is_a_doubt() -> None:
     "text",
     ["the dinosaur", "the moon", "", "the red blue cup", "the cat", "first the white bottle",
      "the bottle with the red lid", "the red one i mean the blue one", "the plastic one",
-     "the cup that my sister gave me", "everything else", "the can between the cup and the bowl"],
+     "the cup that my sister gave me", "everything else", "one of those",
+     "the can between the cup and the bowl"],
 )  # fmt: skip
 def test_what_is_like_nothing_known_is_refused(text: str) -> None:
     with pytest.raises(UnknownObject):
