@@ -89,7 +89,7 @@ def known_words() -> frozenset[str]:
 
 _TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
 _SHORTENED: Final = (
-    (re.compile(r"\b(is|are)n't\b"), r"\1 not"),
+    (re.compile(r"\b(is|are)n'?t\b"), r"\1 not"),
     (re.compile(r"\b(that|which|who|one|what|whatever)'s\b"), r"\1 is"),
     (re.compile(r"'s\b|-(?!colou?red)"), ""),
 )
