@@ -13,7 +13,7 @@ from training.planner.manners import CALLS, ENDINGS
 from training.planner.openings import OPENINGS, REASONS
 from training.planner.slips import CLAUSE_SLIPS, FILLERS, JOINTS
 from training.planner.telling import AFTER, BEFORE, load_remarks, load_told
-from vla_deploy.planning.command_parser.grammar import answer_text
+from training.planner.writing import answer_text
 from vla_deploy.planning.command_parser.wording import MOST_COMMAND_WORDS
 
 # How often each kind of step is drawn, of those that may stand among others.

@@ -16,10 +16,10 @@ from zlib import crc32
 from training.planner.clause import PHRASES, Clause, Said, filled
 from training.planner.grammar import PatternInvalid, Slot
 from training.planner.referring import SOURCES
+from training.planner.writing import answer_text
 from vla_deploy.planning.command_parser.grammar import (
     COPIED_FIELDS,
     STEPS,
-    answer_text,
     field_names,
 )
 from vla_deploy.planning.command_parser.wording import plain_words

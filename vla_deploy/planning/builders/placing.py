@@ -16,15 +16,14 @@ from vla_deploy.planning.builders.steps import (
     pick,
     split_put,
 )
-from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.planning.understanding.conversation import Mention
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
-from vla_deploy.planning.understanding.setting import Setting, mention_of
+from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.relations import NEXT_TO
 
 STORE: Final = "box"
@@ -49,27 +48,13 @@ def put(groups: Groups, request: Request) -> list[Step]:
     return _put_each(moved, **where)
 
 
-def put_there(groups: Groups, request: Request) -> list[Step]:
-    """Put each thing where was spoken of; what is there already is what shall be taken."""
-    if _is_there(groups["object"], request):
-        return pick(groups, request)
+def put_there(groups: Groups, _: Request) -> list[Step]:
+    """Put each thing where was spoken of."""
     return _put_each(groups["object"], destination="there", **arm_in(groups))
 
 
 def _put_each(things: str, **where: Any) -> list[Step]:
     return [("place", {"object": part, **where}) for part in parts_of(things)]
-
-
-def _is_there(text: str, request: Request) -> bool:
-    """Tell whether a thing stands at the place that was spoken of last."""
-    setting = Setting(request)
-    place = next((one.means for one in setting.spoken_of() if one.role is Role.PLACE), "")
-    try:
-        found = fitting(read_expression(text, setting.furniture), Use.TAKE, setting)
-    except UnknownObject:
-        return False
-    table = surface_of(place, request.world)
-    return bool(found) and all(one.rests is not None and one.rests.of == table for one in found)
 
 
 def put_down(groups: Groups, request: Request) -> list[Step]:
@@ -144,7 +129,7 @@ def _meant(said: str, request: Request) -> Mention | None:
         return setting.held() or next(spoken, None)
     found = fitting(read, Use.PUT, setting)
     held = [one for one in found if one.held_by] or found
-    return mention_of(held[0]) if len(held) == 1 else None
+    return Mention.of(held[0]) if len(held) == 1 else None
 
 
 def _places(meant: Mention, request: Request) -> Iterator[str]:

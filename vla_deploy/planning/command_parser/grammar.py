@@ -93,27 +93,9 @@ def _copied(words: Sequence[str]) -> str:
     return "|".join((in_order, *(f" {one}" for one in IMPLIED)))
 
 
-def answer_text(steps: Sequence[Step]) -> str:
-    """Return steps as the model writes them: fields in their order, no spaces between.
-
-    Raises:
-        KeyError: a step lacks a field that it must have, or is none.
-    """
-    return '{"steps":[' + ",".join(map(_step_text, steps)) + "]}"
-
-
 def field_names(do: str) -> tuple[tuple[str, bool], ...]:
     """Return each field of a step in its order, and whether the step must have it."""
     return tuple((name.strip("[]"), not name.startswith("[")) for name in STEPS[do])
-
-
-def _step_text(step: Step) -> str:
-    fields = [f'"do":"{step["do"]}"']
-    for name, is_needed in field_names(step["do"]):
-        if is_needed or name in step:
-            space = " " if name in COPIED_FIELDS else ""
-            fields.append(f'"{name}":"{space}{step[name]}"')
-    return "{" + ",".join(fields) + "}"
 
 
 def _step_schema(do: str) -> JsonSchema:

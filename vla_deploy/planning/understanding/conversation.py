@@ -11,6 +11,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.plan import Plan
+from vla_deploy.world import Thing
 
 MOST_TURNS: Final = 5
 # Whoever has not answered by then has gone on to something else.
@@ -54,6 +55,19 @@ class Mention:
     kind: str = ""
     colour: str = ""
     rested: str = ""
+
+    @classmethod
+    def of(cls, thing: Thing, said: str = "", role: Role = Role.OBJECT) -> "Mention":
+        """Return the mention of a thing of the scene, by its own words if it was not called."""
+        return cls(
+            said=said or str(thing),
+            means=str(thing),
+            role=role,
+            thing_id=thing.thing_id,
+            kind=thing.kind,
+            colour=thing.colour,
+            rested="" if thing.rests is None else thing.rests.of,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

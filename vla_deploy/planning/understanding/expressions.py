@@ -35,21 +35,14 @@ class Scope(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Hold a place in a row, from 1, -1 for its end; `side` is where one begins to count."""
-
-    number: int
-    side: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Expression:
     """Hold what an expression says; `said` is its words, in lower case and without articles.
 
     `side` is left, right or middle, as the robot looks. `support` names the furniture that a
-    generic word such as "table" stands for. `place` is where in a row it is, `besides` what it is
-    not, `near` what it is the nearest to, or the farthest from, as `order` says. `among` is of how
-    many things it is one. `doubts` are words that are only like a known one.
+    generic word such as "table" stands for. `nth` is its place in a row, from 1, -1 for the end, 0
+    for none; one begins to count at the `side`. `besides` is what it is not, `near` what it is the
+    nearest to, or the farthest from, as `order` says. `among` is of how many things it is one.
+    `doubts` are words that are only like a known one.
     """
 
     said: str
@@ -62,7 +55,7 @@ class Expression:
     extreme: str = ""
     is_other: bool = False
     support: frozenset[str] = frozenset()
-    place: Place | None = None
+    nth: int = 0
     besides: "tuple[Expression, ...]" = ()
     near: "Expression | None" = None
     order: str = ""
@@ -72,7 +65,7 @@ class Expression:
     @property
     def is_relative(self) -> bool:
         """Tell whether only the things around tell which one it is: a row, or what it is not."""
-        return bool(self.place or self.besides or self.near)
+        return bool(self.nth or self.besides or self.near)
 
 
 def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Expression:
@@ -98,7 +91,7 @@ def known_words() -> frozenset[str]:
 _OF_THEIR_OWN: Final = frozenset({"glasses"})
 _TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
 _SHORTENED: Final = (
-    (re.compile(r"\b(is|are)n't\b"), r"\1 not"),
+    (re.compile(r"\b(is|are)n'?t\b"), r"\1 not"),
     (re.compile(r"\b(that|which|who|one|what|whatever)'s\b"), r"\1 is"),
     (re.compile(r"'s\b|-(?!colou?red)"), ""),
 )
@@ -136,7 +129,9 @@ _SAME: Final = tuple(
          r"\1"),
         (r"\b(?:from|off(?: of)?) (?!(?:the )?(?:left|right)\b)", "on "),
         (r"\bout of ", "in "),
-        *((rf"\b{spoken}\b", word) for spoken, word in phrases.COMPOUNDS.items()),
+        (r"\b(?:set|bunch) of (?=keys\b)", ""),
+        (r"\bremote control(?:ler)?\b", "remote"),
+        (r"\b(glass|cup|bottle|can) of (?:water|tea|coffee|coke)\b", r"\1"),
     )
 )  # fmt: skip
 _BY: Final = re.compile(r"(?P<own>.+?)(?: over| just| right)? by (?P<other>(?:the|my|your) .+)")
@@ -225,8 +220,8 @@ def _compared(own: str, key: str, named: tuple[tuple[str, str], ...], is_part: b
     near = _NEAR.fullmatch(own)
     if near:
         own = "the one" if near["own"] in ARTICLES else near["own"]
-    own, place = _place(own)
-    read = _description(own, Expression(said=key, place=place), dict(named), is_part)
+    own, nth, side = _in_row(own)
+    read = _description(own, Expression(said=key, nth=nth, side=side), dict(named), is_part)
     others = [_part(one, named) for one in besides]
     anchor = _part(near["near"], named) if near else None
     doubts = (one.doubts for one in (read, *others, *(() if anchor is None else (anchor,))))
@@ -251,20 +246,23 @@ def _part(text: str, named: tuple[tuple[str, str], ...]) -> Expression:
     return read
 
 
-def _place(own: str) -> tuple[str, Place | None]:
-    """Return a description without its place in a row; "first" before an article is no such."""
+def _in_row(own: str) -> tuple[str, int, str]:
+    """Return a description without its place in a row, that, and from where one counts.
+
+    "First" before an article is no such.
+    """
     spaced = f" {own}"
     counting = _COUNTING.search(spaced)
     if counting:
         spaced = spaced[: counting.start()] + spaced[counting.end() :]
     found = _NTH.fullmatch(spaced.strip())
     if found is None or (found["own"] or "one").split()[0] in ARTICLES:
-        return own, None
+        return own, 0, ""
     number = {**phrases.ORDINALS, **phrases.NUMBERS}[found["nth"] or found["nth2"]]
     if number < 0 and counting and counting["how"] != "from":
         number = 1  # "The last one on the right" is where the right ends.
     side = counting["side"] if counting else ""
-    return found["own"] or found["own2"] or "one", Place(number=number, side=side)
+    return found["own"] or found["own2"] or "one", number, side
 
 
 def _description(

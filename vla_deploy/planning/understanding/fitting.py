@@ -7,13 +7,13 @@ from enum import StrEnum
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
+from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope
 from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
-from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
 
@@ -48,18 +48,19 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
         raise DependsOnView(read.said, OBJECT_CLASSES)
     found = find(replace(query, order=""), setting.scene, view)
-    found = found or _beside_at_a_distance(query, setting) or _in_room(query, setting)
+    found = found or _in_room(query, setting)
     if read.is_other and use is Use.PUT and not read.query.is_named:
         found = [one for one in setting.scene.things if one.held_by] or found
-    if read.place is None:
+    if not read.nth:
         found = [one for one in found if suits(one, use, query, setting)]
     else:  # what cannot be taken is counted all the same
         found = [one for one in found if not one.held_by]
     if read.support:
         found = [one for one in found if _rests_on(one, read.support)]
     if read.is_other:
-        before = setting.latest_id(replace(query, is_named=query.kind != ANY_CLASS))
-        found = [one for one in found if before is None or not one.is_called(before)]
+        spoken = (one for one in setting.spoken_of() if query.kind in (ANY_CLASS, one.kind))
+        before = next((one.thing_id for one in spoken if one.thing_id), "")
+        found = [one for one in found if not before or not one.is_called(before)]
     for other in read.besides:
         meant = _described_by(other, found, setting)
         found = [one for one in found if one not in meant]
@@ -71,7 +72,8 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
     may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
     match use:
         case Use.ONTO:
-            return not thing.held_by and not setting.is_object_here(thing)
+            moved = [one.thing_id for one in setting.mentions if one.role is Role.OBJECT]
+            return not thing.held_by and thing.thing_id not in moved
         case Use.TAKE:
             return may_move and (not thing.held_by or bool(query.thing_id))
         case Use.PUT:
@@ -82,7 +84,7 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
 
 def _query(read: Expression, use: Use, setting: Setting) -> Query:
     query = read.query
-    is_first_of_what = read.place is not None and not read.place.side
+    is_first_of_what = bool(read.nth) and not read.side
     if query.is_named or query.thing_id or is_first_of_what:
         return query
     return replace(query, kind=_kind_spoken_of(query, use, setting))
@@ -96,17 +98,6 @@ def _kind_spoken_of(query: Query, use: Use, setting: Setting) -> str:
         if find(replace(query, kind=one.kind), setting.scene, setting.view):
             return one.kind
     return ANY_CLASS
-
-
-def _beside_at_a_distance(query: Query, setting: Setting) -> list[Thing]:
-    """Return the nearest on the same furniture where nothing stands right next to a thing."""
-    anchors = (
-        find(query.anchor, setting.scene) if query.anchor and query.relation == NEXT_TO else []
-    )
-    if len(anchors) != 1 or anchors[0].rests is None:
-        return []
-    on_it = _standing_on({anchors[0].rests.of}, query, setting)
-    return by_distance([one for one in on_it if one is not anchors[0]], anchors[0].xy_m)[:1]
 
 
 def _in_room(query: Query, setting: Setting) -> list[Thing]:
@@ -140,8 +131,8 @@ def _told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[
         return found
     if read.near is not None:
         return _by_nearness(read, read.near, found, setting)
-    if read.place is not None:
-        return in_place(found, read.place.number, read.place.side, view)
+    if read.nth:
+        return in_place(found, read.nth, read.side, view)
     if read.side:
         found = on_side(found, read.side, view)
     if read.extreme:

@@ -11,7 +11,12 @@ def nearest_furniture(spot: Point | None, world: World) -> str | None:
     names = [name for name in world.sites if is_surface(name, world)]
     if spot is None:
         return names[0] if names else None
-    return min(names, key=lambda name: math.dist(spot, _site(name, world)), default=None)
+    poses = {name: world.sites[name].pose for name in names}
+    return min(
+        names,
+        key=lambda name: math.dist(spot, (poses[name].x_m, poses[name].y_m)),
+        default=None,
+    )
 
 
 def is_surface(name: str, world: World) -> bool:
@@ -28,8 +33,3 @@ def surface_of(name: str, world: World) -> str:
     return next(
         (one for one, other in world.sites.items() if other.pose == site.viewpoints[0]), name
     )
-
-
-def _site(name: str, world: World) -> Point:
-    pose = world.sites[name].pose
-    return pose.x_m, pose.y_m

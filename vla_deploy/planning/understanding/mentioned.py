@@ -70,20 +70,13 @@ def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterat
     taken = any(one.skill == "pick_up" for one in plan.actions[: plan.actions.index(action)])
     held = [one for one in scene.things if one.held_by and arm in (None, one.held_by)]
     if len(held) == 1 and not taken:
-        yield _mention(held[0].thing_id, subject_of(held[0].thing_id, scene), Role.OBJECT)
+        yield Mention.of(held[0], held[0].thing_id)
 
 
 def _mention(said: str, subject: Subject, role: Role) -> Mention:
-    thing = subject.thing
-    return Mention(
-        said=said,
-        means=subject.words if thing is None else str(thing),
-        role=role,
-        thing_id="" if thing is None else thing.thing_id,
-        kind=subject.kind,
-        colour="" if thing is None else thing.colour,
-        rested="" if thing is None or thing.rests is None else thing.rests.of,
-    )
+    if subject.thing is not None:
+        return Mention.of(subject.thing, said, role)
+    return Mention(said=said, means=subject.words, role=role, kind=subject.kind)
 
 
 def _role(value: str, role: Role, plan: Plan) -> Role:

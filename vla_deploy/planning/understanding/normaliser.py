@@ -4,7 +4,7 @@ Only what has one meaning is changed. What has none stays as it is, and the vali
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import ARMS, SKILLS, Type
@@ -37,8 +37,8 @@ def normalised(action: Action, poses: frozenset[str] = frozenset()) -> Action:
         parameter = spec.parameters.get(name)
         if parameter is not None and parameter.type is Type.NUMBER:
             value = _number(name, value)
-        elif name in _TEXTS and isinstance(value, str):
-            value = _TEXTS[name](value, poses)
+        elif isinstance(value, str):
+            value = _text(name, value, poses)
         parameters[name] = value
     return action.model_copy(update={"parameters": parameters})
 
@@ -52,23 +52,19 @@ def _number(name: str, value: Any) -> Any:
     return value if quantity is None else quantity
 
 
-def _arm(value: str, _: frozenset[str]) -> str:
-    side = re.sub(r"[ _-]?(?:hand|arm|gripper)$", "", value.strip().lower())
-    return side if side in ARMS else value
-
-
-def _pose(value: str, poses: frozenset[str]) -> str:
-    spoken = re.sub(r"[ -]+", "_", value.strip().lower())
-    return spoken if spoken in poses else value
-
-
-def _named(table: Mapping[str, str]) -> Callable[[str, frozenset[str]], str]:
-    return lambda value, _: table.get(value.strip().lower(), value.strip().lower())
-
-
-_TEXTS: Final[Mapping[str, Callable[[str, frozenset[str]], str]]] = {
-    "arm": _arm,
-    "pose": _pose,
-    "direction": _named(DIRECTIONS),
-    "relation": _named(RELATIONS),
-}
+def _text(name: str, value: str, poses: frozenset[str]) -> str:
+    """Return the word of the catalogue for "left hand", "Look ahead", "forward", "into"."""
+    said = value.strip().lower()
+    match name:
+        case "arm":
+            side = re.sub(r"[ _-]?(?:hand|arm|gripper)$", "", said)
+            return side if side in ARMS else value
+        case "pose":
+            pose = re.sub(r"[ -]+", "_", said)
+            return pose if pose in poses else value
+        case "direction":
+            return DIRECTIONS.get(said, said)
+        case "relation":
+            return RELATIONS.get(said, said)
+        case _:
+            return value

@@ -66,25 +66,15 @@ NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
         "1": 1, "2": 2, "3": 3, "4": 4, "5": 5, "6": 6,
     }
 )  # fmt: skip
-# What a kind of thing is called by in two words or more.
-COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "set of keys": "keys", "bunch of keys": "keys", "remote control": "remote",
-        "remote controller": "remote", "cell phone": "phone", "mobile phone": "phone",
-        "smart phone": "phone", "glass of water": "glass", "cup of tea": "cup",
-        "cup of coffee": "cup", "bottle of water": "bottle", "can of coke": "can",
-        "key ring": "keys", "key chain": "keys",
-    }
-)  # fmt: skip
 # What a thing is for or made of, before its kind, tells no two of the known kinds apart.
 MODIFIERS: Final = frozenset(
     {
         "coffee", "tea", "water", "soda", "coke", "cola", "pop", "beer", "juice", "wine", "milk",
         "soup", "salad", "cereal", "breakfast", "fruit", "tennis", "bouncy", "toy", "car", "house",
-        "door", "office", "tv", "telly", "television", "cell", "mobile", "cook", "reading", "story",
-        "school", "library", "storage", "drinking", "rubber", "plastic", "cardboard", "paper",
-        "wooden", "metal", "ceramic", "glass", "favourite", "favorite", "nice", "lovely", "good",
-        "shiny", "same",
+        "door", "office", "tv", "telly", "television", "cell", "mobile", "smart", "cook", "reading",
+        "story", "school", "library", "storage", "drinking", "rubber", "plastic", "cardboard",
+        "paper", "wooden", "metal", "ceramic", "glass", "favourite", "favorite", "nice", "lovely",
+        "good", "shiny", "same",
     }
 )  # fmt: skip
 # Words between a thing and where it stands, which say nothing.

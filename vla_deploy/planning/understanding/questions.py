@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.understanding.conversation import Candidate
+from vla_deploy.planning.understanding.conversation import Candidate, Mention
 from vla_deploy.planning.understanding.names import Match
 from vla_deploy.planning.understanding.phrases import EXTREMES, ORDINALS
 from vla_deploy.planning.understanding.selection import MEASURES, by_distance, in_a_row, most
@@ -40,15 +40,15 @@ def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str
     return Ambiguous(f"Which {noun}, {either(words)}?", candidates, expression)
 
 
-def which_hand(held: Mapping[str, str], expression: str) -> Ambiguous:
+def which_hand(held: Mapping[str, Mention], expression: str) -> Ambiguous:
     """Return the question which of the things in the hands was meant; `held` names them by hand."""
     candidates = [
         Candidate(
             name=f"what is in your {hand} hand",
-            words=f"the {said} in my {hand} hand",
-            features=frozenset((hand, *said.split())),
+            words=f"the {one.said} in my {hand} hand",
+            features=frozenset((hand, *one.said.split())),
         )
-        for hand, said in held.items()
+        for hand, one in held.items()
     ]
     return _which_one(candidates, expression)
 

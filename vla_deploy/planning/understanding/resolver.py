@@ -133,7 +133,7 @@ class Resolver:
         self, read: Expression, found: Sequence[Thing], use: Use
     ) -> tuple[Thing | None, str]:
         """Return which of several is meant, and why; None where only the speaker knows."""
-        if read.place is not None:
+        if read.nth:
             return None, ""
         if read.scope is Scope.ANY:
             return found[0], "any will do, this is the nearest"
@@ -149,7 +149,8 @@ class Resolver:
     def _unseen(self, read: Expression, among: Sequence[Thing], use: Use) -> Referent:
         """Go by words for what is not in the scene; what only points at things needs it there."""
         query = read.query
-        if read.is_relative:
+        is_compared = use is not Use.SEE and bool(read.side or read.extreme)
+        if read.is_relative or is_compared:
             raise _not_there(read, among)
         if not query.is_named and not query.colour and query.anchor is None:
             raise UnknownObject(read.said, OBJECT_CLASSES)
@@ -200,7 +201,7 @@ class Resolver:
         if held is not None and use is not Use.ONTO:
             return (self._again(read, held, use, "it is in my hand"),)
         if use is Use.PUT and holding:
-            raise _which_hand(holding, read)
+            raise which_hand(holding, read.said)
         return (self._only_thing(read, use),)
 
     def _in_hand(self, read: Expression, use: Use) -> tuple[Referent, ...]:
@@ -211,7 +212,7 @@ class Resolver:
         """
         holding = {hand: one for hand, one in self.setting.holding() if read.hand in ("", hand)}
         if len(holding) > 1 and not _ONE_THING.isdisjoint(words_of(read.said)):
-            raise _which_hand(holding, read)
+            raise which_hand(holding, read.said)
         if not holding:
             others = [f"the {hand} one holds the {it.said}" for hand, it in self.setting.holding()]
             nothing = f"my {read.hand} hand holds nothing" if read.hand else "I hold nothing"
@@ -251,25 +252,18 @@ class Resolver:
     ) -> Referent:
         """Log what an expression was taken for, and remember that it was mentioned."""
         self.note(read.said, chosen, why)
+        role = Role.DESTINATION if use is Use.ONTO else Role.OBJECT
+        thing, kind, colour = referent.thing, referent.kind, referent.colour
         self.setting.mentions.append(
-            Mention(
-                said=read.said,
-                means=referent.words,
-                role=Role.DESTINATION if use is Use.ONTO else Role.OBJECT,
-                thing_id="" if referent.thing is None else referent.thing.thing_id,
-                kind=referent.kind,
-                colour=referent.colour,
-            )
+            Mention(said=read.said, means=referent.words, role=role, kind=kind, colour=colour)
+            if thing is None
+            else Mention.of(thing, read.said, role)
         )
         return referent
 
 
 def _can_move(one: Mention, use: Use) -> bool:
     return use in (Use.SEE, Use.REACH) or one.kind in GRASPABLE_CLASSES
-
-
-def _which_hand(holding: dict[str, Mention], read: Expression) -> Exception:
-    return which_hand({hand: one.said for hand, one in holding.items()}, read.said)
 
 
 def _needs_id(read: Expression) -> bool:
@@ -287,32 +281,20 @@ def _are_together(things: Sequence[Thing]) -> bool:
     return all(math.dist(first, one.xy_m) <= TOGETHER_M for one in things)
 
 
-# --- what is not there --------------------------------------------------------------------------
-
-_COUNTED: Final = ("no", "one", "two", "three", "four", "five")
-
-
 def _not_there(read: Expression, things: Sequence[Thing]) -> NotThere:
     """Return why nothing fits; `things` are those that would, if they were not compared."""
     if not things:
         return NotThere(f'I see no {_noun(read, 0)}, so I cannot tell which is "{read.said}"')
-    if read.place is not None and len(things) < read.place.number:
-        are = "is" if len(things) == 1 else "are"
-        return NotThere(f"there {are} only {_number(things)} {_noun(read, len(things))}")
-    if read.besides:
-        known = " and ".join(dict.fromkeys(f"the {one}" for one in things))
-        return NotThere(f"I see no {_noun(read, 1)} but {known}")
-    if read.near is not None:
-        return NotThere(f'I do not see "{read.near.said}", so I cannot tell what is near it')
-    return NotThere(f'I see nothing that is "{read.said}"')
+    known = " and ".join(dict.fromkeys(f"the {one}" for one in things))
+    return NotThere(f'I see nothing that is "{read.said}", only {known}')
 
 
 def _not_as_many(read: Expression, things: Sequence[Thing]) -> NotThere:
     """Return why other things are there than were counted."""
-    there = f"{_number(things)} {_noun(read, len(things))}"
+    there = f"{len(things)} {_noun(read, len(things))}"
     if len(things) < read.count:
         return NotThere(f"I see only {there}")
-    return NotThere(f"I see {there}, and cannot tell which {_COUNTED[read.count]} you mean")
+    return NotThere(f"I see {there}, and cannot tell which {read.count} you mean")
 
 
 def _noun(read: Expression, count: int) -> str:
@@ -320,7 +302,3 @@ def _noun(read: Expression, count: int) -> str:
     kind = "thing" if read.query.kind == ANY_CLASS else read.query.kind
     plural = {"box": "boxes", "keys": "keys"}.get(kind, f"{kind}s")
     return " ".join(word for word in (read.query.colour, kind if count < 2 else plural) if word)
-
-
-def _number(things: Sequence[Thing]) -> str:
-    return _COUNTED[len(things)] if len(things) < len(_COUNTED) else str(len(things))

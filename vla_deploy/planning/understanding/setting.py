@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.world import Query, Snapshot, Thing, Viewpoint
+from vla_deploy.world import Snapshot, Viewpoint
 
 
 @dataclass(slots=True)
@@ -39,19 +39,6 @@ class Setting:
         """Return what was mentioned, in this command first, the newest first."""
         return (*reversed(self.mentions), *self.request.conversation.mentions())
 
-    def is_object_here(self, thing: Thing) -> bool:
-        """Tell whether this command has named a thing as what is moved."""
-        return any(
-            one.thing_id == thing.thing_id for one in self.mentions if one.role is Role.OBJECT
-        )
-
-    def latest_id(self, query: Query) -> str | None:
-        """Return the id of the thing mentioned last that a query may mean, or None."""
-        for one in self.spoken_of():
-            if one.thing_id and (not query.is_named or one.kind == query.kind):
-                return one.thing_id
-        return None
-
     def latest_group(self) -> tuple[Mention, ...]:
         """Return the objects of the newest turn that mentioned any."""
         turns = reversed(self.request.conversation.turns)
@@ -70,18 +57,7 @@ class Setting:
         """Yield each hand that holds something, with what it holds."""
         seen = [one for one in self.scene.things if one.held_by]
         for thing in seen:
-            yield thing.held_by, mention_of(thing)
+            yield thing.held_by, Mention.of(thing)
         for hand, kind in self.request.world.holding.items():
             if kind and not any(one.held_by == hand for one in seen):
                 yield hand, Mention(said=kind, means=kind, kind=kind)
-
-
-def mention_of(thing: Thing) -> Mention:
-    """Return a thing as it would have been mentioned."""
-    return Mention(
-        said=str(thing),
-        means=str(thing),
-        thing_id=thing.thing_id,
-        kind=thing.kind,
-        colour=thing.colour,
-    )

@@ -105,11 +105,11 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("the fifth bottle from the left", "there are only four bottles"),
-        ("the can that isn't pink", "I see no can but the pink can"),
+        ("the fifth bottle from the left", 'nothing that is "fifth bottle from left"'),
+        ("the can that isn't pink", 'nothing that is "can is not pink", only the pink can'),
         ("the first book from the left", "I see no book"),
         ("any cup but the blue one", "I see no cup"),
-        ("the bottle nearest to the bowl", "I do not see"),
+        ("the bottle nearest to the bowl", 'nothing that is "bottle nearest to bowl"'),
     ],
 )
 def test_what_is_not_there_is_said_to_be_not(scene: Request, text: str, says: str) -> None:

@@ -171,10 +171,10 @@ def test_so_many_as_are_counted_are_meant(home: "Home", text: str, meant: list[s
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("both cups", "I see three cups, and cannot tell which two you mean"),
-        ("the two cups", "I see three cups, and cannot tell which two you mean"),
-        ("four cups", "I see only three cups"),
-        ("two balls", "I see only one ball"),
+        ("both cups", "I see 3 cups, and cannot tell which 2 you mean"),
+        ("the two cups", "I see 3 cups, and cannot tell which 2 you mean"),
+        ("four cups", "I see only 3 cups"),
+        ("two balls", "I see only 1 ball"),
     ],
 )
 def test_what_is_counted_otherwise_is_told(home: "Home", text: str, reason: str) -> None:
