@@ -13,7 +13,7 @@ from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
-from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
+from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import question_about
@@ -26,6 +26,7 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.patterns.awaiting import is_word
 from vla_deploy.planning.patterns.follow_up import asked_for, last_done
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
@@ -81,6 +82,7 @@ class CommandManager:
 
     def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
+        command = self._doubted_yes(command)
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
             self._dispatcher.refuse(command, reason)
@@ -226,21 +228,50 @@ class CommandManager:
         request = self._situation.request(command, talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
 
+    def _doubted_yes(self, command: UserCommand) -> UserCommand:
+        """Return an answer as doubted if it agrees, and may have been a no: "go" sounds like it."""
+        waiting = self.dialogue.pending or self.dialogue.held
+        if waiting is None or judge_answer(waiting.question, command.text)[0] is not Verdict.YES:
+            return command
+        others = (text for text, odds in command.others if odds >= LEAST_INSTEAD)
+        verdicts = {judge_answer(waiting.question, text)[0] for text in others}
+        if Verdict.NO not in verdicts:
+            return command
+        return replace(command, is_doubted=True, may_ask_again=True)
+
     def _takes_as_word(self, command: UserCommand) -> bool:
         """Take an utterance as the word that begins the held plan, or drops it."""
         held = self.dialogue.held
-        if held is None or held.plan is None or command.is_doubted:
+        if held is None or held.plan is None:
             return False
+        if corrected := self._correction_of_held(held, command):
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
+            self._queue.appendleft(corrected)
+            return True
         verdict, _ = judge_answer(held.question, command.text)
-        if verdict not in (Verdict.YES, Verdict.NO):
-            return False
-        self.dialogue.take_held()
-        self._events.answered(command, held.command)
-        if verdict is Verdict.YES:
-            self._run_confirmed(held, held.plan)
-        else:
+        begins = is_word(command.text)
+        if verdict is Verdict.NO and not command.is_doubted:
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
             self._dispatcher.drop(held, Says.LEFT)
+        elif begins and not command.is_doubted and not command.awaits_word:
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
+            self._run_confirmed(held, held.plan)
+        elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
+            self._dispatcher.refuse(command, Says.STILL_HELD)
+        else:
+            return False
         return True
+
+    def _correction_of_held(
+        self, held: PendingQuestion, command: UserCommand
+    ) -> UserCommand | None:
+        """Return the held command as an utterance corrects it, if nothing was said since."""
+        turns = self.dialogue.conversation.turns
+        is_last = bool(turns) and turns[-1].command_id == held.command.command_id
+        return self._corrected(held, command.text) if is_last and not command.is_doubted else None
 
     # --- answers --------------------------------------------------------------------------------
 
@@ -249,6 +280,8 @@ class CommandManager:
         if command.has_unsure_number:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
             pending = replace(pending, command=doubted)
+        if command.awaits_word:  # "the red one, but only when I say so"
+            pending = replace(pending, command=replace(pending.command, awaits_word=True))
         go_on = self._continuation(command, pending)
         if go_on is not None:
             self._events.answered(command, pending.command)
@@ -301,6 +334,10 @@ class CommandManager:
             self.dialogue.settle(said)
             if pending.plan is None:
                 self._queue.appendleft(pending.command)
+            elif pending.command.awaits_word:
+                request = self._request(pending.command)
+                done = PlannedCommand(pending.command, request, pending.answer)
+                self._dispatcher.hold(done, pending.plan)
             else:
                 self._run_confirmed(pending, pending.plan)
 

@@ -56,7 +56,7 @@ class CommandDispatcher:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
             self._events.check_length(answer.plan)
             if command.awaits_word or (answer.proposal and answer.proposal.awaits_word):
-                self._hold(done, answer.plan)
+                self.hold(done, answer.plan)
                 return
             agreed = self._active.agreed(command)
             question = answer.read_back or confirmation_of(answer.plan, done.request, agreed)
@@ -74,14 +74,16 @@ class CommandDispatcher:
         except PlanningError as error:
             self.refuse(command, error, answer)
 
-    def _hold(self, done: PlannedCommand, plan: Plan) -> None:
+    def hold(self, done: PlannedCommand, plan: Plan) -> None:
         """Read a plan back, and hold it until the person says go; one that was held is dropped."""
         self.drop(self._dialogue.take_held(), Says.REPLACED)
         question = done.answer.read_back or confirmation_of(plan, done.request)
         asked = (question or question_about(plan, done.request), things_named(plan, done.request))
         held = self._dialogue.hold(done, Says.HELD.format(question=" ".join(filter(None, asked))))
         self.metrics.asked += 1
-        self._events.asked(done.command, held.question, plan)
+        self._events.asked(done.command, held.question, plan, choices=("go",))
+        # "No, the blue one" means this plan, not what was done before it.
+        self._remember(done, plan, Outcome.ASKED)
 
     def drop(self, pending: PendingQuestion | None, why: Says) -> None:
         """Say that what waits for an answer, if anything does, is left."""
@@ -98,6 +100,10 @@ class CommandDispatcher:
         self.metrics.planned += 1
         if not command.recovers:
             self._accepted(request, answer)
+        self._remember(done, plan, Outcome.UNDER_WAY)
+
+    def _remember(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
+        command, request = done.command, done.request
         self._dialogue.remember(
             Turn(
                 said=command.text,
@@ -106,6 +112,7 @@ class CommandDispatcher:
                 understood=plan.summary,
                 mentioned=mentions_of(plan, request.scene),
                 plan=plan,
+                outcome=outcome,
                 here=request.here,
             )
         )

@@ -194,6 +194,7 @@ class TestWaitingForAWord:
         (asked,) = desk.answers()
         assert asked["question"] == "Shall I pick up the red cup? I wait for you to say go."
         assert asked["plan"]["actions"][-1]["skill"] == "pick_up"
+        assert asked["choices"] == ["go"]
         assert desk.plans() == []
         desk.clock.pass_s(600.0)
         assert desk.answers() == []
@@ -204,8 +205,8 @@ class TestWaitingForAWord:
         ("word", "end"),
         [
             ("go", ("c1", "plan")),
+            ("Yes, go!", ("c1", "plan")),
             ("now, please", ("c1", "plan")),
-            ("yes", ("c1", "plan")),
             ("not now", ("c1", "rejected")),
             ("never mind", ("c1", "rejected")),
             ("look left", ("c2", "plan")),
@@ -217,6 +218,61 @@ class TestWaitingForAWord:
         assert events(desk.answers())[-1] == end
         is_held = desk.status()["question"] is not None
         assert is_held == (end[0] == "c2")
+
+    @pytest.mark.parametrize(
+        "said",
+        [
+            {"text": "yes"},
+            {"text": "okay"},
+            {"text": "That's right."},
+            {"text": "go, but only when I say so"},
+            {"text": "go", "heard": {"doubted": True, "ask_again": True}},
+            {"text": "go", "heard": {"confidence": 0.8, "others": [{"text": "no", "odds": 0.4}]}},
+        ],
+    )
+    def test_what_agrees_or_is_heard_badly_begins_nothing_and_drops_nothing(self, desk, said):
+        desk.answers()
+        desk.give(command_id="c2", **said)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["reason"]) == ("c2", Says.STILL_HELD)
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+
+    @pytest.mark.parametrize(
+        ("command", "answer"),
+        [
+            ({"text": "pick up the cup"}, "the red one, but only when I say so"),
+            (
+                {"text": "pick up the red cup", "heard": {"confidence": 0.4}},
+                "yes, not before I call",
+            ),
+        ],
+    )
+    def test_an_answer_may_say_that_it_waits(self, open_desk, command, answer):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(**command)
+        desk.answers()
+        desk.give(command_id="c2", text=answer)
+        answered, asked = desk.answers()
+        assert (answered["event"], asked["event"]) == ("answered", "asked")
+        assert asked["question"].endswith("I wait for you to say go.")
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+
+    def test_a_correction_changes_what_is_held_and_ends_nothing(self, desk):
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(command_id="c0", text="look left")
+        desk.give(command_id="c2", text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c3", text="no, the blue one")
+        told = desk.answers()
+        assert events(told) == [("c3", "answered"), ("c2", "asked")]
+        assert told[1]["question"] == "Shall I pick up the blue cup? I wait for you to say go."
+        assert desk.plans() == []
 
     def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
         desk.answers()

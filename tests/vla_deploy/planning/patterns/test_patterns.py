@@ -5,7 +5,7 @@ import pytest
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.patterns.awaiting import awaiting
+from vla_deploy.planning.patterns.awaiting import awaiting, is_word
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.understanding import Conversation, Turn
@@ -105,6 +105,7 @@ def test_again_does_what_was_done_last() -> None:
         ("when I tell you to, go to the kitchen", "go to the kitchen"),
         ("bring me the cup, but only when I say so", "bring me the cup"),
         ("wait until I give you the word and then go home", "go home"),
+        ("go home the moment I say so", "go home"),
         ("when I tell you to go to bed, turn left", None),
         ("when I come home, turn left", None),
         ("bring me the cup", None),
@@ -112,6 +113,19 @@ def test_again_does_what_was_done_last() -> None:
 )
 def test_a_command_that_waits_for_a_word_is_found(text: str, rest: str | None) -> None:
     assert awaiting(text) == rest
+
+
+@pytest.mark.parametrize(
+    ("text", "begins"),
+    [
+        ("Go!", True), ("okay robot, go ahead", True), ("right now, please", True),
+        ("do it now", True), ("now", True), ("yes", False), ("okay then", False),
+        ("go to the kitchen", False), ("no go", False), ("not now", False), ("don't go", False),
+        ("go on holiday", False), ("do it later", False), ("", False),
+    ],
+)  # fmt: skip
+def test_the_word_that_begins_is_no_mere_yes(text: str, begins: bool) -> None:
+    assert is_word(text) == begins
 
 
 @pytest.mark.parametrize(
