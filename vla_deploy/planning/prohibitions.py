@@ -147,6 +147,17 @@ def held_to(
     return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
 
 
+def is_broken(
+    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
+) -> bool:
+    """Tell whether a plan that may have begun before does what is forbidden, or looks there."""
+    try:
+        kept = held_to(standing, plan, world, scene)
+    except NotAble:
+        return True
+    return _searches(plan, scene) and not {*kept.keeps_out} <= {*plan.keeps_out}
+
+
 def _searches(plan: Plan, scene: Snapshot | None) -> bool:
     """Tell whether a plan looks for something that is not in the scene."""
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]

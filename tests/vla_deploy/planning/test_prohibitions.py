@@ -68,6 +68,25 @@ def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
         assert desk.say("bring me the keys")[1].outcome == "plan"
 
 
+@pytest.mark.parametrize(
+    ("command", "order", "ends"),
+    [
+        ("bring me the keys", "don't touch the keys", True),
+        ("go to the kitchen", "stay out of the kitchen", True),
+        ("find the remote", "stay out of the kitchen", True),
+        ("bring me the keys", "don't touch the red cup", False),
+        ("go to the bedroom", "stay out of the kitchen", False),
+    ],
+)
+def test_what_does_the_forbidden_ends_where_it_is_under_way(
+    command: str, order: str, ends: bool
+) -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        assert desk.say(command)[1].outcome == "plan"
+        assert desk.say(order)[1].outcome == ("stop" if ends else "plan")
+
+
 def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
     with fresh_desk() as desk:
         in_the_flat(desk)

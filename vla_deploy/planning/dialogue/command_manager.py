@@ -30,7 +30,7 @@ from vla_deploy.planning.patterns.awaiting import is_word
 from vla_deploy.planning.patterns.follow_up import asked_for, last_done
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.planning.prohibitions import Prohibitions, is_broken
 from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
 from vla_deploy.planning.understanding.answers import judge_answer
@@ -101,7 +101,7 @@ class CommandManager:
 
     def stop_all(self, command_id: str) -> None:
         """Drop every command, and let the executor end what it does."""
-        self._events.cancelled_all(command_id)
+        self._cancel_all(command_id)
         open_ones = (self.dialogue.settle(), self.dialogue.take_held())
         asked = [one.command for one in open_ones if one is not None]
         dropped = (*asked, self._async.call_off(), *self._queue)
@@ -217,10 +217,21 @@ class CommandManager:
             self.metrics.failed += 1
             self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
 
+    def _cancel_all(self, command_id: str) -> None:
+        """Let the executor end what it does; no setback that it tells of by then is mended."""
+        self._events.cancelled_all(command_id)
+        self._active.end_all()
+
     def _accept(self, request: Request, answer: PlanningResult) -> None:
-        """Obey an order from now on, whatever planner another profile brings."""
+        """Obey an order from now on, whatever planner another profile brings.
+
+        What is under way ends where it does what has just been forbidden.
+        """
         if answer.proposal is not None and answer.proposal.order is not None:
             self._prohibitions.apply(answer.proposal.order)
+            standing, known = self._prohibitions.items, (request.world, request.scene)
+            if any(is_broken(standing, plan, *known) for plan in self._active.plans()):
+                self._cancel_all(f"{request.command_id}-forbids")
         self.planner.accepted(request, answer)
 
     def _request(self, command: UserCommand) -> Request:
@@ -373,7 +384,7 @@ class CommandManager:
             return None
         plan = corrected_by(asked_for(last), command.text, request.world.places)
         if plan is not None and last.outcome is Outcome.UNDER_WAY:
-            self._events.cancelled_all(f"{command.command_id}-corrects")
+            self._cancel_all(f"{command.command_id}-corrects")
         return plan
 
     def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:

@@ -26,7 +26,7 @@ from vla_deploy.planning.understanding.mentioned import mentions_of
 class CommandDispatcher:
     """Conclude commands, publish it, and remember it for what is said next.
 
-    `accepted` is called for every plan that is dispatched for a command of its own.
+    `accepted` is called before a plan is dispatched for a command of its own.
     """
 
     def __init__(
@@ -95,11 +95,11 @@ class CommandDispatcher:
         command, request, answer = done.command, done.request, done.answer
         if command.recovers:
             plan = numbered(plan, len(request.failed))
+        if not command.recovers:
+            self._accepted(request, answer)
         self._events.dispatched(command, plan, answer)
         self._active.add(command, plan, answer, agreement_to(plan, request))
         self.metrics.planned += 1
-        if not command.recovers:
-            self._accepted(request, answer)
         self._remember(done, plan, Outcome.UNDER_WAY)
 
     def _remember(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
