@@ -16,7 +16,7 @@ from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.dialogue.confirmation import question_about
+from vla_deploy.planning.dialogue.confirmation import agreement_to, question_about
 from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
@@ -28,9 +28,10 @@ from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.patterns.awaiting import is_word
 from vla_deploy.planning.patterns.follow_up import asked_for, last_done
+from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.prohibitions import Prohibitions, is_broken
+from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
 from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
 from vla_deploy.planning.understanding.answers import judge_answer
@@ -92,12 +93,34 @@ class CommandManager:
             return
         elif command.is_answer:
             self._dispatcher.refuse(command, Says.NOTHING_ASKED)
+        elif self._objects(command) and only_objects(command.text):
+            self.stop_all(command.command_id)
+            self._events.say(command, Says.LEFT)
+        elif self._async.command is not None and self._forbids(command):
+            self._begin(command)  # it holds for what is being planned, too
         elif len(self._queue) >= MOST_WAITING:
             self._dispatcher.refuse(command, Says.MANY_WAIT)
         else:
+            if self._objects(command):  # "don't take that, take the blue one"
+                self.stop_all(f"{command.command_id}-objects")
             self._queue.append(command)
             if self._async.command is not None:
                 self._events.queued(command, len(self._queue))
+
+    def _objects(self, command: UserCommand) -> bool:
+        """Tell whether a command objects to what goes on; to forbid something is an order."""
+        goes_on = (self._active.plans(), self._async.command, self._queue)
+        is_held = self.dialogue.held is not None
+        if not ((any(goes_on) and objects(command.text)) or (is_held and denies(command.text))):
+            return False
+        return not self._forbids(command)
+
+    def _forbids(self, command: UserCommand) -> bool:
+        """Tell whether a command forbids something for good, which is safe at once."""
+        if command.awaits_word:
+            return False
+        order = read_order(command.text, self._request(command).world, ())
+        return order is not None and order.forbids
 
     def stop_all(self, command_id: str) -> None:
         """Drop every command, and let the executor end what it does."""
@@ -196,10 +219,22 @@ class CommandManager:
     def _look_after_job(self) -> None:
         job = self._async.take_done()
         if job is not None:
-            self._guarded(job.command, lambda: self._conclude(job.result()))
+            self._guarded(job.command, lambda: self._conclude(self._held_to_now(job.result())))
         tedious = self._async.take_tedious()
         if tedious is not None:
             self._events.say(tedious, Says.WORKING)
+
+    def _held_to_now(self, done: PlannedCommand) -> PlannedCommand:
+        """Return what came of a job, held to what was forbidden meanwhile."""
+        plan, standing = done.answer.plan, self._prohibitions.items
+        if plan is None or done.request.prohibitions == standing:
+            return done
+        request = replace(done.request, prohibitions=standing)
+        try:
+            answer = replace(done.answer, plan=self.planner.check(plan, request))
+        except PlanningError as error:
+            answer = replace(done.answer, plan=None, error=error)
+        return PlannedCommand(done.command, request, answer)
 
     def _conclude(self, done: PlannedCommand) -> None:
         """Conclude a command, or try it next in other words that may have been said."""
@@ -401,14 +436,24 @@ class CommandManager:
         self._dispatcher.conclude(PlannedCommand(corrected, request, answer))
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
-        """Check a plan once more: the world may have changed while the person thought."""
+        """Check a plan once more: the world may have changed while the person thought.
+
+        Where it has become a risk that was not agreed to, the person is asked again.
+        """
         request = self._request(pending.command)
         done = PlannedCommand(pending.command, request, pending.answer)
         try:
             self._situation.check_ready()
-            self._dispatcher.dispatch(done, self.planner.check(plan, request))
+            checked = self.planner.check(plan, request)
         except PlanningError as error:
             self._dispatcher.refuse(pending.command, error, pending.answer)
+            return
+        proposal = pending.answer.proposal
+        if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):
+            self._dispatcher.dispatch(done, checked)
+            return
+        asks = replace(pending.answer, plan=checked, proposal=replace(proposal, read_back=""))
+        self._dispatcher.conclude(PlannedCommand(pending.command, request, asks))
 
     def _leave(self, why: Says) -> None:
         self._dispatcher.drop(self.dialogue.settle(), why)

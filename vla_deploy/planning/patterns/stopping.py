@@ -1,10 +1,11 @@
-"""Recognise a command that only means: stop what you are doing."""
+"""Recognise words that only mean: stop what you are doing, and those that object to it."""
 
 import re
 from typing import Final
 
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.plan import MOST_CHARACTERS
+from vla_deploy.planning.scope import IDIOMS
 
 STOP_PHRASES: Final = frozenset(
     {
@@ -21,6 +22,16 @@ _STOP_DOING: Final = re.compile(
     r"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{2,}ing\b"
     r"(?!.* (?:and|then|but|instead)\b).*"
 )
+# "Don't worry" and "don't drop it" are idioms; "don't stop" is no objection.
+_DONT: Final = re.compile(
+    r"(?:i said )?(?:do not|don't|dont|you (?:must not|mustn't|should not|shouldn't|may not))\b"
+    r"(?! (?:stop|you)\b).*"
+)
+_OBJECTS: Final = re.compile(
+    rf"{_DONT.pattern}|no(?: no)*|nope|not (?:that|this|it|there|like that|now)(?: one)?|"
+    r"leave (?:it|that|them)(?: alone| be| there)?|"
+    r"wait|hold on|hang on|pause|(?:wait|hold on|hang on) a (?:second|moment|minute|bit)"
+)
 _SENTENCE: Final = re.compile(r"[.!?;,]+")
 _URGING: Final = frozenset(
     {"and", "but", "no", "oh", "hey", "please", "robot", "butler", "just", "now", "wait", "i",
@@ -34,6 +45,30 @@ def is_stop(text: str) -> bool:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]
     return any(bare) and all(map(_is_stop, filter(None, bare)))
+
+
+def objects(text: str) -> bool:
+    """Return whether words object to what the robot does: "no!", "wait", "don't pick it up"."""
+    return denies(text) or only_objects(text)
+
+
+def denies(text: str) -> bool:
+    """Return whether a command begins by what is not to be done."""
+    pieces = _objecting(text)
+    return bool(pieces) and _DONT.fullmatch(pieces[0]) is not None
+
+
+def only_objects(text: str) -> bool:
+    """Return whether there is nothing in such words besides that could be done."""
+    pieces = _objecting(text)
+    return bool(pieces) and all(map(_OBJECTS.fullmatch, pieces))
+
+
+def _objecting(text: str) -> list[str]:
+    said = IDIOMS.sub(" ", text.lower().replace("\u2019", "'"))
+    bare = (courtesy_off(part) for part in _SENTENCE.split(said[:MOST_CHARACTERS]))
+    without = (re.sub(r"^(?:(?:no|oh|and|but|hey) )+(?=\w)", "", part) for part in bare)
+    return [part for part in without if part]
 
 
 def _is_stop(said: str) -> bool:

@@ -57,6 +57,20 @@ def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_e
     assert model.asked == [], "its deadline was called in"
 
 
+def test_what_is_forbidden_while_a_plan_is_made_holds_for_that_plan(
+    open_desk, later, back_end, propose
+):
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk.give(text="sing one")
+    desk.answers()
+    desk.give(command_id="c2", text="stay out of the kitchen")
+    assert events(desk.answers()) == [("c2", "accepted"), ("c2", "plan")]
+    later.do_one()
+    (refused,) = desk.answers()
+    assert (refused["command_id"], refused["event"]) == ("c1", "rejected")
+    assert "you told me not to go into the kitchen" in refused["reason"]
+
+
 def test_too_many_commands_are_refused_at_once(open_desk, later, back_end, propose):
     desk = open_desk(back_end("model", propose(GO)), aside=later)
     for number in range(10):
@@ -87,6 +101,65 @@ def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open
     told = desk.answers()
     assert events(told) == [("c1", "rejected"), ("c2", "rejected")]
     assert told[0]["reason"] == "the planner failed: ZeroDivisionError"
+
+
+class TestObjecting:
+    @pytest.mark.parametrize(
+        "said", ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "wait"]
+    )
+    def test_what_objects_to_what_is_under_way_ends_it(self, open_desk, said):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="pick up the red cup", source="voice")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said, source="voice")
+        desk.answers()
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+        assert desk.said_aloud() == [Says.LEFT]
+
+    @pytest.mark.parametrize("said", ["don't worry", "don't stop", "don't drop it"])
+    def test_an_idiom_ends_nothing(self, open_desk, said):
+        desk = open_desk()
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert desk.plans() == []
+
+    def test_what_is_to_be_done_instead_is_planned(self, open_desk):
+        desk = open_desk()
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text="don't go there, look left")
+        assert events(desk.answers())[-1][0] == "c2"
+        assert desk.plans()[0] == {"command_id": "c2-objects", "cancel": True}
+
+    def test_it_overtakes_what_is_planned(self, open_desk, later, back_end, propose):
+        desk = open_desk(back_end("model", propose(GO)), aside=later)
+        desk.give(text="sing one")
+        desk.answers()
+        desk.give(command_id="c2", text="don't do that")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        later.do_one()
+        desk.answers()
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+
+    def test_it_drops_what_is_held_but_a_wait_does_not(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.give(command_id="c2", text="wait")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        desk.executor_tells(command_id="c2", event="finished", success=True, error=None)
+        desk.answers()
+        assert desk.status()["question"] is not None
+        desk.give(command_id="c3", text="don't pick it up")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.status()["question"] is None
 
 
 class TestQuestions:
@@ -273,6 +346,17 @@ class TestWaitingForAWord:
         assert events(told) == [("c3", "answered"), ("c2", "asked")]
         assert told[1]["question"] == "Shall I pick up the blue cup? I wait for you to say go."
         assert desk.plans() == []
+
+    def test_what_is_put_down_first_since_hands_are_full_meanwhile_is_asked(self, desk):
+        desk.answers()
+        desk.holds(left="ball", right="book")
+        desk.give(command_id="c2", text="go")
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "asked")]
+        assert "My hands are full" in told[-1]["question"]
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
 
     def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
         desk.answers()
