@@ -241,8 +241,11 @@ class CommandManager:
         found = self._retry.next(done)
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
-        else:
-            self._dispatcher.conclude(found)
+            return
+        if _stands_still(found) and self._active.plans():
+            # A plan is turned away while another runs, and nobody needs to be asked about a halt.
+            self._cancel_all(f"{found.command.command_id}-stops")
+        self._dispatcher.conclude(found)
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -457,3 +460,10 @@ class CommandManager:
 
     def _leave(self, why: Says) -> None:
         self._dispatcher.drop(self.dialogue.settle(), why)
+
+
+def _stands_still(done: PlannedCommand) -> bool:
+    """Tell whether what was planned begins with standing still, now."""
+    plan, proposal = done.answer.plan, done.answer.proposal
+    is_held = done.command.awaits_word or (proposal is not None and proposal.awaits_word)
+    return plan is not None and plan.actions[0].skill == "stop" and not is_held

@@ -24,11 +24,12 @@ _STOP_DOING: Final = re.compile(
 )
 # "Don't worry" and "don't drop it" are idioms; "don't stop" is no objection.
 _DONT: Final = re.compile(
-    r"(?:i said )?(?:do not|don't|dont|you (?:must not|mustn't|should not|shouldn't|may not))\b"
-    r"(?! (?:stop|you)\b).*"
+    r"(?:i said )?(?:(?:do not|don't|dont|you (?:must not|mustn't|should not|shouldn't|may not))\b"
+    r"(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b).*"
 )
+_MORE: Final = r"(?!.* (?:and|then|but|instead)\b)"
 _OBJECTS: Final = re.compile(
-    rf"{_DONT.pattern}|no(?: no)*|nope|not (?:that|this|it|there|like that|now)(?: one)?|"
+    rf"{_MORE}{_DONT.pattern}|no(?: no)*|nope|not (?:that|this|it|there|like that|now)(?: one)?|"
     r"leave (?:it|that|them)(?: alone| be| there)?|"
     r"wait|hold on|hang on|pause|(?:wait|hold on|hang on) a (?:second|moment|minute|bit)"
 )
@@ -53,7 +54,7 @@ def objects(text: str) -> bool:
 
 
 def denies(text: str) -> bool:
-    """Return whether a command begins by what is not to be done."""
+    """Return whether a command begins by what is not to be done: "stop this", "don't do that"."""
     pieces = _objecting(text)
     return bool(pieces) and _DONT.fullmatch(pieces[0]) is not None
 

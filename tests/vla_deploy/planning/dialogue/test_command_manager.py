@@ -105,7 +105,8 @@ def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open
 
 class TestObjecting:
     @pytest.mark.parametrize(
-        "said", ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "wait"]
+        "said",
+        ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "wait", "stop this"],
     )
     def test_what_objects_to_what_is_under_way_ends_it(self, open_desk, said):
         desk = open_desk()
@@ -136,6 +137,18 @@ class TestObjecting:
         desk.give(command_id="c2", text="don't go there, look left")
         assert events(desk.answers())[-1][0] == "c2"
         assert desk.plans()[0] == {"command_id": "c2-objects", "cancel": True}
+
+    def test_a_plan_that_begins_with_standing_still_ends_what_is_under_way(
+        self, open_desk, back_end, propose
+    ):
+        halt = propose(("stop", {}), read_back="Shall I stand still?")
+        desk = open_desk(back_end("model", halt))
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text="oh my word, make it halt somehow")
+        assert events(desk.answers())[-1] == ("c2", "asked")
+        assert desk.plans() == [{"command_id": "c2-stops", "cancel": True}]
 
     def test_it_overtakes_what_is_planned(self, open_desk, later, back_end, propose):
         desk = open_desk(back_end("model", propose(GO)), aside=later)
