@@ -17,7 +17,7 @@ from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRet
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to, question_about
-from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text
+from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
 from vla_deploy.planning.dialogue.event_publisher import EventPublisher
@@ -416,12 +416,14 @@ class CommandManager:
         return replace(command, corrected=plan)
 
     def _correction_of_last(self, command: UserCommand, request: Request) -> Plan | None:
-        """Return what a command makes of the one before it, which ends where it is under way."""
-        last = last_done(request)
-        if command.is_doubted or last is None:
-            return None
-        plan = corrected_by(asked_for(last), command.text, request.world.places)
-        if plan is not None and last.outcome is Outcome.UNDER_WAY:
+        """Return what a command makes of the one before it, which ends where it is under way.
+
+        What is under way ends by a no, too, of which nothing can be made: "no, the banana".
+        """
+        last, plan = last_done(request), None
+        if last is not None and not command.is_doubted:
+            plan = corrected_by(asked_for(last), command.text, request.world.places)
+        if (plan is not None or rejects(command.text)) and self._active.plans():
             self._cancel_all(f"{command.command_id}-corrects")
         return plan
 

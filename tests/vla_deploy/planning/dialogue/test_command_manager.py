@@ -440,6 +440,17 @@ class TestReadingBack:
         desk.give(command_id="c3", text="yes")
         assert events(desk.answers())[-1] == ("c2", "plan")
 
+    @pytest.mark.parametrize("said", ["no, the banana", "Wrong, somewhere", "no! go home"])
+    def test_a_no_of_which_nothing_can_be_made_ends_what_has_begun(self, open_desk, said):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert desk.plans()[0] == {"command_id": "c2-corrects", "cancel": True}
+
     def test_a_correction_of_what_was_not_done_is_a_command_of_its_own(self, open_desk):
         desk = open_desk()
         desk.sees("red cup_1", "blue cup_2")
