@@ -55,7 +55,8 @@ class CommandDispatcher:
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
             self._events.check_length(answer.plan)
-            if command.awaits_word or (answer.proposal and answer.proposal.awaits_word):
+            is_held = command.awaits_word or (answer.proposal and answer.proposal.awaits_word)
+            if is_held and not command.recovers:  # the word has been said
                 self.hold(done, answer.plan)
                 return
             agreed = self._active.agreed(command)
