@@ -18,20 +18,22 @@ STOP_PHRASES: Final = frozenset(
     }
 )  # fmt: skip
 # "Stop driving to the kitchen", but not "stop looking and come here".
+_ALONE: Final = r"(?!.* (?:and|then|but|instead)\b)"
 _STOP_DOING: Final = re.compile(
-    r"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{2,}ing\b"
-    r"(?!.* (?:and|then|but|instead)\b).*"
+    rf"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{{2,}}ing\b{_ALONE}.*"
 )
-# "Don't worry" and "don't drop it" are idioms; "don't stop" is no objection.
-_DONT: Final = re.compile(
-    r"(?:i said )?(?:(?:do not|don't|dont|you (?:must not|mustn't|should not|shouldn't|may not))\b"
-    r"(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b).*"
+_DO_NOT: Final = (
+    "(?:do not|don't|dont|not the|you (?:must not|mustn't|should not|shouldn't|may not))"
 )
-_MORE: Final = r"(?!.* (?:and|then|but|instead)\b)"
+# "Don't stop" is no objection; "don't worry" and "don't drop it" are idioms.
+_DENIES: Final = re.compile(
+    rf"(?:i said )?(?:{_DO_NOT}\b(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b).*"
+)
 _OBJECTS: Final = re.compile(
-    rf"{_MORE}{_DONT.pattern}|no(?: no)*|nope|not (?:that|this|it|there|like that|now)(?: one)?|"
-    r"leave (?:it|that|them)(?: alone| be| there)?|"
-    r"wait|hold on|hang on|pause|(?:wait|hold on|hang on) a (?:second|moment|minute|bit)"
+    rf"{_ALONE}{_DENIES.pattern}|no(?: no)*|nope|"
+    r"not (?:that|this|it|there|like that|now)(?: one)?|leave (?:it|that|them)(?: alone| be)?|"
+    r"(?:that's |that is )?(?:the )?(?:wrong(?: one)?|not (?:it|right))|"
+    r"(?:wait|hold on|hang on|pause)(?: a (?:second|moment|minute|bit))?"
 )
 _SENTENCE: Final = re.compile(r"[.!?;,]+")
 _URGING: Final = frozenset(
@@ -56,7 +58,7 @@ def objects(text: str) -> bool:
 def denies(text: str) -> bool:
     """Return whether a command begins by what is not to be done: "stop this", "don't do that"."""
     pieces = _objecting(text)
-    return bool(pieces) and _DONT.fullmatch(pieces[0]) is not None
+    return bool(pieces) and _DENIES.fullmatch(pieces[0]) is not None
 
 
 def only_objects(text: str) -> bool:
