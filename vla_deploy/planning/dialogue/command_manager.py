@@ -326,7 +326,7 @@ class CommandManager:
 
     def _takes_as_answer(self, command: UserCommand, pending: PendingQuestion) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
-        if command.has_unsure_number:
+        if command.has_unsure_words:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
             pending = replace(pending, command=doubted)
         if command.awaits_word:  # "the red one, but only when I say so"

@@ -171,8 +171,8 @@ class Recall:
 
 
 def _heard_confidence(command: UserCommand) -> float | None:
-    """Return how sure the words are; with an unsure number so little that they are read back."""
+    """Return how sure the words are; with unsure words so little that they are read back."""
     sure = command.heard_confidence
-    if not command.has_unsure_number:
+    if not command.has_unsure_words:
         return sure
     return READ_BACK if sure is None else min(sure, READ_BACK)
