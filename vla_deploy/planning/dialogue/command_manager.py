@@ -109,11 +109,15 @@ class CommandManager:
 
     def _objects(self, command: UserCommand) -> bool:
         """Tell whether a command objects to what goes on; to forbid something is an order."""
-        goes_on = (self._active.plans(), self._async.command, self._queue)
         is_held = self.dialogue.held is not None
-        if not ((any(goes_on) and objects(command.text)) or (is_held and denies(command.text))):
+        if not ((self._goes_on and objects(command.text)) or (is_held and denies(command.text))):
             return False
         return not self._forbids(command)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Return whether anything is carried out, planned, or waits for its turn."""
+        return any((self._active.plans(), self._async.command, self._queue))
 
     def _forbids(self, command: UserCommand) -> bool:
         """Tell whether a command forbids something for good, which is safe at once."""
@@ -300,7 +304,7 @@ class CommandManager:
             return True
         verdict, _ = judge_answer(held.question, command.text)
         begins = is_word(command.text)
-        if verdict is Verdict.NO and not command.is_doubted:
+        if verdict is Verdict.NO and not command.is_doubted and not self._goes_on:
             self.dialogue.take_held()
             self._events.answered(command, held.command)
             self._dispatcher.drop(held, Says.LEFT)

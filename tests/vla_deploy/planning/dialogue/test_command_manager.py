@@ -160,6 +160,18 @@ class TestObjecting:
         desk.answers()
         assert desk.plans() == [{"command_id": "c2", "cancel": True}]
 
+    def test_a_no_is_for_what_moves_too_and_not_for_what_is_held_alone(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c3", text="no!")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.plans() == [{"command_id": "c3", "cancel": True}]
+
     def test_it_drops_what_is_held_but_a_wait_does_not(self, open_desk):
         desk = open_desk()
         desk.sees("red cup_1")
