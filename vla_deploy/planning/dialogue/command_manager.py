@@ -117,7 +117,12 @@ class CommandManager:
     @property
     def _goes_on(self) -> bool:
         """Return whether anything is carried out, planned, or waits for its turn."""
-        return any((self._active.plans(), self._async.command, self._queue))
+        return self._is_moving or any((self._async.command, self._queue))
+
+    @property
+    def _is_moving(self) -> bool:
+        """Return whether a plan is carried out, be it one of a planner that has ended since."""
+        return bool(self._active.plans()) or self._situation.is_executing
 
     def _forbids(self, command: UserCommand) -> bool:
         """Tell whether a command forbids something for good, which is safe at once."""
@@ -246,7 +251,7 @@ class CommandManager:
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
             return
-        if _stands_still(found) and self._active.plans():
+        if _stands_still(found) and self._is_moving:
             # A plan is turned away while another runs, and nobody needs to be asked about a halt.
             self._cancel_all(f"{found.command.command_id}-stops")
         self._dispatcher.conclude(found)
@@ -269,12 +274,19 @@ class CommandManager:
 
         What is under way ends where it does what has just been forbidden.
         """
-        if answer.proposal is not None and answer.proposal.order is not None:
-            self._prohibitions.apply(answer.proposal.order)
-            standing, known = self._prohibitions.items, (request.world, request.scene)
-            if any(is_broken(standing, plan, *known) for plan in self._active.plans()):
-                self._cancel_all(f"{request.command_id}-forbids")
+        order = None if answer.proposal is None else answer.proposal.order
+        if order is not None:
+            self._prohibitions.apply(order)
+        if order is not None and order.forbids and self._breaks(request):
+            self._cancel_all(f"{request.command_id}-forbids")
         self.planner.accepted(request, answer)
+
+    def _breaks(self, request: Request) -> bool:
+        """Tell whether what is under way does what is forbidden, as far as that is known."""
+        plans, standing = self._active.plans(), self._prohibitions.items
+        if not plans:
+            return self._situation.is_executing
+        return any(is_broken(standing, plan, request.world, request.scene) for plan in plans)
 
     def _request(self, command: UserCommand) -> Request:
         talk = self.dialogue.conversation
@@ -427,7 +439,7 @@ class CommandManager:
         last, plan = last_done(request), None
         if last is not None and not command.is_doubted:
             plan = corrected_by(asked_for(last), command.text, request.world.places)
-        if (plan is not None or rejects(command.text)) and self._active.plans():
+        if (plan is not None or rejects(command.text)) and self._is_moving:
             self._cancel_all(f"{command.command_id}-corrects")
         return plan
 

@@ -82,6 +82,12 @@ class Situation:
             last_seen=recall.things() if recall else (),
         )
 
+    @property
+    def is_executing(self) -> bool:
+        """Return whether the executor says that it carries out a plan, whoever gave it that."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        return sample is not None and sample.document().get("state", "idle") != "idle"
+
     def check_ready(self) -> None:
         """Accept that the robot moves now.
 

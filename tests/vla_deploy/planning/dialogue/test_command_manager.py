@@ -160,6 +160,14 @@ class TestObjecting:
         desk.answers()
         assert desk.plans() == [{"command_id": "c2", "cancel": True}]
 
+    @pytest.mark.parametrize("said", ["don't!", "don't touch the red cup", "no, the banana"])
+    def test_a_plan_of_a_planner_that_has_ended_ends_too(self, open_desk, said):
+        desk = open_desk()
+        desk.executor_is("executing")
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert "cancel" in desk.plans()[0]
+
     def test_a_no_is_for_what_moves_too_and_not_for_what_is_held_alone(self, open_desk):
         desk = open_desk()
         desk.sees("red cup_1")
@@ -374,7 +382,7 @@ class TestWaitingForAWord:
 
     def test_what_is_put_down_first_since_hands_are_full_meanwhile_is_asked(self, desk):
         desk.answers()
-        desk.holds(left="ball", right="book")
+        desk.executor_is("idle", left="ball", right="book")
         desk.give(command_id="c2", text="go")
         told = desk.answers()
         assert events(told) == [("c2", "answered"), ("c1", "asked")]
