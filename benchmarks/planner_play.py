@@ -13,7 +13,7 @@ from benchmarks.planner_goals import Goal
 from benchmarks.planner_world import ActionFails, World
 
 MOST_READINGS: Final = 12
-AGREEMENT: Final = "yes"
+AGREEMENT: Final = "yes, go"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

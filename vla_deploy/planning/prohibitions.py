@@ -26,6 +26,7 @@ from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
+from vla_deploy.world.vocabulary import ANY_CLASS
 
 FILE_NAME: Final = "prohibitions.json"
 MOST: Final = 32
@@ -147,6 +148,17 @@ def held_to(
     return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
 
 
+def is_broken(
+    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
+) -> bool:
+    """Tell whether a plan that may have begun before does what is forbidden, or looks there."""
+    try:
+        kept = held_to(standing, plan, world, scene)
+    except NotAble:
+        return True
+    return _searches(plan, scene) and not {*kept.keeps_out} <= {*plan.keeps_out}
+
+
 def _searches(plan: Plan, scene: Snapshot | None) -> bool:
     """Tell whether a plan looks for something that is not in the scene."""
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
@@ -175,7 +187,7 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
     if one.what is Forbidden.THING:
         touched = [given.get("object")] if action.skill == "pick_up" else []
         touched += [given.get("destination")] if action.skill == "place" else []
-        return any(_is_same(str(text), one.words, scene) for text in touched if text)
+        return any(_may_be(str(text), one.words, scene) for text in touched if text)
     inside = surfaces_of(one.words, world)
     if "x_m" in given and "y_m" in given:
         return _is_near((float(given["x_m"]), float(given["y_m"])), inside, world)
@@ -189,14 +201,16 @@ def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool
     return any(math.dist(point, (one.x_m, one.y_m)) <= REACH_M for one in poses)
 
 
-def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
+def _may_be(text: str, words: str, scene: Snapshot | None) -> bool:
+    """Tell whether an action names a forbidden thing; one that is not seen may be, if it can."""
     try:
-        subject, query = subject_of(text, scene), parse_object(words)
+        subject, asked, query = subject_of(text, scene), parse_object(text), parse_object(words)
     except UnknownObject:
         return False
     if subject.thing is not None and scene is not None:
         return any(one.thing_id == subject.thing.thing_id for one in query.among(scene))
-    return subject.kind == query.kind and (not query.colour or query.colour in subject.words)
+    colours = {asked.colour, query.colour} - {""}
+    return len({asked.kind, query.kind} - {ANY_CLASS}) < 2 and len(colours) < 2
 
 
 def _rests(text: object, scene: Snapshot | None) -> set[str]:

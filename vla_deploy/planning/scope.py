@@ -108,6 +108,11 @@ def group_of(word: str) -> ScopeGroup | None:
     return ScopeGroup.NEGATION if _NOT.search(word) else _GROUP.get(word)
 
 
+def negates(text: str) -> bool:
+    """Return whether a word of a command turns it round."""
+    return any(group_of(word) is ScopeGroup.NEGATION for word in scope_words(text))
+
+
 def guarded(proposal: Proposal, request: Request) -> Proposal:
     """Return a proposal that asks about the words that it leaves out.
 

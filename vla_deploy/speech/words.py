@@ -9,6 +9,8 @@ _POLITE: Final = frozenset(
     {
         "robot", "butler", "please", "now", "hey", "moving", "it", "that", "okay", "ok", "no", "oh",
         "emergency", "right", "there", "at", "once", "immediately", "everything", "driving",
+        "just", "wait", "whoa", "i", "said", "can", "could", "you", "this", "all", "away",
+        "doing", "what", "are", "you're",
     }
 )  # fmt: skip
 _COURTESIES: Final = frozenset(

@@ -100,6 +100,7 @@ class Desk:
         self._status = self._space.cell_reader("planner_status")
         self._scene = self._space.cell_writer("scene")
         self._executor = self._space.ring_writer("task_event")
+        self._executor_status = self._space.cell_writer("executor_status")
         self._voice = self._space.ring_reader("say", from_start=True)
         self.planner = self.start()
 
@@ -113,6 +114,10 @@ class Desk:
 
     def control(self, state: str) -> None:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
+
+    def executor_is(self, state: str, **holding: str | None) -> None:
+        """Let the executor tell what it does, and what the hands hold."""
+        self._executor_status.put_document({"state": state, "holding": holding})
 
     def sees(self, *names: str) -> None:
         """Let perception tell of things such as "red cup_1", in a row on the coffee table."""

@@ -1,5 +1,7 @@
 """What a person forbids stands until they take it back, whoever plans, also over a restart."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,11 +10,14 @@ from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Desk, fresh_desk
 from drivers.clock import MonotonicClock
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
-from vla_deploy.planning.prohibitions import Prohibitions, read_order
+from vla_deploy.planning.prohibitions import Prohibitions, held_to, read_order
 from vla_deploy.robots import load_robot
+from vla_deploy.world import Snapshot
 
 WORLD = world_of(load_robot("butler"), {})
 KEYS = Prohibition(what=Forbidden.THING, words="keys")
@@ -66,6 +71,47 @@ def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
         desk.say("you may touch the keys again")
         desk.say("yes")
         assert desk.say("bring me the keys")[1].outcome == "plan"
+
+
+@pytest.mark.parametrize(
+    ("forbidden", "taken", "is_refused"),
+    [
+        ("the green cup", "a cup", True),
+        ("the green cup", "the green cup", True),
+        ("the green cup", "the white cup", False),
+        ("the green cup", "a green bowl", False),
+        ("the can", "the white can", True),
+        ("the can", "the object", True),
+    ],
+)
+def test_what_is_not_seen_is_not_taken_where_it_may_be_the_forbidden(
+    scene: Snapshot, forbidden: str, taken: str, is_refused: bool
+) -> None:
+    order = read_order(f"don't touch {forbidden}", WORLD, ())
+    assert order is not None
+    step = Action(id="a", skill="pick_up", parameters={"object": taken})
+    plan = Plan(goal="take it", actions=(step,))
+    with pytest.raises(NotAble) if is_refused else nullcontext():
+        held_to((order.of,), plan, WORLD, replace(scene, things=()))
+
+
+@pytest.mark.parametrize(
+    ("command", "order", "ends"),
+    [
+        ("bring me the keys", "don't touch the keys", True),
+        ("go to the kitchen", "stay out of the kitchen", True),
+        ("find the remote", "stay out of the kitchen", True),
+        ("bring me the keys", "don't touch the red cup", False),
+        ("go to the bedroom", "stay out of the kitchen", False),
+    ],
+)
+def test_what_does_the_forbidden_ends_where_it_is_under_way(
+    command: str, order: str, ends: bool
+) -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        assert desk.say(command)[1].outcome == "plan"
+        assert desk.say(order)[1].outcome == ("stop" if ends else "plan")
 
 
 def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:

@@ -79,6 +79,14 @@ class ActivePlans:
         self._active[command_id] = command, carried.after(found)
         return command
 
+    def plans(self) -> tuple[Plan, ...]:
+        """Return the plans that are carried out."""
+        return tuple(carried.plan for _, carried in self._active.values())
+
     def end(self, command_id: str) -> None:
         """Forget a command: it has come to its end."""
         self._active.pop(command_id, None)
+
+    def end_all(self) -> None:
+        """Forget all: they are cancelled, so a setback that is still under way starts nothing."""
+        self._active.clear()

@@ -17,6 +17,7 @@ from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.interfaces import Proposal
+from vla_deploy.planning.patterns.awaiting import awaiting
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to back ends that take time, too."""
@@ -135,4 +136,11 @@ def _in_other_words(command: UserCommand, first: UserCommand) -> UserCommand | N
     sure = first.heard_confidence
     if text != _bare(first.text):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
-    return replace(command, text=text, others=tuple(rest), heard_confidence=sure)
+    bare = awaiting(text)
+    return replace(
+        command,
+        text=text if bare is None else bare,
+        others=tuple(rest),
+        heard_confidence=sure,
+        awaits_word=command.awaits_word or bare is not None,
+    )

@@ -11,6 +11,7 @@ from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.plan import MOST_CHARACTERS, Plan
+from vla_deploy.planning.scope import negates
 from vla_deploy.planning.understanding.quantities import numbers_in
 
 VOICE: Final = "voice"
@@ -48,14 +49,17 @@ class UserCommand:
     recovers: bool = False
 
     @property
-    def has_unsure_number(self) -> bool:
-        """Return whether a number in it may have been another one, as "90" may be heard as "19".
+    def has_unsure_words(self) -> bool:
+        """Return whether a number in it may have been another one, or a "don't" was not heard.
 
-        A "one" where no number was read mostly stands for a thing: "the red one".
+        "90" may be heard as "19". A "one" where no number was read mostly stands for a thing: "the
+        red one".
         """
         numbers = numbers_in(self.text)
         others = {numbers_in(text) for text, _ in self.others}
-        return bool(others - {numbers, (), (1.0,) if not numbers else ()})
+        if others - {numbers, (), (1.0,) if not numbers else ()}:
+            return True
+        return not negates(self.text) and any(negates(text) for text, _ in self.others)
 
     @property
     def is_spoken(self) -> bool:

@@ -13,11 +13,11 @@ from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
-from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
+from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.dialogue.confirmation import question_about
-from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text
+from vla_deploy.planning.dialogue.confirmation import agreement_to, question_about
+from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
 from vla_deploy.planning.dialogue.event_publisher import EventPublisher
@@ -26,10 +26,12 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.patterns.awaiting import is_word
 from vla_deploy.planning.patterns.follow_up import asked_for, last_done
+from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
 from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
 from vla_deploy.planning.understanding.answers import judge_answer
@@ -81,6 +83,7 @@ class CommandManager:
 
     def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
+        command = self._doubted_yes(command)
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
             self._dispatcher.refuse(command, reason)
@@ -90,16 +93,47 @@ class CommandManager:
             return
         elif command.is_answer:
             self._dispatcher.refuse(command, Says.NOTHING_ASKED)
+        elif self._objects(command) and only_objects(command.text):
+            self.stop_all(command.command_id)
+            self._events.say(command, Says.LEFT)
+        elif self._async.command is not None and self._forbids(command):
+            self._begin(command)  # it holds for what is being planned, too
         elif len(self._queue) >= MOST_WAITING:
             self._dispatcher.refuse(command, Says.MANY_WAIT)
         else:
+            if self._objects(command):  # "don't take that, take the blue one"
+                self.stop_all(f"{command.command_id}-objects")
             self._queue.append(command)
             if self._async.command is not None:
                 self._events.queued(command, len(self._queue))
 
+    def _objects(self, command: UserCommand) -> bool:
+        """Tell whether a command objects to what goes on; to forbid something is an order."""
+        is_held = self.dialogue.held is not None
+        if not ((self._goes_on and objects(command.text)) or (is_held and denies(command.text))):
+            return False
+        return not self._forbids(command)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Return whether anything is carried out, planned, or waits for its turn."""
+        return self._is_moving or any((self._async.command, self._queue))
+
+    @property
+    def _is_moving(self) -> bool:
+        """Return whether a plan is carried out, be it one of a planner that has ended since."""
+        return bool(self._active.plans()) or self._situation.is_executing
+
+    def _forbids(self, command: UserCommand) -> bool:
+        """Tell whether a command forbids something for good, which is safe at once."""
+        if command.awaits_word:
+            return False
+        order = read_order(command.text, self._request(command).world, ())
+        return order is not None and order.forbids
+
     def stop_all(self, command_id: str) -> None:
         """Drop every command, and let the executor end what it does."""
-        self._events.cancelled_all(command_id)
+        self._cancel_all(command_id)
         open_ones = (self.dialogue.settle(), self.dialogue.take_held())
         asked = [one.command for one in open_ones if one is not None]
         dropped = (*asked, self._async.call_off(), *self._queue)
@@ -194,18 +228,33 @@ class CommandManager:
     def _look_after_job(self) -> None:
         job = self._async.take_done()
         if job is not None:
-            self._guarded(job.command, lambda: self._conclude(job.result()))
+            self._guarded(job.command, lambda: self._conclude(self._held_to_now(job.result())))
         tedious = self._async.take_tedious()
         if tedious is not None:
             self._events.say(tedious, Says.WORKING)
+
+    def _held_to_now(self, done: PlannedCommand) -> PlannedCommand:
+        """Return what came of a job, held to what was forbidden meanwhile."""
+        plan, standing = done.answer.plan, self._prohibitions.items
+        if plan is None or done.request.prohibitions == standing:
+            return done
+        request = replace(done.request, prohibitions=standing)
+        try:
+            answer = replace(done.answer, plan=self.planner.check(plan, request))
+        except PlanningError as error:
+            answer = replace(done.answer, plan=None, error=error)
+        return PlannedCommand(done.command, request, answer)
 
     def _conclude(self, done: PlannedCommand) -> None:
         """Conclude a command, or try it next in other words that may have been said."""
         found = self._retry.next(done)
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
-        else:
-            self._dispatcher.conclude(found)
+            return
+        if _stands_still(found) and self._is_moving:
+            # A plan is turned away while another runs, and nobody needs to be asked about a halt.
+            self._cancel_all(f"{found.command.command_id}-stops")
+        self._dispatcher.conclude(found)
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -215,40 +264,89 @@ class CommandManager:
             self.metrics.failed += 1
             self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
 
+    def _cancel_all(self, command_id: str) -> None:
+        """Let the executor end what it does; no setback that it tells of by then is mended."""
+        self._events.cancelled_all(command_id)
+        self._active.end_all()
+
     def _accept(self, request: Request, answer: PlanningResult) -> None:
-        """Obey an order from now on, whatever planner another profile brings."""
-        if answer.proposal is not None and answer.proposal.order is not None:
-            self._prohibitions.apply(answer.proposal.order)
+        """Obey an order from now on, whatever planner another profile brings.
+
+        What is under way ends where it does what has just been forbidden.
+        """
+        order = None if answer.proposal is None else answer.proposal.order
+        if order is not None:
+            self._prohibitions.apply(order)
+        if order is not None and order.forbids and self._breaks(request):
+            self._cancel_all(f"{request.command_id}-forbids")
         self.planner.accepted(request, answer)
+
+    def _breaks(self, request: Request) -> bool:
+        """Tell whether what is under way does what is forbidden, as far as that is known."""
+        plans, standing = self._active.plans(), self._prohibitions.items
+        if not plans:
+            return self._situation.is_executing
+        return any(is_broken(standing, plan, request.world, request.scene) for plan in plans)
 
     def _request(self, command: UserCommand) -> Request:
         talk = self.dialogue.conversation
         request = self._situation.request(command, talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
 
+    def _doubted_yes(self, command: UserCommand) -> UserCommand:
+        """Return an answer as doubted if it agrees, and may have been a no: "go" sounds like it."""
+        waiting = self.dialogue.pending or self.dialogue.held
+        if waiting is None or judge_answer(waiting.question, command.text)[0] is not Verdict.YES:
+            return command
+        others = (text for text, odds in command.others if odds >= LEAST_INSTEAD)
+        verdicts = {judge_answer(waiting.question, text)[0] for text in others}
+        if Verdict.NO not in verdicts:
+            return command
+        return replace(command, is_doubted=True, may_ask_again=True)
+
     def _takes_as_word(self, command: UserCommand) -> bool:
         """Take an utterance as the word that begins the held plan, or drops it."""
         held = self.dialogue.held
-        if held is None or held.plan is None or command.is_doubted:
+        if held is None or held.plan is None:
             return False
+        if corrected := self._correction_of_held(held, command):
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
+            self._queue.appendleft(corrected)
+            return True
         verdict, _ = judge_answer(held.question, command.text)
-        if verdict not in (Verdict.YES, Verdict.NO):
-            return False
-        self.dialogue.take_held()
-        self._events.answered(command, held.command)
-        if verdict is Verdict.YES:
-            self._run_confirmed(held, held.plan)
-        else:
+        begins = is_word(command.text)
+        if verdict is Verdict.NO and not command.is_doubted and not self._goes_on:
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
             self._dispatcher.drop(held, Says.LEFT)
+        elif begins and not command.is_doubted and not command.awaits_word:
+            self.dialogue.take_held()
+            self._events.answered(command, held.command)
+            self._run_confirmed(held, held.plan)
+        elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
+            self._dispatcher.refuse(command, Says.STILL_HELD)
+        else:
+            return False
         return True
+
+    def _correction_of_held(
+        self, held: PendingQuestion, command: UserCommand
+    ) -> UserCommand | None:
+        """Return the held command as an utterance corrects it, if nothing was said since."""
+        turns = self.dialogue.conversation.turns
+        is_last = bool(turns) and turns[-1].command_id == held.command.command_id
+        return self._corrected(held, command.text) if is_last and not command.is_doubted else None
 
     # --- answers --------------------------------------------------------------------------------
 
     def _takes_as_answer(self, command: UserCommand, pending: PendingQuestion) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
-        if command.has_unsure_number:
+        if command.has_unsure_words:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
             pending = replace(pending, command=doubted)
+        if command.awaits_word:  # "the red one, but only when I say so"
+            pending = replace(pending, command=replace(pending.command, awaits_word=True))
         go_on = self._continuation(command, pending)
         if go_on is not None:
             self._events.answered(command, pending.command)
@@ -301,6 +399,10 @@ class CommandManager:
             self.dialogue.settle(said)
             if pending.plan is None:
                 self._queue.appendleft(pending.command)
+            elif pending.command.awaits_word:
+                request = self._request(pending.command)
+                done = PlannedCommand(pending.command, request, pending.answer)
+                self._dispatcher.hold(done, pending.plan)
             else:
                 self._run_confirmed(pending, pending.plan)
 
@@ -330,13 +432,15 @@ class CommandManager:
         return replace(command, corrected=plan)
 
     def _correction_of_last(self, command: UserCommand, request: Request) -> Plan | None:
-        """Return what a command makes of the one before it, which ends where it is under way."""
-        last = last_done(request)
-        if command.is_doubted or last is None:
-            return None
-        plan = corrected_by(asked_for(last), command.text, request.world.places)
-        if plan is not None and last.outcome is Outcome.UNDER_WAY:
-            self._events.cancelled_all(f"{command.command_id}-corrects")
+        """Return what a command makes of the one before it, which ends where it is under way.
+
+        What is under way ends by a no, too, of which nothing can be made: "no, the banana".
+        """
+        last, plan = last_done(request), None
+        if last is not None and not command.is_doubted:
+            plan = corrected_by(asked_for(last), command.text, request.world.places)
+        if (plan is not None or rejects(command.text)) and self._is_moving:
+            self._cancel_all(f"{command.command_id}-corrects")
         return plan
 
     def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:
@@ -353,14 +457,31 @@ class CommandManager:
         self._dispatcher.conclude(PlannedCommand(corrected, request, answer))
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
-        """Check a plan once more: the world may have changed while the person thought."""
+        """Check a plan once more: the world may have changed while the person thought.
+
+        Where it has become a risk that was not agreed to, the person is asked again.
+        """
         request = self._request(pending.command)
         done = PlannedCommand(pending.command, request, pending.answer)
         try:
             self._situation.check_ready()
-            self._dispatcher.dispatch(done, self.planner.check(plan, request))
+            checked = self.planner.check(plan, request)
         except PlanningError as error:
             self._dispatcher.refuse(pending.command, error, pending.answer)
+            return
+        proposal = pending.answer.proposal
+        if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):
+            self._dispatcher.dispatch(done, checked)
+            return
+        asks = replace(pending.answer, plan=checked, proposal=replace(proposal, read_back=""))
+        self._dispatcher.conclude(PlannedCommand(pending.command, request, asks))
 
     def _leave(self, why: Says) -> None:
         self._dispatcher.drop(self.dialogue.settle(), why)
+
+
+def _stands_still(done: PlannedCommand) -> bool:
+    """Tell whether what was planned begins with standing still, now."""
+    plan, proposal = done.answer.plan, done.answer.proposal
+    is_held = done.command.awaits_word or (proposal is not None and proposal.awaits_word)
+    return plan is not None and plan.actions[0].skill == "stop" and not is_held

@@ -8,6 +8,7 @@ from typing import Final
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
+from vla_deploy.planning.scope import IDIOMS
 from vla_deploy.planning.understanding import Question
 from vla_deploy.world import Query, UnknownWord, parse_query
 
@@ -24,6 +25,7 @@ _CORRECTIONS: Final = tuple(
         r"(?P<rest>the other(?: one)?)",
     )
 )
+_REJECTS: Final = re.compile(rf"(?!sorry){_NO}(?:[,.!]| (?:the|my|your|that|an?)\b)")
 _OTHER: Final = re.compile(r"(?:the )?other(?: one)?", re.IGNORECASE)
 _OTHER_TOO: Final = re.compile(r"the other (?:one|thing)(?:,? (?:too|as well|also))")
 _INSTEAD: Final = re.compile(r"[, ]+(?:instead|please|rather)$", re.IGNORECASE)
@@ -40,6 +42,11 @@ def correction_in(text: str) -> str:
     said = text.strip().strip(".!")
     found = next((one for one in (it.fullmatch(said) for it in _CORRECTIONS) if one), None)
     return "" if found is None else _INSTEAD.sub("", found["rest"]).strip()
+
+
+def rejects(text: str) -> bool:
+    """Tell whether an utterance begins with a no, whatever else it says."""
+    return _REJECTS.match(IDIOMS.sub(" ", text.strip().lower())) is not None
 
 
 def wants_other_too(clause: str) -> bool:

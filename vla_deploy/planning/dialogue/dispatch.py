@@ -26,7 +26,7 @@ from vla_deploy.planning.understanding.mentioned import mentions_of
 class CommandDispatcher:
     """Conclude commands, publish it, and remember it for what is said next.
 
-    `accepted` is called for every plan that is dispatched for a command of its own.
+    `accepted` is called before a plan is dispatched for a command of its own.
     """
 
     def __init__(
@@ -55,8 +55,9 @@ class CommandDispatcher:
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
             self._events.check_length(answer.plan)
-            if command.awaits_word or (answer.proposal and answer.proposal.awaits_word):
-                self._hold(done, answer.plan)
+            is_held = command.awaits_word or (answer.proposal and answer.proposal.awaits_word)
+            if is_held and not command.recovers:  # the word has been said
+                self.hold(done, answer.plan)
                 return
             agreed = self._active.agreed(command)
             question = answer.read_back or confirmation_of(answer.plan, done.request, agreed)
@@ -74,14 +75,16 @@ class CommandDispatcher:
         except PlanningError as error:
             self.refuse(command, error, answer)
 
-    def _hold(self, done: PlannedCommand, plan: Plan) -> None:
+    def hold(self, done: PlannedCommand, plan: Plan) -> None:
         """Read a plan back, and hold it until the person says go; one that was held is dropped."""
         self.drop(self._dialogue.take_held(), Says.REPLACED)
         question = done.answer.read_back or confirmation_of(plan, done.request)
         asked = (question or question_about(plan, done.request), things_named(plan, done.request))
         held = self._dialogue.hold(done, Says.HELD.format(question=" ".join(filter(None, asked))))
         self.metrics.asked += 1
-        self._events.asked(done.command, held.question, plan)
+        self._events.asked(done.command, held.question, plan, choices=("go",))
+        # "No, the blue one" means this plan, not what was done before it.
+        self._remember(done, plan, Outcome.ASKED)
 
     def drop(self, pending: PendingQuestion | None, why: Says) -> None:
         """Say that what waits for an answer, if anything does, is left."""
@@ -93,11 +96,15 @@ class CommandDispatcher:
         command, request, answer = done.command, done.request, done.answer
         if command.recovers:
             plan = numbered(plan, len(request.failed))
+        if not command.recovers:
+            self._accepted(request, answer)
         self._events.dispatched(command, plan, answer)
         self._active.add(command, plan, answer, agreement_to(plan, request))
         self.metrics.planned += 1
-        if not command.recovers:
-            self._accepted(request, answer)
+        self._remember(done, plan, Outcome.UNDER_WAY)
+
+    def _remember(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
+        command, request = done.command, done.request
         self._dialogue.remember(
             Turn(
                 said=command.text,
@@ -106,6 +113,7 @@ class CommandDispatcher:
                 understood=plan.summary,
                 mentioned=mentions_of(plan, request.scene),
                 plan=plan,
+                outcome=outcome,
                 here=request.here,
             )
         )

@@ -57,13 +57,19 @@ class EventPublisher:
         """Publish that others are planned first."""
         self._publish(command, "queued", place=place)
 
-    def asked(self, command: UserCommand, question: Question, plan: Plan | None) -> None:
-        """Ask what only the person knows; `plan` is what a yes lets run."""
+    def asked(
+        self,
+        command: UserCommand,
+        question: Question,
+        plan: Plan | None,
+        choices: tuple[str, ...] = (),
+    ) -> None:
+        """Ask what only the person knows; `plan` is what a yes, or one of the choices, lets run."""
         self._publish(
             command,
             "asked",
             question=_bounded(question.text),
-            choices=[one.words for one in question.candidates],
+            choices=[*choices, *(one.words for one in question.candidates)],
             answer_within_s=question.limit_s,
             plan=None if plan is None else plan.model_dump(mode="json"),
         )

@@ -25,6 +25,7 @@ class Says(StrEnum):
     WORKING = "One moment."
     CONFIRM = "Shall I {steps}?"
     HELD = "{question} I wait for you to say go."
+    STILL_HELD = "I wait for you to say go."
     NOT_CLEAR = "Sorry, I did not get that. {question}"
     LEFT = "All right, I leave it."
     NO_ANSWER = "I got no answer, so I leave it."

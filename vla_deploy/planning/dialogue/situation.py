@@ -82,6 +82,12 @@ class Situation:
             last_seen=recall.things() if recall else (),
         )
 
+    @property
+    def is_executing(self) -> bool:
+        """Return whether the executor says that it carries out a plan, whoever gave it that."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        return sample is not None and sample.document().get("state", "idle") != "idle"
+
     def check_ready(self) -> None:
         """Accept that the robot moves now.
 
@@ -171,8 +177,8 @@ class Recall:
 
 
 def _heard_confidence(command: UserCommand) -> float | None:
-    """Return how sure the words are; with an unsure number so little that they are read back."""
+    """Return how sure the words are; with unsure words so little that they are read back."""
     sure = command.heard_confidence
-    if not command.has_unsure_number:
+    if not command.has_unsure_words:
         return sure
     return READ_BACK if sure is None else min(sure, READ_BACK)

@@ -8,7 +8,8 @@ _WORD: Final = (
     r"signal|go-ahead)|call(?: you)?|ask you(?: to)?)"
 )
 _WHEN: Final = (
-    r"(?:but )?(?:only )?(?:when(?:ever)?|as soon as|once|after|not (?:before|until|till)) " + _WORD
+    r"(?:but )?(?:only )?(?:when(?:ever)?|as soon as|the (?:moment|instant|minute|second)|once|"
+    r"after|not (?:before|until|till)) " + _WORD
 )
 _ORDERS: Final = tuple(
     re.compile(pattern, re.IGNORECASE)
@@ -26,3 +27,16 @@ def awaiting(text: str) -> str | None:
     said = " ".join(text.split()).strip(" .!")
     found = (order.fullmatch(said) for order in _ORDERS)
     return next((one["rest"] for one in found if one), None)
+
+
+# A mere "yes", "okay" or "right" is said to other people, too, and for an hour.
+_BEGINS: Final = re.compile(r"(?:now )?(?:go|go ahead|go on|do it|start|begin)(?: now)?|now")
+_AROUND: Final = re.compile(
+    r"[,.!]|\b(?:yes|yeah|yep|sure|ok|okay|right|alright|please|then|hey|robot|butler)\b"
+)
+
+
+def is_word(text: str) -> bool:
+    """Return whether an utterance is the word that begins a held plan."""
+    said = " ".join(_AROUND.sub(" ", text.lower()).split())
+    return _BEGINS.fullmatch(said) is not None

@@ -1,10 +1,11 @@
-"""Recognise a command that only means: stop what you are doing."""
+"""Recognise words that only mean: stop what you are doing, and those that object to it."""
 
 import re
 from typing import Final
 
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.plan import MOST_CHARACTERS
+from vla_deploy.planning.scope import IDIOMS
 
 STOP_PHRASES: Final = frozenset(
     {
@@ -17,9 +18,22 @@ STOP_PHRASES: Final = frozenset(
     }
 )  # fmt: skip
 # "Stop driving to the kitchen", but not "stop looking and come here".
+_ALONE: Final = r"(?!.* (?:and|then|but|instead)\b)"
 _STOP_DOING: Final = re.compile(
-    r"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{2,}ing\b"
-    r"(?!.* (?:and|then|but|instead)\b).*"
+    rf"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{{2,}}ing\b{_ALONE}.*"
+)
+_DO_NOT: Final = (
+    "(?:do not|don't|dont|not the|you (?:must not|mustn't|should not|shouldn't|may not))"
+)
+# "Don't stop" is no objection; "don't worry" and "don't drop it" are idioms.
+_DENIES: Final = re.compile(
+    rf"(?:i said )?(?:{_DO_NOT}\b(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b).*"
+)
+_OBJECTS: Final = re.compile(
+    rf"{_ALONE}{_DENIES.pattern}|no(?: no)*|nope|"
+    r"not (?:that|this|it|there|like that|now)(?: one)?|leave (?:it|that|them)(?: alone| be)?|"
+    r"(?:that's |that is )?(?:the )?(?:wrong(?: one)?|not (?:it|right))|"
+    r"(?:wait|hold on|hang on|pause)(?: a (?:second|moment|minute|bit))?"
 )
 _SENTENCE: Final = re.compile(r"[.!?;,]+")
 _URGING: Final = frozenset(
@@ -34,6 +48,30 @@ def is_stop(text: str) -> bool:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]
     return any(bare) and all(map(_is_stop, filter(None, bare)))
+
+
+def objects(text: str) -> bool:
+    """Return whether words object to what the robot does: "no!", "wait", "don't pick it up"."""
+    return denies(text) or only_objects(text)
+
+
+def denies(text: str) -> bool:
+    """Return whether a command begins by what is not to be done: "stop this", "don't do that"."""
+    pieces = _objecting(text)
+    return bool(pieces) and _DENIES.fullmatch(pieces[0]) is not None
+
+
+def only_objects(text: str) -> bool:
+    """Return whether there is nothing in such words besides that could be done."""
+    pieces = _objecting(text)
+    return bool(pieces) and all(map(_OBJECTS.fullmatch, pieces))
+
+
+def _objecting(text: str) -> list[str]:
+    said = IDIOMS.sub(" ", text.lower().replace("\u2019", "'"))
+    bare = (courtesy_off(part) for part in _SENTENCE.split(said[:MOST_CHARACTERS]))
+    without = (re.sub(r"^(?:(?:no|oh|and|but|hey) )+(?=\w)", "", part) for part in bare)
+    return [part for part in without if part]
 
 
 def _is_stop(said: str) -> bool:

@@ -162,6 +162,30 @@ def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
     assert first["command_id"] == "c1"
 
 
+def test_what_has_begun_at_a_word_waits_for_none_after_a_failure(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen when I say so")
+    desk.answers()
+    desk.give(command_id="c2", text="go")
+    desk.answers()
+    (first,) = desk.plans()
+    (second,) = set_back(desk, first)
+    assert second["command_id"] == "c1"
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+
+
+@pytest.mark.parametrize("said", ["stop", "no, the bedroom", "stay out of the kitchen"])
+def test_a_setback_that_a_cancel_has_overtaken_starts_nothing(open_desk, said):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (plan,) = desk.plans()
+    desk.give(command_id="c2", text=said)
+    desk.answers()
+    assert "cancel" in desk.plans()[0]
+    assert [one for one in set_back(desk, plan) if "plan" in one] == []
+
+
 def test_a_stop_ends_the_search_for_another_plan(open_desk, later, back_end, propose):
     desk = open_desk(back_end("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
     desk.give(text="go to the kitchen")

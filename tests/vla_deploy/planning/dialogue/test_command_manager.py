@@ -57,6 +57,20 @@ def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_e
     assert model.asked == [], "its deadline was called in"
 
 
+def test_what_is_forbidden_while_a_plan_is_made_holds_for_that_plan(
+    open_desk, later, back_end, propose
+):
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk.give(text="sing one")
+    desk.answers()
+    desk.give(command_id="c2", text="stay out of the kitchen")
+    assert events(desk.answers()) == [("c2", "accepted"), ("c2", "plan")]
+    later.do_one()
+    (refused,) = desk.answers()
+    assert (refused["command_id"], refused["event"]) == ("c1", "rejected")
+    assert "you told me not to go into the kitchen" in refused["reason"]
+
+
 def test_too_many_commands_are_refused_at_once(open_desk, later, back_end, propose):
     desk = open_desk(back_end("model", propose(GO)), aside=later)
     for number in range(10):
@@ -87,6 +101,98 @@ def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open
     told = desk.answers()
     assert events(told) == [("c1", "rejected"), ("c2", "rejected")]
     assert told[0]["reason"] == "the planner failed: ZeroDivisionError"
+
+
+class TestObjecting:
+    @pytest.mark.parametrize(
+        "said",
+        ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "wait", "stop this"],
+    )
+    def test_what_objects_to_what_is_under_way_ends_it(self, open_desk, said):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="pick up the red cup", source="voice")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said, source="voice")
+        desk.answers()
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+        assert desk.said_aloud() == [Says.LEFT]
+
+    @pytest.mark.parametrize("said", ["don't worry", "don't stop", "don't drop it"])
+    def test_an_idiom_ends_nothing(self, open_desk, said):
+        desk = open_desk()
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert desk.plans() == []
+
+    def test_what_is_to_be_done_instead_is_planned(self, open_desk):
+        desk = open_desk()
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text="don't go there, look left")
+        assert events(desk.answers())[-1][0] == "c2"
+        assert desk.plans()[0] == {"command_id": "c2-objects", "cancel": True}
+
+    def test_a_plan_that_begins_with_standing_still_ends_what_is_under_way(
+        self, open_desk, back_end, propose
+    ):
+        halt = propose(("stop", {}), read_back="Shall I stand still?")
+        desk = open_desk(back_end("model", halt))
+        desk.give(text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text="oh my word, make it halt somehow")
+        assert events(desk.answers())[-1] == ("c2", "asked")
+        assert desk.plans() == [{"command_id": "c2-stops", "cancel": True}]
+
+    def test_it_overtakes_what_is_planned(self, open_desk, later, back_end, propose):
+        desk = open_desk(back_end("model", propose(GO)), aside=later)
+        desk.give(text="sing one")
+        desk.answers()
+        desk.give(command_id="c2", text="don't do that")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        later.do_one()
+        desk.answers()
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+
+    @pytest.mark.parametrize("said", ["don't!", "don't touch the red cup", "no, the banana"])
+    def test_a_plan_of_a_planner_that_has_ended_ends_too(self, open_desk, said):
+        desk = open_desk()
+        desk.executor_is("executing")
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert "cancel" in desk.plans()[0]
+
+    def test_a_no_is_for_what_moves_too_and_not_for_what_is_held_alone(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c3", text="no!")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.plans() == [{"command_id": "c3", "cancel": True}]
+
+    def test_it_drops_what_is_held_but_a_wait_does_not(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.give(command_id="c2", text="wait")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        desk.executor_tells(command_id="c2", event="finished", success=True, error=None)
+        desk.answers()
+        assert desk.status()["question"] is not None
+        desk.give(command_id="c3", text="don't pick it up")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.status()["question"] is None
 
 
 class TestQuestions:
@@ -194,6 +300,7 @@ class TestWaitingForAWord:
         (asked,) = desk.answers()
         assert asked["question"] == "Shall I pick up the red cup? I wait for you to say go."
         assert asked["plan"]["actions"][-1]["skill"] == "pick_up"
+        assert asked["choices"] == ["go"]
         assert desk.plans() == []
         desk.clock.pass_s(600.0)
         assert desk.answers() == []
@@ -204,8 +311,8 @@ class TestWaitingForAWord:
         ("word", "end"),
         [
             ("go", ("c1", "plan")),
+            ("Yes, go!", ("c1", "plan")),
             ("now, please", ("c1", "plan")),
-            ("yes", ("c1", "plan")),
             ("not now", ("c1", "rejected")),
             ("never mind", ("c1", "rejected")),
             ("look left", ("c2", "plan")),
@@ -217,6 +324,72 @@ class TestWaitingForAWord:
         assert events(desk.answers())[-1] == end
         is_held = desk.status()["question"] is not None
         assert is_held == (end[0] == "c2")
+
+    @pytest.mark.parametrize(
+        "said",
+        [
+            {"text": "yes"},
+            {"text": "okay"},
+            {"text": "That's right."},
+            {"text": "go, but only when I say so"},
+            {"text": "go", "heard": {"doubted": True, "ask_again": True}},
+            {"text": "go", "heard": {"confidence": 0.8, "others": [{"text": "no", "odds": 0.4}]}},
+        ],
+    )
+    def test_what_agrees_or_is_heard_badly_begins_nothing_and_drops_nothing(self, desk, said):
+        desk.answers()
+        desk.give(command_id="c2", **said)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["reason"]) == ("c2", Says.STILL_HELD)
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+
+    @pytest.mark.parametrize(
+        ("command", "answer"),
+        [
+            ({"text": "pick up the cup"}, "the red one, but only when I say so"),
+            (
+                {"text": "pick up the red cup", "heard": {"confidence": 0.4}},
+                "yes, not before I call",
+            ),
+        ],
+    )
+    def test_an_answer_may_say_that_it_waits(self, open_desk, command, answer):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(**command)
+        desk.answers()
+        desk.give(command_id="c2", text=answer)
+        answered, asked = desk.answers()
+        assert (answered["event"], asked["event"]) == ("answered", "asked")
+        assert asked["question"].endswith("I wait for you to say go.")
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+
+    def test_a_correction_changes_what_is_held_and_ends_nothing(self, desk):
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(command_id="c0", text="look left")
+        desk.give(command_id="c2", text="when I say so, pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c3", text="no, the blue one")
+        told = desk.answers()
+        assert events(told) == [("c3", "answered"), ("c2", "asked")]
+        assert told[1]["question"] == "Shall I pick up the blue cup? I wait for you to say go."
+        assert desk.plans() == []
+
+    def test_what_is_put_down_first_since_hands_are_full_meanwhile_is_asked(self, desk):
+        desk.answers()
+        desk.executor_is("idle", left="ball", right="book")
+        desk.give(command_id="c2", text="go")
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "asked")]
+        assert "My hands are full" in told[-1]["question"]
+        assert desk.plans() == []
+        desk.give(command_id="c3", text="go")
+        assert events(desk.answers())[-1] == ("c1", "plan")
 
     def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
         desk.answers()
@@ -286,6 +459,17 @@ class TestReadingBack:
         assert desk.plans() == [{"command_id": "c2-corrects", "cancel": True}]
         desk.give(command_id="c3", text="yes")
         assert events(desk.answers())[-1] == ("c2", "plan")
+
+    @pytest.mark.parametrize("said", ["no, the banana", "Wrong, somewhere", "no! go home"])
+    def test_a_no_of_which_nothing_can_be_made_ends_what_has_begun(self, open_desk, said):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        desk.answers()
+        assert desk.plans()[0] == {"command_id": "c2-corrects", "cancel": True}
 
     def test_a_correction_of_what_was_not_done_is_a_command_of_its_own(self, open_desk):
         desk = open_desk()

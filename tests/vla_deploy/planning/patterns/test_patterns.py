@@ -5,9 +5,9 @@ import pytest
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.patterns.awaiting import awaiting
+from vla_deploy.planning.patterns.awaiting import awaiting, is_word
 from vla_deploy.planning.patterns.backend import pattern_plan
-from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.patterns.stopping import is_stop, objects, only_objects
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 
@@ -105,6 +105,7 @@ def test_again_does_what_was_done_last() -> None:
         ("when I tell you to, go to the kitchen", "go to the kitchen"),
         ("bring me the cup, but only when I say so", "bring me the cup"),
         ("wait until I give you the word and then go home", "go home"),
+        ("go home the moment I say so", "go home"),
         ("when I tell you to go to bed, turn left", None),
         ("when I come home, turn left", None),
         ("bring me the cup", None),
@@ -112,6 +113,19 @@ def test_again_does_what_was_done_last() -> None:
 )
 def test_a_command_that_waits_for_a_word_is_found(text: str, rest: str | None) -> None:
     assert awaiting(text) == rest
+
+
+@pytest.mark.parametrize(
+    ("text", "begins"),
+    [
+        ("Go!", True), ("okay robot, go ahead", True), ("right now, please", True),
+        ("do it now", True), ("now", True), ("yes", False), ("okay then", False),
+        ("go to the kitchen", False), ("no go", False), ("not now", False), ("don't go", False),
+        ("go on holiday", False), ("do it later", False), ("", False),
+    ],
+)  # fmt: skip
+def test_the_word_that_begins_is_no_mere_yes(text: str, begins: bool) -> None:
+    assert is_word(text) == begins
 
 
 @pytest.mark.parametrize(
@@ -128,3 +142,21 @@ def test_a_command_that_waits_for_a_word_is_found(text: str, rest: str | None) -
 )  # fmt: skip
 def test_words_that_only_stop_are_known(text: str, stops: bool) -> None:
     assert is_stop(text) is stops
+
+
+@pytest.mark.parametrize(
+    ("text", "is_objection", "has_more"),
+    [
+        ("no!", True, False), ("No, don't!", True, False), ("please don't do that", True, False),
+        ("that's wrong", True, False), ("not the red one", True, False),
+        ("hold on a second", True, False), ("stop this", True, False),
+        ("don't go there, come here", True, True), ("stop and come here", True, True),
+        ("don't worry", False, True), ("don't stop", False, True), ("no problem", False, True),
+        ("bring it, don't drop it", False, True), ("wait 5 seconds", False, True),
+        ("go to the bus stop", False, True), ("no, the blue one", False, True),
+    ],
+)  # fmt: skip
+def test_words_that_object_are_told_from_idioms_and_from_what_is_to_be_done(
+    text: str, is_objection: bool, has_more: bool
+) -> None:
+    assert (objects(text), not only_objects(text)) == (is_objection, has_more)
