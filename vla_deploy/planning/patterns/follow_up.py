@@ -5,11 +5,10 @@ Nothing is repeated that failed, was refused or called off: a person has to say 
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.action_words import action_words
-from vla_deploy.planning.builders.steps import go_back
+from vla_deploy.planning.builders.steps import way_back
 from vla_deploy.planning.dialogue.correction import wants_other_too, with_other
 from vla_deploy.planning.errors import Declined, NothingBefore
 from vla_deploy.planning.interfaces import Request
@@ -136,8 +135,7 @@ def _single(skill: str, parameters: Mapping[str, Any]) -> Plan:
 
 
 def _returned(request: Request) -> Plan:
-    ((skill, parameters),) = go_back({}, replace(request, text="go back"))
-    return _single(skill, parameters)
+    return _single(*way_back(request))
 
 
 def _ratio(text: str) -> float | None:

@@ -29,10 +29,10 @@ _UNKNOWN: Final = (
 _STANDS: Final = (
     rf" (?:on|in|next to|beside) (?:the|my|your|our) (?:{_LOOK} ){{0,2}}[a-z]+(?: table)?"
 )
-_SEVERAL: Final = (
-    rf"(?:both|all)(?: of)?(?: the| my| our)? (?:{_LOOK} )?{KIND}s?|everything(?:{_STANDS})?"
-)
-_KNOWN: Final = rf"(?:{_ONE})(?:{_STANDS})?|{_SEVERAL}"
+_SEVERAL: Final = rf"(?:both|all)(?: of)?(?: the| my| our)? (?:{_LOOK} )?{KIND}s?|everything"
+_KNOWN: Final = rf"(?:{_ONE}|everything)(?:{_STANDS})?|{_SEVERAL}"
+BARE: Final = rf"(?:{_ONE}|{_SEVERAL}|{_UNKNOWN})"
+"""A thing that is told by its look alone."""
 THING: Final = rf"(?:{_KNOWN}|{_UNKNOWN})"
 THINGS: Final = rf"{THING}(?:(?:,| and|, and) {THING})*"
 WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
