@@ -13,7 +13,7 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Plan, execution_order
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.symbolic.simulation import end_state
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.world.thing import Rest
 
 _HANDLING: Final = frozenset({"pick_up", "place"})

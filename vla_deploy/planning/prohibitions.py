@@ -22,7 +22,7 @@ from vla_deploy.planning.patterns.slots import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot

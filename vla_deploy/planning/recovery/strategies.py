@@ -13,8 +13,7 @@ from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Requ
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.recovery.setback import Carried, FailureCause
 from vla_deploy.planning.references import parse_object
-from vla_deploy.planning.symbolic.state import state_of
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
 # What a command is about does not depend on these.

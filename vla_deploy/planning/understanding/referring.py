@@ -7,8 +7,7 @@ from typing import Final
 
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic.state import Held, Pose, State
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import Held, Pose, State, subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.places import (
