@@ -87,7 +87,7 @@ class ServedModel(ChatBackEnd):
                 break
         if not found:
             raise failure
-        candidate, confidence = elected(found, asked, request.world.places)
+        candidate, confidence = elected(found, asked, request)
         # What was made of an image cannot be compared with later.
         return self.proposal(candidate, confidence, may_be_kept=self._image(request) is None)
 
