@@ -1,7 +1,6 @@
 """Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
 
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
@@ -12,7 +11,6 @@ from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.planning.understanding.questions import did_you_mean
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
@@ -20,7 +18,6 @@ from vla_deploy.world.memory import place_of, seen_words
 
 Fields = Mapping[str, str]
 MOST_TOLD = 6
-_IN_ROOM = re.compile(r"\bin (?:the )?(.+)$")
 READY = "I am ready for a command."
 ABILITIES = (
     "I can go to places, look for things, pick them up, put them in the box or on a table, "
@@ -74,20 +71,7 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
 def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
     """Say whether a thing is in sight."""
     found = _known(fields["what"], request)
-    unsure = "" if found else _of_room(fields["what"], request)
-    if unsure:
-        elsewhere = _known(_IN_ROOM.sub("", fields["what"]), request)
-        return _say(_places_of(elsewhere, request) or unsure)
-    if not found:
-        return _say("No, I do not see that.")
-    return _say(f"Yes, I see {listed(found)}.")
-
-
-def _tell_number(fields: Fields, request: Request) -> list[Skill]:
-    """Say how many such things are known."""
-    count = len(_known(fields["what"], request))
-    unsure = "" if count else _of_room(fields["what"], request)
-    return _say(unsure or f"I see {count or 'none'}.")
+    return _say(f"Yes, I see {listed(found)}." if found else "No, I do not see that.")
 
 
 def listed(things: Sequence[Thing]) -> str:
@@ -113,16 +97,6 @@ def _known(text: str, request: Request) -> list[Thing]:
     if read.doubts:
         raise did_you_mean(read.doubts[0], read.said)
     return fitting(read, Use.SEE, setting)
-
-
-def _of_room(text: str, request: Request) -> str:
-    """Say that nobody knows all that is in a room, if words are about one, else ""."""
-    found = _IN_ROOM.search(text)
-    room = match_place(found[1], request.world.places) if found else None
-    if room is None or is_surface(room, request.world):
-        return ""
-    where = room.replace("_", " ")
-    return f"I know what I see on furniture, not all that is in the {where}; ask me to look there."
 
 
 def _remembered(text: str, request: Request) -> list[Skill]:
@@ -178,7 +152,6 @@ ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
     "seeing": _tell_sight,
     "place": _tell_place,
     "whether": _tell_whether,
-    "number": _tell_number,
     "doing": _tell_doing,
     "able": _told(ABILITIES),
     # One that may not move refuses every plan before.

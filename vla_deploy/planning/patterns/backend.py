@@ -11,8 +11,7 @@ from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.follow_up import follow_up
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.slots import is_place, is_thing
-from vla_deploy.planning.patterns.table import PATTERNS, Pattern
+from vla_deploy.planning.patterns.table import PATTERNS, Pattern, is_place, is_thing
 from vla_deploy.planning.plan import Plan, Priority, Skill, chained
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words

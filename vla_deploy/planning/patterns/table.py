@@ -1,29 +1,59 @@
-"""List the patterns of the commonest commands: how each is said, and which step it is."""
+"""List the patterns of the commonest commands: how each is said, and which step it is.
+
+What may stand in their slots are names that the robot knows, and nothing else: so no word that
+changes what a sentence means can hide in one.
+"""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.planning.patterns.slots import (
-    ANGLE,
-    BARE,
-    HAND,
-    KIND,
-    METRES,
-    SECONDS,
-    THING,
-    THINGS,
-    WORDS,
-)
 from vla_deploy.planning.plan import Priority
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.understanding.quantities import NUMBER
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
-_THINGS: Final = rf"(?P<what>{THINGS})"
+_ARTICLE: Final = "(?:the|a|an|my|your|that|this|some|our)"
+_LOOK: Final = (
+    f"(?:{'|'.join(COLOURS)}|gray|violet|small|little|big|large|nearest|closest|smallest|biggest|"
+    "smaller|bigger|tall|short|other|left|right)"
+)
+_KIND: Final = f"(?:{KIND_WORDS}|remote control|mobile phone|cell phone)"
+_ONE: Final = (
+    rf"(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}|(?:the|that|this) (?:{_LOOK} ){{1,2}}one|"
+    "it|that|this|that one|this one|them|those|these"
+)
+# A word for a thing that the robot has not learnt: grounding asks what it is.
+_UNKNOWN: Final = (
+    rf"(?:the|a|an|my|that|this) (?:{_LOOK} ){{0,2}}"
+    r"(?!one\b|same\b|rest\b|other\b|left\b|right\b|whole\b)[a-z]{3,}"
+)
+_STANDS: Final = (
+    rf" (?:on|in|next to|beside) (?:the|my|your|our) (?:{_LOOK} ){{0,2}}[a-z]+(?: table)?"
+)
+_SEVERAL: Final = rf"(?:both|all)(?: of)?(?: the| my| our)? (?:{_LOOK} )?{_KIND}s?|everything"
+_KNOWN: Final = rf"(?:{_ONE}|everything)(?:{_STANDS})?|{_SEVERAL}"
+_BARE: Final = rf"(?:{_ONE}|{_SEVERAL}|{_UNKNOWN})"
+"""A thing that is told by its look alone."""
+THING: Final = rf"(?:{_KNOWN}|{_UNKNOWN})"
+_SEVERAL_THINGS: Final = rf"{THING}(?:(?:,| and|, and) {THING})*"
+WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
+_METRES: Final = (
+    rf"{NUMBER}(?: of a| an?)? ?(?:m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|steps?)"
+)
+_ANGLE: Final = rf"{NUMBER} ?(?:degrees?|deg|°|rad|radians?)"
+_SECONDS: Final = rf"{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment)"
+_HAND: Final = (
+    r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|claw|fingers|hands|grippers)"
+)
+_IS_THING: Final = re.compile(_KNOWN)
+_THINGS: Final = rf"(?P<what>{_SEVERAL_THINGS})"
 _THING: Final = rf"(?P<what>{THING})"
 # What is moved where: a thing that is told by where it stands leaves it open what goes where.
-_MOVED: Final = rf"(?P<what>{BARE}(?:(?:,| and|, and) {BARE})*)"
+_MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
 _WHERE: Final = rf"(?P<where>{WORDS})"
-_WITH: Final = rf"(?: (?:with|in) {HAND})?"
+_WITH: Final = rf"(?: (?:with|in) {_HAND})?"
 _INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
 _TAKE: Final = "(?:pick up|grab|take|get|lift|grasp|hold|collect|take hold of|grab hold of)"
 _PUT: Final = "(?:put|place|set|lay|drop|leave|stick|pop)"
@@ -57,12 +87,12 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
      {"where": "charging station"}),
     # --- go straight, turn
     (_MEDIUM, rf"(?:move|drive|go|roll|come|step)(?: {_LITTLE})? {_WAY}"
-     rf"(?:(?: by| for)? (?P<by>{METRES}))?", "move", {}),
-    (_MEDIUM, rf"(?:move|drive|go|roll|step) (?P<by>{METRES}) {_WAY}", "move", {}),
+     rf"(?:(?: by| for)? (?P<by>{_METRES}))?", "move", {}),
+    (_MEDIUM, rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
     (_MEDIUM, rf"(?:move|drive|go|come) {_WAY} {_LITTLE}", "move", {}),
     (_MEDIUM, rf"(?:turn|rotate|spin)(?: {_LITTLE})?(?: to the)? {_SIDE}"
-     rf"(?:(?: by)? (?P<by>{ANGLE}))?", "turn", {}),
-    (_MEDIUM, rf"(?:turn|rotate|spin)(?: by)? (?P<by>{ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
+     rf"(?:(?: by)? (?P<by>{_ANGLE}))?", "turn", {}),
+    (_MEDIUM, rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
      {}),
     (_MEDIUM, rf"(?:turn|rotate)(?: to the)? {_SIDE} {_LITTLE}", "turn", {}),
     (_MEDIUM, rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
@@ -77,8 +107,8 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
     (_MEDIUM, rf"(?:find|look for|search for|locate) {_THINGS}"
      rf"(?: in (?:the )?(?P<from>{WORDS}))?", "find", {}),
     # --- hands
-    (_MEDIUM, rf"open {HAND}", "open", {}),
-    (_MEDIUM, rf"close {HAND}", "close", {}),
+    (_MEDIUM, rf"open {_HAND}", "open", {}),
+    (_MEDIUM, rf"close {_HAND}", "close", {}),
     (_MEDIUM, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose",
      {"name": "tuck"}),
     (_MEDIUM, rf"(?:put|set) {_THING} down|put down {_THINGS}|drop {_THING}", "put", {}),
@@ -86,7 +116,7 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
     (_MEDIUM, rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
     (_MEDIUM, rf"{_PUT} {_THING} (?P<where>here|there|over there)", "put", {}),
     (_MEDIUM, r"empty (?:both )?(?:your )?hands", "put", {"what": "everything you are holding"}),
-    (_MEDIUM, rf"empty {HAND}", "put", {}),
+    (_MEDIUM, rf"empty {_HAND}", "put", {}),
     # --- give, bring
     (_MEDIUM, rf"(?:give|hand|pass|bring|fetch|get) (?:me|us) {_THINGS}", "bring", {}),
     (_MEDIUM, rf"(?:give|hand|pass) {_THINGS} to me|hand over {_THINGS}|hand {_THING} over",
@@ -106,7 +136,7 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
     # --- say, wait, answer
     (_HIGH, r"(?:say|announce) (?P<text>[^,;:]+)|"
      r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", "say", {}),
-    (_HIGH, rf"wait(?: here)?(?:(?: for)? (?P<by>{SECONDS}))?", "wait", {}),
+    (_HIGH, rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
     (_HIGH, r"(?:many )?thanks(?: a lot| so much)?|thank you(?: very much| so much)?|"
      r"good (?:job|robot)", "ask", {"about": "thanks"}),
     (_HIGH, r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
@@ -123,8 +153,6 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
     (_MEDIUM, "where are you", "ask", {"about": "place"}),
     (_MEDIUM, rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask",
      {"about": "whether"}),
-    (_MEDIUM, rf"how many (?P<what>{KIND}s?)(?: are there| do you see)?", "ask",
-     {"about": "number"}),
 )  # fmt: skip
 
 
@@ -142,3 +170,13 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 PATTERNS: Final = tuple(
     Pattern(priority, _compiled(pattern), do, given) for priority, pattern, do, given in _ROWS
 )
+
+
+def is_place(text: str, places: Mapping[str, str]) -> bool:
+    """Return whether a text is the whole name of a place."""
+    return match_place(text, places) is not None
+
+
+def is_thing(text: str) -> bool:
+    """Return whether a text names a thing in words that the robot knows."""
+    return _IS_THING.fullmatch(text) is not None

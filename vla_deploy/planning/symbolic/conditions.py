@@ -73,31 +73,25 @@ def is_known(state: State, setting: Setting) -> Answer:
 
 def is_before(state: State, setting: Setting) -> Answer:
     """Does the robot stand where the thing, or the place, is within reach?"""
-    place = setting.place("destination")
+    place, sites = setting.place("destination"), setting.world.sites
     subject = setting.subject("object") or setting.subject("destination")
+    at = place or (subject.key if subject is not None else "")
+    what = at if place is not None or subject is None else subject.words
+    if not at or state.at == at:
+        return MET
+    spot = None
     if place is not None:
-        return _is_before_place(state, place, setting.world)
-    if subject is None or state.at == subject.key:
-        return MET
-    if subject.thing is None:
-        away = bool(state.at) and state.at in setting.world.sites
-        return f"the robot went to {state.at}; navigate_to it first" if away else None
-    distance_m = state.distance_m(subject.thing)
-    if distance_m is None or distance_m <= SURELY_AWAY_M:
+        spot = (sites[place].pose.x_m, sites[place].pose.y_m) if place in sites else None
+    elif subject is not None and subject.thing is not None:
+        spot = subject.thing.xy_m
+    elif state.at in sites:
+        return f"the robot went to {state.at}; navigate_to it first"
+    if spot is None or state.spot is None:
         return None
-    return f"the {subject.words} is {distance_m:.1f} m away; navigate_to it first"
-
-
-def _is_before_place(state: State, place: str, world: World) -> Answer:
-    if state.at == place:
-        return MET
-    if place not in world.sites or state.spot is None:
-        return None
-    pose = world.sites[place].pose
-    distance_m = math.dist(state.spot, (pose.x_m, pose.y_m))
+    distance_m = math.dist(state.spot, spot)
     if distance_m <= SURELY_AWAY_M:
         return None
-    return f"the {place} is {distance_m:.1f} m away; navigate_to it first"
+    return f"the {what} is {distance_m:.1f} m away; navigate_to it first"
 
 
 def has_free_hand(state: State, setting: Setting) -> Answer:

@@ -3,7 +3,6 @@
 "Red cup" and "cup_1" are one thing, a subject.
 """
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -69,10 +68,6 @@ class State:
         """Return the state with some things no longer in the hands."""
         gone = tuple(given)
         return replace(self, held=tuple(one for one in self.held if one not in gone))
-
-    def distance_m(self, thing: Thing) -> float | None:
-        """Return about how far the robot is from a thing, None where that is not known."""
-        return None if self.spot is None else math.dist(self.spot, thing.xy_m)
 
 
 def state_of(world: World, scene: Snapshot | None, here: Pose | None) -> State:

@@ -65,7 +65,8 @@ _WORD: Final = re.compile(r"[a-z0-9_']+")
 _TO: Final = re.compile(r"^(?:(?:go |back |over )*(?:to|into|in|at|on|by) )?(?:(?:the|my|your) )?")
 _PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
 _NOT: Final = re.compile(
-    r"(?:no |any |either )*(?:but not|but|not|except|other than|(?:you can )?(?:leave|keep)|"
+    r"(?:no |any |either |the one )*(?:but not|but|not|except|other than|"
+    r"(?:that |which )?is(?:n't| not)|(?:you can )?(?:leave|keep)|"
     r"i (?:don't|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?"
 )
 _FROM_SIDE: Final = re.compile(
