@@ -68,7 +68,7 @@ class Steps:
     """Hold the words of a command, and make actions of the steps that answer it."""
 
     def __init__(self, command: Sequence[str], request: Request) -> None:
-        self._command = command
+        self.command = command
         self.request = request
 
     def skills(self, step: Step) -> list[Skill]:
@@ -87,14 +87,10 @@ class Steps:
         """Return whether the command has few words, and so one step."""
         return len(self.request.text.split()) <= MOST_WORDS_ALONE
 
-    def says(self, word: str) -> bool:
-        """Tell whether a word was said."""
-        return word in self._command
-
     def spoken(self, step: Step, field: str) -> str:
         """Return the words of a field, with the articles that were said among them."""
         words = step[field].split()
-        span = find_span(words, self._command)
+        span = find_span(words, self.command)
         text = " ".join(words if span is None else span.spoken)
         text = _BESIDE.sub("", _POSSESSIVES.sub("the", text))
         return re.sub(
@@ -114,7 +110,7 @@ class Steps:
         place = match_place(where, world.places)
         if place is not None and not is_surface(place, world):
             there = f" in {where}"
-            if self._is_seen(step, there):
+            if all(is_seen(one + there, self.request) for one in self.parts(step)):
                 return [], there
             return [("navigate_to", {"place": place})], ""
         kinds = {SYNONYMS.get(word, word) for word in where.split()}
@@ -138,11 +134,6 @@ class Steps:
         second = self.spoken(step, "else") if "else" in step else ""
         is_second = bool(second) and not is_seen(first, self.request)
         return second if is_second and is_seen(second, self.request) else first
-
-    def _is_seen(self, step: Step, there: str) -> bool:
-        """Tell whether each thing of a step is known to be at a place."""
-        parts = self.parts(step)
-        return bool(parts) and all(is_seen(one + there, self.request) for one in parts)
 
     def _where_from(self, step: Step) -> str:
         """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""
@@ -221,7 +212,7 @@ def _put(spoken: Steps, step: Step) -> list[Skill]:
     if step.get("where") == "back":
         return way + [one for thing in things for one in put_back(thing, spoken.request)]
     if "where" not in step:
-        where = {"destination": STORE, "relation": "in"} if spoken.says("away") else {}
+        where = {"destination": STORE, "relation": "in"} if "away" in spoken.command else {}
     else:
         where = {"destination": spoken.spoken(step, "where")}
         where |= {} if relation == "to" else {"relation": RELATIONS.get(relation, relation)}

@@ -132,9 +132,8 @@ def is_not_held(state: State, setting: Setting) -> Answer:
     return f"a hand holds the {subject.words} itself"
 
 
-def can_be_gripped(state: State, setting: Setting) -> Answer:
+def can_be_gripped(_: State, setting: Setting) -> Answer:
     """Is the thing narrow enough, and at a height, for a hand that points down?"""
-    del state
     subject, opening_m = setting.subject("object"), setting.world.opening_max_m
     if subject is None or subject.thing is None or opening_m is None:
         return None
@@ -152,9 +151,8 @@ def can_be_gripped(state: State, setting: Setting) -> Answer:
     return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
 
 
-def is_light_enough(state: State, setting: Setting) -> Answer:
+def is_light_enough(_: State, setting: Setting) -> Answer:
     """Is the thing within what one hand may carry?"""
-    del state
     subject, limit_kg = setting.subject("object"), setting.world.bounds.payload_kg
     mass_kg = None if subject is None else subject.mass_kg
     if mass_kg is None or mass_kg <= limit_kg:
@@ -243,9 +241,8 @@ def _refusal(zone: KeepOutZone | None, what: str) -> Answer:
     return MET if zone is None else f"{what} is in the {zone.name}: {zone.reason}"
 
 
-def is_slow_enough(state: State, setting: Setting) -> Answer:
+def is_slow_enough(_: State, setting: Setting) -> Answer:
     """Is the speed within what the base may do?"""
-    del state
     speed_m_s, most_m_s = setting.parameters.get("speed_m_s"), setting.world.max_speed_m_s
     if speed_m_s is None or most_m_s is None:
         return MET
