@@ -60,7 +60,7 @@ _PUT: Final = "(?:put|place|set|lay|drop|leave|stick|pop)"
 _CARRY: Final = "(?:put|place|set|take|bring|carry|move|get)"
 _WAY: Final = "(?P<way>forwards?|ahead|straight ahead|backwards?|back)"
 _SIDE: Final = "(?P<way>left|right|around|round)"
-_LITTLE: Final = "(?P<by>a (?:little|bit|little bit)|slightly)"
+_LITTLE: Final = "(?:a (?:little|bit|little bit)|slightly)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,15 +86,13 @@ _ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
     (_MEDIUM, r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?", "go",
      {"where": "charging station"}),
     # --- go straight, turn
-    (_MEDIUM, rf"(?:move|drive|go|roll|come|step)(?: {_LITTLE})? {_WAY}"
-     rf"(?:(?: by| for)? (?P<by>{_METRES}))?", "move", {}),
+    (_MEDIUM, rf"(?:move|drive|go|roll|come|step)(?: (?P<by>{_LITTLE}))? {_WAY}"
+     rf"(?:(?: by| for)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
     (_MEDIUM, rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
-    (_MEDIUM, rf"(?:move|drive|go|come) {_WAY} {_LITTLE}", "move", {}),
-    (_MEDIUM, rf"(?:turn|rotate|spin)(?: {_LITTLE})?(?: to the)? {_SIDE}"
-     rf"(?:(?: by)? (?P<by>{_ANGLE}))?", "turn", {}),
+    (_MEDIUM, rf"(?:turn|rotate|spin)(?: (?P<by>{_LITTLE}))?(?: to the)? {_SIDE}"
+     rf"(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?", "turn", {}),
     (_MEDIUM, rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
      {}),
-    (_MEDIUM, rf"(?:turn|rotate)(?: to the)? {_SIDE} {_LITTLE}", "turn", {}),
     (_MEDIUM, rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
      rf"(?: to| into)? {_WHERE}", "go", {}),
     (_MEDIUM, "(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",

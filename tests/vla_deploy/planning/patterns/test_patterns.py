@@ -34,6 +34,8 @@ def does(text: str, *turns: Turn) -> str:
         ("come here", "navigate_to here"),
         ("dock", "navigate_to charging station"),
         ("move back a bit", "move -0.2"),
+        ("go a little forward", "move 0.2"),
+        ("turn right slightly", "turn -0.2617993877991494"),
         ("drive forward 50 cm", "move 0.5"),
         ("turn left 90 degrees", "turn 1.5707963267948966"),
         ("look up", "look_at up"),
