@@ -11,7 +11,7 @@ from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.follow_up import follow_up
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.table import PATTERNS, Pattern, is_place, is_thing
+from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, intent_of, is_place, is_thing
 from vla_deploy.planning.plan import Plan, Priority, Skill, chained
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
@@ -58,16 +58,17 @@ def pattern_plan(request: Request) -> Plan:
     if not said:
         raise Declined("no clause that a pattern covers")
     skills: list[Skill] = []
-    priorities: list[Priority] = []
+    intents: list[str] = []
     for clause in said:
-        pattern, step = _fitting(clause, request)
+        step = _fitting(clause, request)
         built = Steps(clause.split(), request).skills(step)
         skills += built
-        priorities += [pattern.priority] * len(built)
+        intents += [intent_of(step)] * len(built)
+    words = ", ".join(action_words(skill, parameters) for skill, parameters in skills)
     return Plan(
         goal=request.text.strip(),
-        summary=", ".join(action_words(skill, parameters) for skill, parameters in skills),
-        actions=chained(skills, priorities),
+        summary=f"{', '.join(dict.fromkeys(intents))}: {words}",
+        actions=chained(skills, [PRIORITIES.get(one, Priority.MEDIUM) for one in intents]),
     )
 
 
@@ -87,7 +88,7 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
         raise NotUnderstood(text) from error
 
 
-def _fitting(clause: str, request: Request) -> tuple[Pattern, Step]:
+def _fitting(clause: str, request: Request) -> Step:
     unknown: Step = {}
     for pattern in PATTERNS:
         found = pattern.pattern.fullmatch(clause)
@@ -95,7 +96,7 @@ def _fitting(clause: str, request: Request) -> tuple[Pattern, Step]:
             said = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
             step = {"do": pattern.do, **pattern.given, **said}
             if _are_known(said, request):
-                return pattern, step
+                return step
             unknown = unknown or step
     if "what" not in unknown and "where" in unknown and not scope_words(clause):
         raise UnknownPlace(unknown["where"], set(request.world.places.values()))

@@ -63,6 +63,28 @@ _SIDE: Final = "(?P<way>left|right|around|round)"
 _LITTLE: Final = "(?:a (?:little|bit|little bit)|slightly)"
 
 
+# What commands are for, by what their steps do or answer; where it is not listed, a question.
+_INTENTS: Final[Mapping[str, str]] = {
+    "stop": "stop",
+    **dict.fromkeys(("go", "move", "turn"), "navigation"),
+    **dict.fromkeys(("pick", "put", "bring", "give", "open", "close", "pose"), "manipulation"),
+    **dict.fromkeys(("find", "look"), "search"),
+    **dict.fromkeys(("say", "wait", "able", "ready", "thanks"), "assist"),
+    **dict.fromkeys(("tidy", "patrol"), "cleaning"),
+}
+# What is urgent comes first where the order is free.
+PRIORITIES: Final = {
+    "stop": Priority.HIGH,
+    "assist": Priority.HIGH,
+    "cleaning": Priority.LOW,
+}
+
+
+def intent_of(step: Mapping[str, str]) -> str:
+    """Return what a step is for."""
+    return _INTENTS.get(step.get("about", step["do"]), "question")
+
+
 @dataclass(frozen=True, slots=True)
 class Pattern:
     """Hold one row; a clause that fits `pattern` whole is a step to `do`, with `given` fields.
@@ -70,86 +92,83 @@ class Pattern:
     The named groups of `pattern` are the other fields.
     """
 
-    priority: Priority
     pattern: re.Pattern[str]
     do: str
     given: Mapping[str, str]
 
 
-_HIGH, _MEDIUM, _LOW = Priority.HIGH, Priority.MEDIUM, Priority.LOW
-# What is urgent comes first where the order is free.
-_ROWS: Final[tuple[tuple[Priority, str, str, Mapping[str, str]], ...]] = (
-    (_HIGH, "stop|halt|freeze|stand still", "stop", {}),
+_ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
+    ("stop|halt|freeze|stand still", "stop", {}),
     # --- go
-    (_MEDIUM, r"(?:go|drive|come) back|return", "go", {"where": "back"}),
-    (_MEDIUM, r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
-    (_MEDIUM, r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?", "go",
+    (r"(?:go|drive|come) back|return", "go", {"where": "back"}),
+    (r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
+    (r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?", "go",
      {"where": "charging station"}),
     # --- go straight, turn
-    (_MEDIUM, rf"(?:move|drive|go|roll|come|step)(?: (?P<by>{_LITTLE}))? {_WAY}"
+    (rf"(?:move|drive|go|roll|come|step)(?: (?P<by>{_LITTLE}))? {_WAY}"
      rf"(?:(?: by| for)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
-    (_MEDIUM, rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
-    (_MEDIUM, rf"(?:turn|rotate|spin)(?: (?P<by>{_LITTLE}))?(?: to the)? {_SIDE}"
+    (rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
+    (rf"(?:turn|rotate|spin)(?: (?P<by>{_LITTLE}))?(?: to the)? {_SIDE}"
      rf"(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?", "turn", {}),
-    (_MEDIUM, rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
+    (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
      {}),
-    (_MEDIUM, rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
+    (rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
      rf"(?: to| into)? {_WHERE}", "go", {}),
-    (_MEDIUM, "(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",
+    ("(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",
      "turn", {"by": "360 degrees"}),
     # --- look
-    (_MEDIUM, "look a?round|have a look a?round", "look", {"way": "around"}),
-    (_MEDIUM, r"look(?: to the| to your)? (?P<way>left|right|up|down|ahead|straight ahead)|"
+    ("look a?round|have a look a?round", "look", {"way": "around"}),
+    (r"look(?: to the| to your)? (?P<way>left|right|up|down|ahead|straight ahead)|"
      "look at the (?P<way>floor|ceiling)", "look", {}),
-    (_MEDIUM, rf"look at {_THING}", "look", {}),
-    (_MEDIUM, rf"(?:find|look for|search for|locate) {_THINGS}"
+    (rf"look at {_THING}", "look", {}),
+    (rf"(?:find|look for|search for|locate) {_THINGS}"
      rf"(?: in (?:the )?(?P<from>{WORDS}))?", "find", {}),
     # --- hands
-    (_MEDIUM, rf"open {_HAND}", "open", {}),
-    (_MEDIUM, rf"close {_HAND}", "close", {}),
-    (_MEDIUM, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose",
+    (rf"open {_HAND}", "open", {}),
+    (rf"close {_HAND}", "close", {}),
+    (r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose",
      {"name": "tuck"}),
-    (_MEDIUM, rf"(?:put|set) {_THING} down|put down {_THINGS}|drop {_THING}", "put", {}),
-    (_MEDIUM, rf"{_CARRY} {_THING} back(?: where it was)?", "put", {"where": "back"}),
-    (_MEDIUM, rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
-    (_MEDIUM, rf"{_PUT} {_THING} (?P<where>here|there|over there)", "put", {}),
-    (_MEDIUM, r"empty (?:both )?(?:your )?hands", "put", {"what": "everything you are holding"}),
-    (_MEDIUM, rf"empty {_HAND}", "put", {}),
+    (rf"(?:put|set) {_THING} down|put down {_THINGS}|drop {_THING}", "put", {}),
+    (rf"{_CARRY} {_THING} back(?: where it was)?", "put", {"where": "back"}),
+    (rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
+    (rf"{_PUT} {_THING} (?P<where>here|there|over there)", "put", {}),
+    (r"empty (?:both )?(?:your )?hands", "put", {"what": "everything you are holding"}),
+    (rf"empty {_HAND}", "put", {}),
     # --- give, bring
-    (_MEDIUM, rf"(?:give|hand|pass|bring|fetch|get) (?:me|us) {_THINGS}", "bring", {}),
-    (_MEDIUM, rf"(?:give|hand|pass) {_THINGS} to me|hand over {_THINGS}|hand {_THING} over",
+    (rf"(?:give|hand|pass|bring|fetch|get) (?:me|us) {_THINGS}", "bring", {}),
+    (rf"(?:give|hand|pass) {_THINGS} to me|hand over {_THINGS}|hand {_THING} over",
      "bring", {}),
-    (_MEDIUM, rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|"
+    (rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|"
      rf"(?:fetch|bring) {_THINGS}|(?:can|could|may) i have {_THINGS}", "bring", {}),
-    (_MEDIUM, r"let go(?: of (?:it|that|them))?|release (?:it|that|them)", "give", {}),
+    (r"let go(?: of (?:it|that|them))?|release (?:it|that|them)", "give", {}),
     # --- put, take
-    (_MEDIUM, rf"{_PUT} {_MOVED}(?: down)? {_INTO} {_WHERE}", "put", {}),
+    (rf"{_PUT} {_MOVED}(?: down)? {_INTO} {_WHERE}", "put", {}),
     # What is taken "beside the ball" or "on the table" stands there.
-    (_MEDIUM, rf"{_CARRY} {_MOVED} (?P<how>to|into|onto) {_WHERE}", "put", {}),
-    (_MEDIUM, rf"{_TAKE} {_THINGS}{_WITH}|(?:pick|lift) {_THINGS} up", "pick", {}),
+    (rf"{_CARRY} {_MOVED} (?P<how>to|into|onto) {_WHERE}", "put", {}),
+    (rf"{_TAKE} {_THINGS}{_WITH}|(?:pick|lift) {_THINGS} up", "pick", {}),
     # --- tidy
-    (_LOW, r"(?:clean|tidy|clear)(?: up)?", "tidy", {}),
-    (_LOW, rf"(?:clean|tidy|clear)(?: up| off)? {_WHERE}", "tidy", {}),
-    (_LOW, rf"(?:patrol|inspect) {_WHERE}", "patrol", {}),
+    (r"(?:clean|tidy|clear)(?: up)?", "tidy", {}),
+    (rf"(?:clean|tidy|clear)(?: up| off)? {_WHERE}", "tidy", {}),
+    (rf"(?:patrol|inspect) {_WHERE}", "patrol", {}),
     # --- say, wait, answer
-    (_HIGH, r"(?:say|announce) (?P<text>[^,;:]+)|"
+    (r"(?:say|announce) (?P<text>[^,;:]+)|"
      r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", "say", {}),
-    (_HIGH, rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
-    (_HIGH, r"(?:many )?thanks(?: a lot| so much)?|thank you(?: very much| so much)?|"
+    (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
+    (r"(?:many )?thanks(?: a lot| so much)?|thank you(?: very much| so much)?|"
      r"good (?:job|robot)", "ask", {"about": "thanks"}),
-    (_HIGH, r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
+    (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
      {"about": "ready"}),
-    (_MEDIUM, r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
+    (r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
      r"(?:how is|what is|how's) your battery(?: level)?", "ask", {"about": "battery"}),
-    (_HIGH, r"help(?: me)?|what can you do|who are you|what are you", "ask", {"about": "able"}),
-    (_MEDIUM, rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
+    (r"help(?: me)?|what can you do|who are you|what are you", "ask", {"about": "able"}),
+    (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
      rf"where did i (?:leave|put) {_THING}", "where", {}),
-    (_MEDIUM, rf"what (?:do|can) you see|what is there|what(?:'s| is) on (?:the )?{_WHERE}", "ask",
+    (rf"what (?:do|can) you see|what is there|what(?:'s| is) on (?:the )?{_WHERE}", "ask",
      {"about": "seeing"}),
-    (_MEDIUM, r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",
+    (r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",
      {"about": "holding"}),
-    (_MEDIUM, "where are you", "ask", {"about": "place"}),
-    (_MEDIUM, rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask",
+    ("where are you", "ask", {"about": "place"}),
+    (rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask",
      {"about": "whether"}),
 )  # fmt: skip
 
@@ -165,9 +184,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(re.sub(r"\(\?P<([a-z]+)>", numbered, pattern))
 
 
-PATTERNS: Final = tuple(
-    Pattern(priority, _compiled(pattern), do, given) for priority, pattern, do, given in _ROWS
-)
+PATTERNS: Final = tuple(Pattern(_compiled(pattern), do, given) for pattern, do, given in _ROWS)
 
 
 def is_place(text: str, places: Mapping[str, str]) -> bool:

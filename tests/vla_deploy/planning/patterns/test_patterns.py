@@ -98,6 +98,18 @@ def test_a_place_that_nobody_knows_is_named() -> None:
         pattern_plan(request_for("go to narnia"))
 
 
+@pytest.mark.parametrize(
+    ("text", "intents"),
+    [
+        ("stop", "stop"), ("go to the kitchen", "navigation"), ("find my keys", "search"),
+        ("pick up the cup and go to the kitchen", "manipulation, navigation"),
+        ("tidy up", "cleaning"), ("where are you", "question"), ("help me", "assist"),
+    ],
+)  # fmt: skip
+def test_a_plan_says_what_it_is_for(text: str, intents: str) -> None:
+    assert pattern_plan(request_for(text)).summary.startswith(f"{intents}: ")
+
+
 def test_again_does_what_was_done_last() -> None:
     plan = pattern_plan(request_for("turn left 30 degrees"))
     last = Turn(said="turn left 30 degrees", plan=plan)
