@@ -4,8 +4,7 @@ Two back ends say the same in other steps: one looks for a thing that is in sigh
 to it. What leads up to taking and putting a thing is left out, and so is what moves nothing.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
@@ -13,8 +12,7 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Plan, execution_order
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.symbolic.simulation import end_state
-from vla_deploy.planning.symbolic.subjects import subject_of
-from vla_deploy.world.thing import Rest
+from vla_deploy.planning.symbolic.state import subject_of
 
 _HANDLING: Final = frozenset({"pick_up", "place"})
 _LEADING_UP: Final = frozenset({"find_object", "navigate_to"})
@@ -28,20 +26,6 @@ _HOW: Final = frozenset(
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Effects:
-    """Hold what a plan moves.
-
-    `taken` are the things that a hand takes, `rests` what they are put on or in, `held` what the
-    hands hold in the end, `ways` everything else that the robot does, in its order.
-    """
-
-    taken: frozenset[str]
-    rests: Mapping[str, Rest]
-    held: frozenset[str]
-    ways: tuple[str, ...]
-
-
 def move_the_same(one: Plan, other: Plan, request: Request) -> bool:
     """Return whether two plans move the same things to the same places, and the robot alike.
 
@@ -50,15 +34,16 @@ def move_the_same(one: Plan, other: Plan, request: Request) -> bool:
     return _effects(one, request) == _effects(other, request)
 
 
-def _effects(plan: Plan, request: Request) -> _Effects:
+def _effects(plan: Plan, request: Request) -> tuple[object, ...]:
+    """Return what a hand takes, where that rests and what is held in the end, and all else done."""
     actions = execution_order(plan.actions)
     state = end_state(actions, request.world, request.scene, request.here)
     taken = (one.parameters["object"] for one in actions if one.skill == "pick_up")
-    return _Effects(
-        taken=frozenset(subject_of(str(name), request.scene).key for name in taken),
-        rests=dict(state.rests),
-        held=frozenset(held.key for held in state.held),
-        ways=tuple(_ways(actions, request)),
+    return (
+        {subject_of(str(name), request.scene).key for name in taken},
+        dict(state.rests),
+        {held.key for held in state.held},
+        list(_ways(actions, request)),
     )
 
 

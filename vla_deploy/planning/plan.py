@@ -1,6 +1,6 @@
 """Define the one canonical plan that every planner emits and the executor runs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Final
@@ -12,6 +12,10 @@ MOST_CHARACTERS: Final = 1000
 MOST_ACTIONS: Final = 100
 PUT_IN: Final = "put in"
 """What the description of an action says that its author did not ask for."""
+
+
+Skill = tuple[str, Mapping[str, Any]]
+"""The name of a skill, and its parameters."""
 
 
 class Priority(StrEnum):
@@ -114,3 +118,20 @@ def execution_order(actions: Sequence[Action]) -> list[Action]:
         finished.add(chosen.id)
         ordered.append(chosen)
     return ordered
+
+
+def chained(
+    skills: Sequence[Skill], priorities: Sequence[Priority] | None = None
+) -> tuple[Action, ...]:
+    """Return the actions of skills, one after the other; each of medium priority by default."""
+    ranks = priorities or [Priority.MEDIUM] * len(skills)
+    return tuple(
+        Action(
+            id=f"a{number}",
+            skill=skill,
+            parameters=dict(parameters),
+            depends_on=(f"a{number - 1}",) if number > 1 else (),
+            priority=rank,
+        )
+        for number, ((skill, parameters), rank) in enumerate(zip(skills, ranks, strict=True), 1)
+    )

@@ -18,11 +18,11 @@ from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
-from vla_deploy.planning.patterns.slots import THING, WORDS
+from vla_deploy.planning.patterns.table import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot

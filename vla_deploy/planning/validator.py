@@ -16,8 +16,8 @@ from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
 from vla_deploy.planning.references import match_place, parse_object
-from vla_deploy.planning.symbolic import bounds_faults, symbolic_faults
 from vla_deploy.planning.symbolic.sharing import sharing_faults
+from vla_deploy.planning.symbolic.simulation import bounds_faults, symbolic_faults
 from vla_deploy.planning.symbolic.state import Pose
 from vla_deploy.world import Snapshot
 

@@ -11,7 +11,7 @@ from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.plan import Action, Plan, execution_order
-from vla_deploy.planning.recovery import FailureCause
+from vla_deploy.planning.recovery.setback import FailureCause
 from vla_deploy.planning.symbolic.state import State
 from vla_deploy.skills.context import Rest, Skill, SkillContext
 from vla_deploy.skills.errors import (

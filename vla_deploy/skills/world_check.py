@@ -14,9 +14,9 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import ObjectQuery, parse_object
-from vla_deploy.planning.symbolic import LOGIC, state_of
 from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
-from vla_deploy.planning.symbolic.state import Pose, State
+from vla_deploy.planning.symbolic.state import Pose, State, state_of
+from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.world.footprint import gap_m

@@ -1,55 +1,35 @@
 """Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
 
 import math
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Final
 
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words
-from vla_deploy.planning.builders.steps import Groups, Step, find
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.planning.understanding.questions import did_you_mean
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
 
+Fields = Mapping[str, str]
 MOST_TOLD = 6
-_IN_ROOM = re.compile(r"\bin (?:the )?(.+)$")
+READY = "I am ready for a command."
 ABILITIES = (
     "I can go to places, look for things, pick them up, put them in the box or on a table, "
     "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
 )
 
 
-def tell_welcome(_: Groups, __: Request) -> list[Step]:
-    """Answer thanks and praise."""
-    return _say("You are welcome.")
-
-
-def tell_ready(_: Groups, __: Request) -> list[Step]:
-    """Answer who asks how the robot is: one that may not move refuses every plan before."""
-    return _say("I am ready for a command.")
-
-
-def tell_battery(_: Groups, __: Request) -> list[Step]:
-    """Say that no board or drive measures the charge."""
-    return _say("I cannot measure how full my battery is.")
-
-
-def tell_abilities(_: Groups, __: Request) -> list[Step]:
-    """Say what the robot can do."""
-    return _say(ABILITIES)
-
-
-def tell_sight(groups: Groups, request: Request) -> list[Step]:
+def _tell_sight(fields: Fields, request: Request) -> list[Skill]:
     """Say what is known, on a piece of furniture if one is named."""
     things = [] if request.scene is None else list(request.scene.things)
     where = ""
-    place = match_place(groups.get("place", ""), request.world.places)
+    place = match_place(fields.get("where", ""), request.world.places)
     if place is not None:
         things = [one for one in things if one.rests is not None and one.rests.of == place]
         where = f" on the {place.replace('_', ' ')}"
@@ -58,7 +38,7 @@ def tell_sight(groups: Groups, request: Request) -> list[Step]:
     return _say(f"I see {listed(things)}{where}.")
 
 
-def tell_hands(_: Groups, request: Request) -> list[Step]:
+def _tell_hands(_: Fields, request: Request) -> list[Skill]:
     """Say what the hands hold."""
     held = {one.held_by: str(one) for one in (request.scene.things if request.scene else ())}
     full = [
@@ -69,7 +49,7 @@ def tell_hands(_: Groups, request: Request) -> list[Step]:
     return _say(f"I hold {_and(full)}." if full else "My hands are empty.")
 
 
-def tell_place(_: Groups, request: Request) -> list[Step]:
+def _tell_place(_: Fields, request: Request) -> list[Skill]:
     """Say near which place the robot is."""
     here = request.here
     if here is None or not request.world.sites:
@@ -79,31 +59,19 @@ def tell_place(_: Groups, request: Request) -> list[Step]:
     return _say(f"I am near the {nearest.name.replace('_', ' ')}.")
 
 
-def tell_or_find(groups: Groups, request: Request) -> list[Step]:
+def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
     """Say where a thing is if that is known, else where it was, and look for it."""
-    found = _known(groups["object"], request)
+    found = _known(fields["what"], request)
     if not found or request.scene is None:
-        return [*_remembered(groups["object"], request), *find(groups, request)]
+        look: Skill = ("find_object", {"object": fields["what"]})
+        return [*_remembered(fields["what"], request), look]
     return _say(_places_of(found, request))
 
 
-def tell_whether(groups: Groups, request: Request) -> list[Step]:
+def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
     """Say whether a thing is in sight."""
-    found = _known(groups["object"], request)
-    unsure = "" if found else _of_room(groups["object"], request)
-    if unsure:
-        elsewhere = _known(_IN_ROOM.sub("", groups["object"]), request)
-        return _say(_places_of(elsewhere, request) or unsure)
-    if not found:
-        return _say("No, I do not see that.")
-    return _say(f"Yes, I see {listed(found)}.")
-
-
-def tell_number(groups: Groups, request: Request) -> list[Step]:
-    """Say how many such things are known."""
-    count = len(_known(groups["object"], request))
-    unsure = "" if count else _of_room(groups["object"], request)
-    return _say(unsure or f"I see {count or 'none'}.")
+    found = _known(fields["what"], request)
+    return _say(f"Yes, I see {listed(found)}." if found else "No, I do not see that.")
 
 
 def listed(things: Sequence[Thing]) -> str:
@@ -131,17 +99,7 @@ def _known(text: str, request: Request) -> list[Thing]:
     return fitting(read, Use.SEE, setting)
 
 
-def _of_room(text: str, request: Request) -> str:
-    """Say that nobody knows all that is in a room, if words are about one, else ""."""
-    found = _IN_ROOM.search(text)
-    room = match_place(found[1], request.world.places) if found else None
-    if room is None or is_surface(room, request.world):
-        return ""
-    where = room.replace("_", " ")
-    return f"I know what I see on furniture, not all that is in the {where}; ask me to look there."
-
-
-def _remembered(text: str, request: Request) -> list[Step]:
+def _remembered(text: str, request: Request) -> list[Skill]:
     """Say where such a thing was in earlier runs, if that is remembered."""
     query = read_expression(text, Setting(request).furniture).query
     for seen in request.last_seen:
@@ -176,5 +134,30 @@ def _and(words: Iterable[str]) -> str:
     return " and ".join(part for part in (start, *listed_words[-1:]) if part)
 
 
-def _say(text: str) -> list[Step]:
+def _say(text: str) -> list[Skill]:
     return [("speak", {"text": text[:500]})]
+
+
+def _tell_doing(_: Fields, request: Request) -> list[Skill]:
+    turns = request.conversation.turns
+    return _say(f"The last that I was told is: {turns[-1].said}." if turns else READY)
+
+
+def _told(text: str) -> Callable[[Fields, Request], list[Skill]]:
+    return lambda _fields, _request: _say(text)
+
+
+ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
+    "holding": _tell_hands,
+    "seeing": _tell_sight,
+    "place": _tell_place,
+    "whether": _tell_whether,
+    "doing": _tell_doing,
+    "able": _told(ABILITIES),
+    # One that may not move refuses every plan before.
+    "ready": _told(READY),
+    "thanks": _told("You are welcome."),
+    # No board or drive measures the charge.
+    "battery": _told("I cannot measure how full my battery is."),
+}
+"""What each subject of a question is answered by."""

@@ -1,141 +1,162 @@
-"""Build the steps of each kind of clause; what they refer to stays in the speaker's words.
+"""Build actions of the steps that a pattern, or the command parser, has made of a command.
 
-Grounding resolves the words and puts in the way there, so a step says only what is wanted.
+A step is what to `do`, with fields in the speaker's words (`command_parser.grammar`). What they
+refer to stays in these words: grounding resolves it and puts in ways, searches and free hands, for
+every planner alike (`vla_deploy.planning.understanding`).
 """
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
+from vla_deploy.planning.builders import answering
+from vla_deploy.planning.builders.putting_back import put_back
+from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
 from vla_deploy.planning.catalogue import ARMS
-from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.wording import find_span
+from vla_deploy.planning.errors import (
+    CannotBeDone,
+    Declined,
+    PlanInvalid,
+    UnknownObject,
+    UnknownPlace,
+)
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.plan import Action, Priority
-from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.plan import Skill
+from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.places import is_like_place
-from vla_deploy.planning.understanding.quantities import quantity_of
+from vla_deploy.planning.understanding.furniture import is_surface
+from vla_deploy.planning.understanding.normaliser import RELATIONS
+from vla_deploy.planning.understanding.quantities import (
+    UNITS,
+    amount_of,
+    amount_words,
+    is_silent,
+    quantity_words,
+)
 from vla_deploy.planning.understanding.referring import pose_parameters
 from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
-Groups = Mapping[str, str]
-Step = tuple[str, dict[str, Any]]
-Builder = Callable[[Groups, Request], list[Step]]
-
-SLOW_RATIO: Final = 0.4
+DEFAULT_MOVE_M: Final = 0.5
+DEFAULT_TURN_RAD: Final = math.pi / 2
+DEFAULT_WAIT_S: Final = 5.0
 # "Go back" alone is about the command before; in a longer one it is about where that began.
 MOST_WORDS_ALONE: Final = 4
+_SPEAKERS: Final = frozenset({"me", "us", "here", "over here"})
+# What poses are called besides their names in robot files.
+_POSES: Final[Mapping[str, str]] = {
+    "tucked": "tuck", "fold": "tuck", "folded": "tuck", "stow": "tuck", "stowed": "tuck",
+    "pull": "tuck", "carry": "tuck", "driving": "tuck", "travel": "tuck", "safe": "tuck",
+    "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
+}  # fmt: skip
+_CAN_PUT: Final = frozenset((*RELATIONS, *RELATIONS.values()))
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
-PUT_GROUPS: Final = ("object", "relation", "destination")
-BESIDE_WORDS: Final = ("next to", "beside", "alongside", "close to", "near")
-BESIDE: Final = "|".join(BESIDE_WORDS)
-WAYS: Final = "back|over|up|down|through|across|along|round|out"
-_PUT_RELATION: Final = re.compile(
-    rf"(?:^| )(?:(?:{WAYS}) )?"
-    r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
-)
-_PUT_BESIDE: Final = re.compile(rf"{_PUT_RELATION.pattern}|(?:^| )(?:{BESIDE}) ")
-# "On the table next to the book": there the book is.
-_BESIDE_THERE: Final = re.compile(
-    rf"(?P<moved>.+?) (?P<there>(?:on|onto|in) .+?) (?P<how>{BESIDE}) (?P<other>.+)"
-)
-NO_THING: Final = re.compile(
-    r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
-    r"furthest|nearest|closest|not|lying|standing|sitting|resting)$"
-)
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
+_POSSESSIVES: Final = re.compile(r"\b(?:his|her|their|its)\b")
+# What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
+_BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
+Handler = Callable[["Steps", Step], list[Skill]]
 
 
-def chained(
-    steps: Sequence[Step], priorities: Sequence[Priority] | None = None
-) -> tuple[Action, ...]:
-    """Return the actions of steps, one after the other; each of medium priority by default."""
-    ranks = priorities or [Priority.MEDIUM] * len(steps)
-    return tuple(
-        Action(
-            id=f"a{number}",
-            skill=skill,
-            parameters=dict(parameters),
-            depends_on=(f"a{number - 1}",) if number > 1 else (),
-            priority=rank,
+class Steps:
+    """Hold the words of a command, and make actions of the steps that answer it."""
+
+    def __init__(self, command: Sequence[str], request: Request) -> None:
+        self.command = command
+        self.request = request
+
+    def skills(self, step: Step) -> list[Skill]:
+        """Return the skills of a step with their parameters, one after the other.
+
+        Raises:
+            Declined: it is no command.
+            CannotBeDone: no skill does what it asks for.
+            UnknownPlace: it goes to a person, or back to where nobody knows.
+            PlanInvalid: an amount is none.
+        """
+        return _HANDLERS[step["do"]](self, step)
+
+    @property
+    def is_alone(self) -> bool:
+        """Return whether the command has few words, and so one step."""
+        return len(self.request.text.split()) <= MOST_WORDS_ALONE
+
+    def spoken(self, step: Step, field: str) -> str:
+        """Return the words of a field, with the articles that were said among them."""
+        words = step[field].split()
+        span = find_span(words, self.command)
+        text = " ".join(words if span is None else span.spoken)
+        text = _BESIDE.sub("", _POSSESSIVES.sub("the", text))
+        return re.sub(
+            r"\b(on|to|at|in) (left|right|middle|back|front)\b(?! of)", r"\1 the \2", text
         )
-        for number, ((skill, parameters), rank) in enumerate(zip(steps, ranks, strict=True), 1)
-    )
 
+    def fields(self, step: Step, *names: str) -> dict[str, str]:
+        """Return the words of those of some fields that a step has."""
+        return {name: self.spoken(step, name) for name in names if name in step}
 
-def parts_of(text: str) -> list[str]:
-    """Return the things of "the cup, the ball and the book"."""
-    return [part for part in _AND.split(text) if part]
+    def source(self, step: Step) -> tuple[list[Skill], str]:
+        """Return the way to the room where things are, or words that say what they are on or in."""
+        where = self._where_from(step)
+        if not where:
+            return [], ""
+        world = self.request.world
+        place = match_place(where, world.places)
+        if place is not None and not is_surface(place, world):
+            there = f" in {where}"
+            if all(is_seen(one + there, self.request) for one in self.parts(step)):
+                return [], there
+            return [("navigate_to", {"place": place})], ""
+        kinds = {SYNONYMS.get(word, word) for word in where.split()}
+        return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"
 
+    def things(self, step: Step) -> tuple[list[Skill], list[str]]:
+        """Return the way to what a step is about, and that, with where it is to be taken from."""
+        way, behind = self.source(step)
+        return way, [part + behind for part in self.parts(step)]
 
-def held_kinds(request: Request) -> list[str]:
-    """Return the kind of what each full hand holds."""
-    return [kind for kind in request.world.holding.values() if kind]
+    def parts(self, step: Step) -> list[str]:
+        """Return each thing that a step is about, without where it is to be taken from."""
+        spoken, _, _ = self._chosen(step).partition(" from ")
+        if "except" in step:
+            return [f"{spoken} but {self.spoken(step, 'except')}"]
+        return _parts_of(spoken)
 
+    def _chosen(self, step: Step) -> str:
+        """Return what a step is about: of two choices the second where only that is seen."""
+        first = self.spoken(step, "what")
+        second = self.spoken(step, "else") if "else" in step else ""
+        is_second = bool(second) and not is_seen(first, self.request)
+        return second if is_second and is_seen(second, self.request) else first
 
-def go(groups: Groups, request: Request) -> list[Step]:
-    """Drive to each place or thing in turn; "near the box" is where the box can be reached."""
-    named = (_NEAR.sub("", part) for part in parts_of(groups["place"]))
-    speed = speed_in(groups, request)
-    return [("navigate_to", {"place": part, **speed}) for part in named]
+    def _where_from(self, step: Step) -> str:
+        """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""
+        if "from" in step:
+            return self.spoken(step, "from")
+        return self.spoken(step, "what").partition(" from ")[2] if "what" in step else ""
 
+    def amount(self, step: Step, dimension: str, default: float) -> float:
+        """Return the amount of a step in SI units; a bare number is one of degrees, not radians.
 
-def approach(groups: Groups, request: Request) -> list[Step]:
-    """Drive to where a thing can be reached."""
-    return go({"place": groups["object"]}, request)
-
-
-def dock(_: Groups, __: Request) -> list[Step]:
-    """Drive to where the battery is charged."""
-    return [("navigate_to", {"place": "charging station"})]
-
-
-def come(_: Groups, __: Request) -> list[Step]:
-    """Drive to where the command was given."""
-    return [("navigate_to", {"place": "here"})]
-
-
-def go_back(_: Groups, request: Request) -> list[Step]:
-    """Return to where the command was given, or, as a command of its own, the one before it."""
-    if len(words_of(request.text)) > MOST_WORDS_ALONE:
-        return [("navigate_to", {"place": "here"})]
-    before = [one.here for one in request.conversation.turns if one.here is not None]
-    if not before:
-        raise NotUnderstood(request.text)
-    return [("navigate_to", pose_parameters(before[-1]))]
-
-
-def pick(groups: Groups, _: Request) -> list[Step]:
-    """Take each thing."""
-    arm = arm_in(groups)
-    return [("pick_up", {"object": part, **arm}) for part in parts_of(groups["object"])]
-
-
-def split_put(groups: Groups, request: Request) -> tuple[str, str, str]:
-    """Return what is put, how, and where to: "the cup on the table | into | the box".
-
-    Of several ways to read it the last is meant of which both sides are known.
-    """
-    text = " ".join(groups[name] for name in PUT_GROUPS)
-    beside = groups["relation"] in BESIDE_WORDS
-    ways = [
-        (text[: found.start()].strip(), found[0].strip(), text[found.end() :].strip())
-        for found in (_PUT_BESIDE if beside else _PUT_RELATION).finditer(text)
-        if text[: found.start()].strip() and text[found.end() :].strip()
-    ]
-    if beside and (told := _BESIDE_THERE.fullmatch(text)):
-        there = f"{told['other']} {told['there']}"
-        ways.append((told["moved"], told["how"], re.sub(r" (?:on|in)to ", " on ", there)))
-    known = [
-        way
-        for way in ways
-        if all(is_one(part, request) for part in parts_of(way[0])) and is_one(way[2], request)
-    ]
-    seen = [way for way in known if all(is_seen(part, request) for part in parts_of(way[0]))]
-    return (seen or known or ways[:1] or [(text, "on", "")])[-1]
+        Raises:
+            PlanInvalid: its words are no amount.
+        """
+        words = quantity_words(step["by"]) if "by" in step else []
+        units = UNITS[dimension]
+        bare = units["degree"] if dimension == "rad" else 1.0
+        # More may have been copied than the amount.
+        for told in (words, amount_words(words, units)):
+            if told and (value := amount_of(told, units, bare)) is not None:
+                return value
+        if is_silent(words):
+            return default
+        raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
 
 
 def is_seen(text: str, request: Request) -> bool:
@@ -148,122 +169,186 @@ def is_seen(text: str, request: Request) -> bool:
     return bool(read.pronoun or fitting(read, Use.PUT, setting))
 
 
-def is_one(text: str, request: Request) -> bool:
-    """Tell whether a text is the name of a place or refers to things that the robot can know.
+def way_back(request: Request) -> Skill:
+    """Return the way to where the robot stood when it got the command before.
 
-    A side alone is neither, nor is what breaks off: "the cup that is".
+    Raises:
+        UnknownPlace: there is none before.
     """
-    if NO_THING.search(text):
-        return False
-    if is_like_place(_NEAR.sub("", text), request.world.places):
-        return True
-    try:
-        read_expression(_NEAR.sub("", text), Setting(request).furniture)
-    except UnknownObject:
-        return False
-    return True
+    poses = [one.here for one in request.conversation.turns if one.here is not None]
+    if not poses:
+        raise UnknownPlace("back", set(request.world.places.values()))
+    return "navigate_to", pose_parameters(poses[-1])
 
 
-def bring(groups: Groups, request: Request) -> list[Step]:
-    """Fetch each thing and give it to who asked."""
-    return handed_over(parts_of(groups["object"]), request)
+def _parts_of(text: str) -> list[str]:
+    """Return the things of "the cup, the ball and the book"."""
+    return [part for part in _AND.split(text) if part]
 
 
-def handed_over(things: Sequence[str], request: Request) -> list[Step]:
+def _go(spoken: Steps, step: Step) -> list[Skill]:
+    if "else" in step:
+        raise CannotBeDone("every place that I know is there: say to which one I shall go")
+    where = step["where"]
+    if where == "back" and spoken.is_alone:
+        return [way_back(spoken.request)]
+    if where == "back" or where in _SPEAKERS:
+        return [("navigate_to", {"place": "here"})]
+    places = re.sub(r" with (?:it|them|that|this)$", "", spoken.spoken(step, "where"))
+    return [("navigate_to", {"place": _NEAR.sub("", one)}) for one in _parts_of(places)]
+
+
+def _pick(spoken: Steps, step: Step) -> list[Skill]:
+    way, things = spoken.things(step)
+    return way + [("pick_up", {"object": one, **_arm(step)}) for one in things]
+
+
+def _put(spoken: Steps, step: Step) -> list[Skill]:
+    relation = step.get("how", "to")
+    if relation not in _CAN_PUT:
+        raise CannotBeDone(f"I can put things in, on or next to something, not {relation} it")
+    way, things = spoken.things(step) if "what" in step else ([], [""])
+    arm = _arm(step)
+    if step.get("where") == "back":
+        return way + [one for thing in things for one in put_back(thing, spoken.request)]
+    if "where" not in step:
+        where = {"destination": STORE, "relation": "in"} if "away" in spoken.command else {}
+    else:
+        where = {"destination": spoken.spoken(step, "where")}
+        where |= {} if relation == "to" else {"relation": RELATIONS.get(relation, relation)}
+        bare = match_place(where["destination"], spoken.request.world.places)
+        if relation == "to" and bare and bare not in spoken.request.world.furniture:
+            return way + _carried(things, where["destination"])
+    return way + [("place", {**({"object": one} if one else {}), **where, **arm}) for one in things]
+
+
+def _carried(things: Sequence[str], place: str) -> list[Skill]:
+    """Return the steps that take things to a place where nothing can be put down."""
+    go: Skill = ("navigate_to", {"place": place})
+    return [skill for one in things for skill in (("pick_up", {"object": one}), go)]
+
+
+def _bring(spoken: Steps, step: Step) -> list[Skill]:
+    """Give each thing to who speaks, or take it to a place, where it is put down on what is there.
+
+    Raises:
+        UnknownPlace: it is to go to a person, of whom nobody knows where they are.
+    """
+    way, things = spoken.things(step)
+    if step.get("to", "me") in _SPEAKERS:
+        return way + _handed_over(things, spoken.request)
+    to, world = spoken.spoken(step, "to"), spoken.request.world
+    place = match_place(to, world.places)
+    if place is None:
+        raise UnknownPlace(to, set(world.places.values()))
+    if place in world.furniture:
+        return way + [("place", {"object": one, "destination": to}) for one in things]
+    return way + _carried(things, to)
+
+
+def _handed_over(things: Sequence[str], request: Request) -> list[Skill]:
     """Return the steps that give things to who asked; grounding puts in the ways there and back.
 
     Two are fetched on one way, a hand each.
     """
-    give: list[Step] = [("hand_over", {"object": one}) for one in things]
+    give: list[Skill] = [("hand_over", {"object": one}) for one in things]
     if len(things) != len(ARMS) or request.here is None:
         return give
-    fetch: list[Step] = [("pick_up", {"object": one}) for one in things]
+    fetch: list[Skill] = [("pick_up", {"object": one}) for one in things]
     return [*fetch, ("navigate_to", {"place": "here"}), *give]
 
 
-def find(groups: Groups, _: Request) -> list[Step]:
-    """Look for each thing, first at a place if one is said."""
-    there: list[Step] = [("navigate_to", {"place": groups["place"]})] if "place" in groups else []
-    return there + [("find_object", {"object": part}) for part in parts_of(groups["object"])]
+def _find(spoken: Steps, step: Step) -> list[Skill]:
+    way, things = spoken.things(step)
+    return way + [("find_object", {"object": one}) for one in things]
 
 
-def look(groups: Groups, request: Request) -> list[Step]:
-    """Turn the head to a direction or a thing; "down at the table" is down."""
-    direction = _DIRECTIONS.get(re.sub(r"^(?:over )?(?:to )?(?:the |your )?", "", groups["what"]))
-    if direction is None and "side" in groups and match_place(groups["what"], _furniture(request)):
-        direction = _DIRECTIONS[groups["side"]]
-    if direction is not None:
-        return [("look_at", {"direction": direction})]
-    return [("look_at", {"object": groups["what"]})]
+def _see(spoken: Steps, step: Step) -> list[Skill]:
+    """Look for what must be there for the steps behind it, unless it is seen already."""
+    _, things = spoken.things(step)
+    return [] if all(is_seen(one, spoken.request) for one in things) else _find(spoken, step)
 
 
-def _furniture(request: Request) -> Mapping[str, str]:
-    """Return what furniture may be called, by its whole name or what kind of furniture it is."""
-    named = Setting(request).furniture
-    return {name.split()[-1]: place for name, place in named.items()} | named
+def _look(spoken: Steps, step: Step) -> list[Skill]:
+    if step.get("way") == "around":
+        return look_around()
+    if "way" in step:
+        return [("look_at", {"direction": step["way"]})]
+    if step.get("what", "me") in _SPEAKERS:
+        return [("look_at", {"direction": "ahead"})]
+    return [("look_at", {"object": spoken.spoken(step, "what")})]
 
 
-def look_around(groups: Groups, _: Request) -> list[Step]:
-    """Look to all sides, at a place if one is said."""
-    there: list[Step] = [("navigate_to", {"place": groups["place"]})] if "place" in groups else []
-    return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
+def _move(spoken: Steps, step: Step) -> list[Skill]:
+    sign = -1.0 if step["way"].startswith("back") else 1.0
+    return [("move", {"distance_m": sign * spoken.amount(step, "m", DEFAULT_MOVE_M)})]
 
 
-def gripper(groups: Groups, _: Request) -> list[Step]:
-    """Open or close a hand."""
-    verb = "close" if groups["verb"] in ("close", "shut") else "open"
-    return [(f"{verb}_gripper", arm_in(groups))]
+def _turn(spoken: Steps, step: Step) -> list[Skill]:
+    way = step.get("way", "left")
+    default = math.pi if way in ("around", "round") else DEFAULT_TURN_RAD
+    sign = -1.0 if way == "right" else 1.0
+    return [("turn", {"angle_rad": sign * spoken.amount(step, "rad", default)})]
 
 
-def tuck(groups: Groups, _: Request) -> list[Step]:
-    """Fold the arms in for driving."""
-    return [("move_arm", {"pose": "tuck", **arm_in(groups)})]
+def _arm(step: Step) -> dict[str, str]:
+    return {"arm": step["arm"]} if "arm" in step else {}
 
 
-def speak(groups: Groups, _: Request) -> list[Step]:
-    """Say something."""
-    return [("speak", {"text": groups["text"].strip("\"'")})]
+def _pose(_spoken: Steps, step: Step) -> list[Skill]:
+    name = _POSES.get(step["name"], step["name"].replace(" ", "_"))
+    return [("move_arm", {"pose": name, **_arm(step)})]
 
 
-def wait(groups: Groups, _: Request) -> list[Step]:
-    """Do nothing for a while."""
-    return [("wait", {"duration_s": quantity_in(groups, "s", 2.0)})]
+def _say(_spoken: Steps, step: Step) -> list[Skill]:
+    text = step["text"].strip("\"'")
+    return [("speak", {"text": f"{text[:1].upper()}{text[1:]}."})]
 
 
-def stop(_: Groups, __: Request) -> list[Step]:
-    """Come to rest."""
-    return [("stop", {})]
+def _answer(spoken: Steps, step: Step) -> list[Skill]:
+    tell = answering.ANSWERS[step["about"]]
+    return tell(spoken.fields(step, "what", "where"), spoken.request)
 
 
-def quantity_in(groups: Groups, dimension: str, default: float) -> float:
-    """Return how much was said, in SI units of a dimension.
+def _refused(error: type[Declined | CannotBeDone], why: str) -> Handler:
+    def handle(_spoken: Steps, _step: Step) -> list[Skill]:
+        raise error(why)
 
-    Raises:
-        NotUnderstood: that is no quantity.
-    """
-    if "quantity" not in groups:
-        return default
-    value = quantity_of(groups["quantity"], dimension)
-    if value is None:
-        raise NotUnderstood(groups["quantity"])
-    return value
+    return handle
 
 
-def speed_in(groups: Groups, request: Request) -> dict[str, Any]:
-    """Return how fast to drive, where it is said: "slowly", "at 0.2 m/s"."""
-    most_m_s = request.world.max_speed_m_s
-    if "speed" in groups:
-        return {"speed_m_s": quantity_of(groups["speed"], "m_s")}
-    return {"speed_m_s": SLOW_RATIO * most_m_s} if "pace" in groups and most_m_s else {}
-
-
-def arm_in(groups: Groups) -> dict[str, Any]:
-    """Return which hand to take, where it is said."""
-    return {"arm": groups["arm"]} if groups.get("arm") in ("left", "right") else {}
-
-
-_DIRECTIONS: Final = {
-    "ahead": "ahead", "forward": "ahead", "forwards": "ahead", "straight": "ahead",
-    "straight ahead": "ahead", "left": "left", "right": "right", "up": "up", "down": "down",
-    "ceiling": "up", "floor": "down", "ground": "down",
-}  # fmt: skip
+_HANDLERS: Final[Mapping[str, Handler]] = {
+    "go": _go,
+    "pick": _pick,
+    "put": _put,
+    "bring": _bring,
+    "give": lambda _spoken, _step: [("hand_over", {})],
+    "find": _find,
+    "see": _see,
+    "where": lambda spoken, step: answering.tell_or_find(
+        spoken.fields(step, "what"), spoken.request
+    ),
+    "look": _look,
+    "move": _move,
+    "turn": _turn,
+    "open": lambda _, step: [("open_gripper", _arm(step))],
+    "close": lambda _, step: [("close_gripper", _arm(step))],
+    "pose": _pose,
+    "say": _say,
+    "wait": lambda spoken, step: [
+        ("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})
+    ],
+    "stop": lambda _spoken, _step: [("stop", {})],
+    "ask": _answer,
+    "tidy": lambda spoken, step: tidy(spoken.fields(step, "where", "except"), spoken.request),
+    "patrol": lambda spoken, step: patrol(step["where"], spoken.request),
+    "await": lambda _spoken, _step: [],
+    "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),
+    "permit": _refused(CannotBeDone, "say by itself what I may do again"),
+    "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
+    "impossible": _refused(
+        CannotBeDone,
+        "none of my skills does that, but I can look for things, bring them and put them away",
+    ),
+    "unknown": _refused(Declined, "it is no command that I know"),
+}

@@ -1,20 +1,21 @@
 """Clean with what there is: put things away, and drive over the floor in rows."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
-from vla_deploy.planning.builders.placing import STORE
-from vla_deploy.planning.builders.steps import Groups, Step, look_around
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 
+STORE: Final = "box"
+"""What "put it away" means where nothing else is said."""
 MOST_THINGS: Final = 6
 EVERYWHERE: Final = frozenset({"", "up", "mess", "room", "place", "house", "flat", "home",
                                "everything", "things", "apartment", "here"})  # fmt: skip
@@ -24,18 +25,17 @@ ROW_M: Final = 0.5
 MOST_POINTS: Final = 20
 
 
-def tidy(groups: Groups, request: Request) -> list[Step]:
+def tidy(fields: Mapping[str, str], request: Request) -> list[Skill]:
     """Put away what lies on a piece of furniture, or everywhere; look first where none is known.
 
     What fits the words of "except" stays.
     """
-    stays = _fitting(groups["except"], request) if "except" in groups else []
-    lying = [one for one in _lying(groups.get("place", ""), request) if one not in stays]
+    stays = _fitting(fields["except"], request) if "except" in fields else []
+    lying = [one for one in _lying(fields.get("where", ""), request) if one not in stays]
     if not lying:
-        there = {"place": groups["place"]} if "place" in groups else {}
         said = "I know of nothing there to put away. I look around."
-        return [("speak", {"text": said}), *look_around(there, request)]
-    steps: list[Step] = []
+        return [("speak", {"text": said}), *look_around(fields.get("where"))]
+    steps: list[Skill] = []
     for thing in lying[:MOST_THINGS]:
         where = {"destination": STORE, "relation": "in"}
         steps.append(("place", {"object": thing.thing_id, **where}))
@@ -83,16 +83,22 @@ def surfaces_of(name: str, world: World) -> frozenset[str]:
     return frozenset({name, *(one for one, site in world.sites.items() if site.pose in views)})
 
 
-def patrol(groups: Groups, request: Request) -> list[Step]:
+def look_around(place: str | None = None) -> list[Skill]:
+    """Look to all sides, at a place if one is said."""
+    there: list[Skill] = [] if place is None else [("navigate_to", {"place": place})]
+    return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
+
+
+def patrol(place: str, request: Request) -> list[Skill]:
     """Drive over the free floor around a place in rows.
 
     Raises:
         NotAble: no map is at hand, or no floor is free there.
     """
-    name = match_place(groups["place"], request.world.places)
+    name = match_place(place, request.world.places)
     site = request.world.sites.get(name or "")
     if site is None:
-        raise NotAble(f'I do not know the area "{groups["place"]}"')
+        raise NotAble(f'I do not know the area "{place}"')
     if request.world.is_free is None:
         raise NotAble("without a map I cannot drive over an area")
     points = list(_rows(request, site.pose.x_m, site.pose.y_m))

@@ -1,16 +1,29 @@
 """Do what planning with any chat model has in common: read its answer, and propose the plan."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
-from vla_deploy.planning.chat_models.voting import PlanCandidate
 from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
+from vla_deploy.planning.plan import Plan
 
 SURE: Final = 0.75
 """A plan of which a model is less sure is read back before anything moves."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanCandidate:
+    """Hold a plan that may run, and how sure its model is of it, 0 to 1.
+
+    `plan` is as it was proposed, `checked` as it would run.
+    """
+
+    plan: Plan
+    checked: Plan
+    confidence: float
 
 
 class ChatBackEnd(BackEnd):

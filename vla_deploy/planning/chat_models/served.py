@@ -12,9 +12,9 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd
+from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd, PlanCandidate
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
-from vla_deploy.planning.chat_models.voting import PlanCandidate, elected
+from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, Check, Proposal, Request
 from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, chat_for, filled
@@ -87,7 +87,7 @@ class ServedModel(ChatBackEnd):
                 break
         if not found:
             raise failure
-        candidate, confidence = elected(found, asked, request.world.places)
+        candidate, confidence = elected(found, asked, request)
         # What was made of an image cannot be compared with later.
         return self.proposal(candidate, confidence, may_be_kept=self._image(request) is None)
 
@@ -128,3 +128,31 @@ def _refused(chat: Chat, answer: PlanAnswer, error: PlanningError) -> Chat:
     said = Message(role=Role.ASSISTANT, text=answer.model_dump_json())
     wish = Message(text=filled("refused", faults=one_line(error)[:_FAULT_CHARACTERS]))
     return replace(chat, messages=(*before, said, wish))
+
+
+# --- the vote -------------------------------------------------------------------------------------
+
+
+def elected(
+    candidates: Sequence[PlanCandidate], asked: int, request: Request
+) -> tuple[PlanCandidate, float]:
+    """Return the plan that most candidates share, and how sure the vote makes it.
+
+    Between equals the more feasible one is taken. `asked` is how many plans were asked for: one
+    that could not run votes for nothing. A single plan is as sure as its model is; else the rule of
+    succession holds: three of three give 0.8, two of three 0.6.
+    """
+    votes = [
+        sum(move_the_same(one.checked, other.checked, request) for other in candidates)
+        for one in candidates
+    ]
+    best = max(range(len(candidates)), key=lambda n: (votes[n], *_ease(candidates[n])))
+    confidence = candidates[best].confidence if asked == 1 else (votes[best] + 1) / (asked + 2)
+    return candidates[best], confidence
+
+
+def _ease(candidate: PlanCandidate) -> tuple[float, float, int]:
+    """Return how feasible a plan is: its weakest action, how sure its model is, how short it is."""
+    actions = candidate.checked.actions
+    weakest = min((one.feasibility_score for one in actions), default=0.0)
+    return (weakest, candidate.confidence, -len(actions))

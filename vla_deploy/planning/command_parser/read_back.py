@@ -5,32 +5,32 @@ from typing import Final
 
 from vla_deploy.planning.command_parser.grammar import Step
 
-# What is said of a step, with the words of its fields; one that it lacks is left out.
-_PATTERNS: Final[Mapping[str, tuple[str, ...]]] = {
-    "go": ("go to", "where"),
-    "pick": ("pick up", "what", "but not:except", "or else:else", "from:from", "with:arm"),
-    "put": ("put", "what", "but not:except", "or else:else", "from:from", "how", "where"),
-    "bring": ("bring", "what", "but not:except", "or else:else", "from:from", "to:to"),
+# What is said of a step: words, each before the field behind the colon, with which they are left
+# out where the step lacks it.
+_SAID: Final[Mapping[str, tuple[str, ...]]] = {
+    "go": ("go to", ":where"),
+    "pick": ("pick up", ":what", "but not:except", "or else:else", "from:from", "with:arm"),
+    "put": ("put", ":what", "but not:except", "or else:else", "from:from", ":how", ":where"),
+    "bring": ("bring", ":what", "but not:except", "or else:else", "from:from", "to:to"),
     "give": ("give you what I hold",),
-    "find": ("look for", "what", "or else:else", "at:from"),
-    "see": ("see whether there is", "what", "at:from", "and if so"),
+    "find": ("look for", ":what", "or else:else", "at:from"),
+    "see": ("see whether there is", ":what", "at:from", "and if so"),
     "await": ("begin now",),
-    "forbid": ("leave alone from now on", "what", "where"),
-    "permit": ("go back to using", "what", "where"),
-    "where": ("look for", "what"),
-    "look": ("look", "way", "at:what"),
-    "move": ("move", "way", "by"),
-    "turn": ("turn", "way", "by"),
-    "open": ("open my", "arm", ":hand"),
-    "close": ("close my", "arm", ":hand"),
-    "pose": ("bring my arms to", "name"),
-    "say": ("say", "text"),
-    "wait": ("wait", "by"),
+    "forbid": ("leave alone from now on", ":what", ":where"),
+    "permit": ("go back to using", ":what", ":where"),
+    "where": ("look for", ":what"),
+    "look": ("look", ":way", "at:what"),
+    "move": ("move", ":way", ":by"),
+    "turn": ("turn", ":way", ":by"),
+    "open": ("open my", ":arm", "hand"),
+    "close": ("close my", ":arm", "hand"),
+    "pose": ("bring my arms to", ":name"),
+    "say": ("say", ":text"),
+    "wait": ("wait", ":by"),
     "stop": ("stand still",),
     "ask": ("answer you",),
-    "tidy": ("tidy up", "where"),
+    "tidy": ("tidy up", ":where", "but not:except"),
 }
-_FIELDS: Final = frozenset({"where", "what", "how", "way", "by", "arm", "name", "text"})
 
 
 def question(steps: Sequence[Step]) -> str:
@@ -40,14 +40,8 @@ def question(steps: Sequence[Step]) -> str:
 
 def _words(step: Step) -> str:
     said: list[str] = []
-    for part in _PATTERNS[step["do"]]:
-        before, _, field = part.rpartition(":")
-        if part.startswith(":"):
-            said.append(field)
-        elif before:
-            said += [before, step[field]] if field in step else []
-        elif part in _FIELDS:
-            said += [step[part]] if part in step else []
-        else:
-            said.append(part)
-    return " ".join(said)
+    for part in _SAID[step["do"]]:
+        before, _, field = part.partition(":")
+        if not field or field in step:
+            said += [before, step.get(field, "")]
+    return " ".join(filter(None, said))

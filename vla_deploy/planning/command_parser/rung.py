@@ -17,6 +17,7 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
     confidence_of,
@@ -24,7 +25,6 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
@@ -36,14 +36,16 @@ from vla_deploy.planning.command_parser.wording import (
 from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.language_model import AnswerBounds, LanguageModel, open_language_model
-from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prohibitions import proposal_of
+from vla_deploy.planning.plan import Plan, chained
+from vla_deploy.planning.prohibitions import order_of, proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
 
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
 MOST_FOREIGN: Final = 0.2
 _DOUBT: Final = 0.01
+# What standing orders call the fields of a step.
+_ORDER_GROUPS: Final = {"what": "thing", "where": "place"}
 # A model that nobody has measured is asked back about everything.
 UNMEASURED: Final = Certainty(
     bias=0.0, least=0.0, mean=0.0, strange=0.0, read_back_below=1.0, decline_below=0.0
@@ -94,8 +96,11 @@ class CommandParser(BackEnd):
             raise Declined(one_line(error)) from error
         reader = Steps(parsed.words, request)
         if len(parsed.steps) == 1 and parsed.steps[0]["do"] in ("forbid", "permit"):
-            return proposal_of(reader.order(parsed.steps[0]), request, self.name)
-        actions = reader.actions(parsed.steps)
+            step = parsed.steps[0]
+            said = reader.fields(step, "what", "where")
+            groups = {_ORDER_GROUPS[name]: words for name, words in said.items()}
+            return proposal_of(order_of(groups, step["do"] == "forbid", request), request, NAME)
+        skills = [skill for step in parsed.steps for skill in reader.skills(step)]
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
             raise Declined("it asks about the one who speaks")
@@ -108,7 +113,7 @@ class CommandParser(BackEnd):
         plan = Plan(
             goal=request.text.strip(),
             summary=asked.removeprefix("Shall I ").removesuffix("?"),
-            actions=actions,
+            actions=chained(skills),
         )
         sure = self._confidence(parsed)
         if request.heard_confidence is not None:

@@ -32,7 +32,7 @@ from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
-from vla_deploy.planning.recovery import recover
+from vla_deploy.planning.recovery.strategies import recover
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
 from vla_deploy.planning.understanding.answers import judge_answer
 from vla_deploy.planning.understanding.mentioned import mentions_of

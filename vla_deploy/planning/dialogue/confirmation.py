@@ -15,7 +15,7 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s
-from vla_deploy.planning.symbolic.subjects import Subject, subject_of
+from vla_deploy.planning.symbolic.state import Subject, subject_of
 from vla_deploy.robots.plan_bounds import Confirm
 
 Risk = Callable[[Plan, Request], str]

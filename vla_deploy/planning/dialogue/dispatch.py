@@ -18,7 +18,7 @@ from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.recovery import numbered
+from vla_deploy.planning.recovery.setback import numbered
 from vla_deploy.planning.understanding import Outcome, Turn
 from vla_deploy.planning.understanding.mentioned import mentions_of
 

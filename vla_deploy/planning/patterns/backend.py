@@ -4,21 +4,21 @@ from typing import Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.builders.steps import Groups, Step, chained
+from vla_deploy.planning.builders.steps import Steps
+from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.follow_up import follow_up
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.slots import is_place, is_thing
-from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, Intent, Pattern
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, intent_of, is_place, is_thing
+from vla_deploy.planning.plan import Plan, Priority, Skill, chained
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 
 NAME: Final = "patterns"
-_THERE: Final = frozenset({"there", "over there", "back there"})
+_THERE: Final = frozenset({"here", "there", "over there", "back there"})
 
 
 class Patterns(BackEnd):
@@ -57,18 +57,18 @@ def pattern_plan(request: Request) -> Plan:
         return plan
     if not said:
         raise Declined("no clause that a pattern covers")
-    steps: list[Step] = []
-    intents: list[Intent] = []
+    skills: list[Skill] = []
+    intents: list[str] = []
     for clause in said:
-        pattern, groups = _fitting(clause, request)
-        built = pattern.build(groups, request)
-        steps += built
-        intents += [pattern.intent] * len(built)
-    words = ", ".join(action_words(skill, parameters) for skill, parameters in steps)
+        step = _fitting(clause, request)
+        built = Steps(clause.split(), request).skills(step)
+        skills += built
+        intents += [intent_of(step)] * len(built)
+    words = ", ".join(action_words(skill, parameters) for skill, parameters in skills)
     return Plan(
         goal=request.text.strip(),
         summary=f"{', '.join(dict.fromkeys(intents))}: {words}",
-        actions=chained(steps, [PRIORITIES[intent] for intent in intents]),
+        actions=chained(skills, [PRIORITIES.get(one, Priority.MEDIUM) for one in intents]),
     )
 
 
@@ -88,23 +88,24 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
         raise NotUnderstood(text) from error
 
 
-def _fitting(clause: str, request: Request) -> tuple[Pattern, Groups]:
-    unknown: Groups = {}
+def _fitting(clause: str, request: Request) -> Step:
+    unknown: Step = {}
     for pattern in PATTERNS:
         found = pattern.pattern.fullmatch(clause)
         if found is not None:
-            groups = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
-            if _are_known(groups, request):
-                return pattern, groups
-            unknown = unknown or groups
-    place = unknown.get("place", "")
-    if place and "object" not in unknown and not scope_words(clause):
-        raise UnknownPlace(place, set(request.world.places.values()))
+            said = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
+            step = {"do": pattern.do, **pattern.given, **said}
+            if _are_known(said, request):
+                return step
+            unknown = unknown or step
+    if "what" not in unknown and "where" in unknown and not scope_words(clause):
+        raise UnknownPlace(unknown["where"], set(request.world.places.values()))
     raise Declined(f'no pattern covers "{clause[:60]}"')
 
 
-def _are_known(groups: Groups, request: Request) -> bool:
-    places = request.world.places
-    place, where = groups.get("place", "there"), groups.get("destination", "there")
-    is_known = is_place(place, places) or place in _THERE
-    return is_known and (is_place(where, places) or is_thing(where) or where in _THERE)
+def _are_known(said: Step, request: Request) -> bool:
+    """Tell whether each place of a step is one, or a thing, or "there"."""
+    named = (said[name] for name in ("where", "from") if name in said)
+    return all(
+        one in _THERE or is_place(one, request.world.places) or is_thing(one) for one in named
+    )

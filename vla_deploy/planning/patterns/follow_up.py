@@ -5,15 +5,14 @@ Nothing is repeated that failed, was refused or called off: a person has to say 
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.action_words import action_words
-from vla_deploy.planning.builders.steps import go_back
+from vla_deploy.planning.builders.steps import way_back
 from vla_deploy.planning.dialogue.correction import wants_other_too, with_other
 from vla_deploy.planning.errors import Declined, NothingBefore
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.plan import PUT_IN, Action, Plan
+from vla_deploy.planning.plan import PUT_IN, Plan, chained
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 
 _AGAIN: Final = re.compile(
@@ -22,43 +21,31 @@ _AGAIN: Final = re.compile(
 )
 # How much "a bit more" is of the distance, angle or time that was last given outright.
 RATIOS: Final[Mapping[str, float]] = {
-    r"(?:just )?(?:a (?:tiny |little |wee )?(?:bit|touch|tad|fraction)|a little|slightly)": 0.25,
-    r"(?:some|quite a bit)": 0.5,
+    r"(?:just )?(?:a (?:tiny |little |wee )?(?:bit|touch|tad)|a little|slightly)": 0.25,
+    r"(?:some|quite a bit)?": 0.5,
     r"(?:much|a lot|lots)": 1.0,
+    r"(?:twice (?:that|as (?:much|far|long))|double(?: (?:that|it))?)": 2.0,
 }
 _FURTHER: Final = (
-    r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
+    r" ?(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
     r"(?: than that|,? (?:the same|that) way|,? in (?:the same|that) direction)?"
 )
-_LESS: Final = r"(?:back(?: again)?(?:,? the other way)?|the other way|less)"
+_LESS: Final = r" (?:back(?: again)?(?:,? the other way)?|the other way|less)"
 _GO: Final = r"(?:and |now |then )*(?:(?:go|move|drive|turn|rotate|spin|roll|come|wait) )?"
 _MORE: Final = tuple(
-    (re.compile(rf"{_GO}(?:{words})"), ratio)
-    for words, ratio in (
-        (_FURTHER, 0.5),
-        *((rf"{share} {_FURTHER}", ratio) for share, ratio in RATIOS.items()),
-        *((rf"{share} {_LESS}", -ratio) for share, ratio in RATIOS.items()),
-        (r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?", 0.5),
-        (r"(?:as much|the same amount|that much)(?: again)?", 1.0),
-        (r"twice (?:that|as (?:much|far|long))|double(?: (?:that|it))?", 2.0),
-    )
+    (re.compile(f"{_GO}{share}{direction}"), sign * ratio)
+    for share, ratio in RATIOS.items()
+    for direction, sign in ((_FURTHER if ratio < 2.0 else "", 1.0), (_LESS, -1.0))
 )
-_ALL_BACK: Final = r"(?:all the way )?back(?: again)?"
 _BACK: Final = re.compile(
-    rf"(?:and )?(?:now )?(?:{_ALL_BACK}|(?:turn|move|drive|go|come|step|roll) back again)"
-)
-# After a look these are for the head.
-_AHEAD: Final = re.compile(
-    rf"(?:and )?(?:now )?(?:{_ALL_BACK}(?: to the (?:middle|cent(?:re|er)))?|"
-    r"(?:back |look )*(?:straight )?(?:ahead|forwards?|in front(?: of you)?|to the middle)"
-    r"(?: again)?)"
+    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|"
+    r"(?:turn|move|drive|go|come|step|roll) back again)"
 )
 _REVERSE: Final = re.compile(
     r"(?:and )?(?:now )?(?:to )?the other (?:way(?: (?:round|around))?|side|direction)|"
     r"(?:and )?(?:now )?(?:the )?same (?:distance|amount|way|thing)?(?: ?again)?,? "
     r"(?:but |only |just )?(?:backwards?|in reverse|the other way|in the other direction)"
 )
-_OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
 # What of a step can be more or less, and can be done in the other direction.
 _AMOUNTS: Final = {"move": "distance_m", "turn": "angle_rad", "wait": "duration_s"}
 _REVERSIBLE: Final = ("move", "turn")
@@ -83,10 +70,8 @@ def follow_up(text: str, request: Request) -> Plan | None:
         return _more(ratio, request)
     if _REVERSE.fullmatch(text):
         return _reversed(_last(request))
-    if _AHEAD.fullmatch(text) and any(map(_looked, request.conversation.turns[-1:])):
-        return _single("look_at", {"direction": "ahead"})
     if _BACK.fullmatch(text):
-        return _reversed(_last(request)) or _returned(request)
+        return _reversed(_last(request)) or _single(*way_back(request))
     return None
 
 
@@ -121,23 +106,13 @@ def _last(request: Request) -> Turn:
 def asked_for(last: Turn) -> Plan:
     """Return the plan of a turn, without what grounding has put in."""
     plan = last.plan or Plan(goal=last.said)
-    own = [one for one in plan.actions if one.description != PUT_IN]
-    chained = tuple(
-        one.model_copy(update={"depends_on": (own[number - 1].id,) if number else ()})
-        for number, one in enumerate(own)
-    )
-    return Plan(goal=plan.goal, summary=last.understood, actions=chained)
+    own = [(one.skill, one.parameters) for one in plan.actions if one.description != PUT_IN]
+    return Plan(goal=plan.goal, summary=last.understood, actions=chained(own))
 
 
 def _single(skill: str, parameters: Mapping[str, Any]) -> Plan:
-    action = Action(id="a1", skill=skill, parameters=dict(parameters))
     words = action_words(skill, parameters)
-    return Plan(goal=words, summary=words, actions=(action,))
-
-
-def _returned(request: Request) -> Plan:
-    ((skill, parameters),) = go_back({}, replace(request, text="go back"))
-    return _single(skill, parameters)
+    return Plan(goal=words, summary=words, actions=chained([(skill, parameters)]))
 
 
 def _ratio(text: str) -> float | None:
@@ -176,19 +151,9 @@ def _amount(turn: Turn) -> tuple[str, float] | None:
 
 
 def _reversed(last: Turn) -> Plan | None:
-    """Return the last straight way, turn or look in the other direction, None for other things."""
-    if way := _looked(last):
-        return _single("look_at", {"direction": _OPPOSITE[way]})
+    """Return the last straight way or turn in the other direction, None for other things."""
     amount = _amount(last)
     if amount is None or amount[0] not in _REVERSIBLE:
         return None
     skill, value = amount
     return _single(skill, {_AMOUNTS[skill]: round(-value, 4)})
-
-
-def _looked(turn: Turn) -> str:
-    """Return the side to which a turn's last action turned the head, "" for none."""
-    action = turn.plan.actions[-1] if turn.plan is not None and turn.plan.actions else None
-    way = "" if action is None else str(action.parameters.get("direction", ""))
-    is_look = action is not None and action.skill == "look_at"
-    return way if is_look and way in _OPPOSITE else ""

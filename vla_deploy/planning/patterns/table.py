@@ -1,159 +1,175 @@
-"""List the patterns of the commonest commands: what each is for, and what builds its steps."""
+"""List the patterns of the commonest commands: how each is said, and which step it is.
+
+What may stand in their slots are names that the robot knows, and nothing else: so no word that
+changes what a sentence means can hide in one.
+"""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
-from vla_deploy.planning.builders import (
-    answering,
-    giving,
-    moving,
-    placing,
-    steps,
-    tidying,
-)
-from vla_deploy.planning.builders.steps import Builder
-from vla_deploy.planning.patterns.slots import (
-    ANGLE,
-    HAND,
-    KIND,
-    METRES,
-    SECONDS,
-    THING,
-    THINGS,
-    WORDS,
-)
 from vla_deploy.planning.plan import Priority
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.understanding.quantities import NUMBER
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
-_OBJECT: Final = rf"(?P<object>{THINGS})"
-_THING: Final = rf"(?P<object>{THING})"
-_PLACE: Final = rf"(?P<place>{WORDS})"
-_WITH: Final = rf"(?: (?:with|in) {HAND})?"
-_INTO: Final = r"(?P<relation>into|inside|in|onto|on top of|on|next to|beside|to)"
-_DESTINATION: Final = rf"(?P<destination>{WORDS})"
+_ARTICLE: Final = "(?:the|a|an|my|your|that|this|some|our)"
+_LOOK: Final = (
+    f"(?:{'|'.join(COLOURS)}|gray|violet|small|little|big|large|nearest|closest|smallest|biggest|"
+    "smaller|bigger|tall|short|other|left|right)"
+)
+_KIND: Final = f"(?:{KIND_WORDS}|remote control|mobile phone|cell phone)"
+_ONE: Final = (
+    rf"(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}|(?:the|that|this) (?:{_LOOK} ){{1,2}}one|"
+    "it|that|this|that one|this one|them|those|these"
+)
+# A word for a thing that the robot has not learnt: grounding asks what it is.
+_UNKNOWN: Final = (
+    rf"(?:the|a|an|my|that|this) (?:{_LOOK} ){{0,2}}"
+    r"(?!one\b|same\b|rest\b|other\b|left\b|right\b|whole\b)[a-z]{3,}"
+)
+_STANDS: Final = (
+    rf" (?:on|in|next to|beside) (?:the|my|your|our) (?:{_LOOK} ){{0,2}}[a-z]+(?: table)?"
+)
+_SEVERAL: Final = rf"(?:both|all)(?: of)?(?: the| my| our)? (?:{_LOOK} )?{_KIND}s?|everything"
+_KNOWN: Final = rf"(?:{_ONE}|everything)(?:{_STANDS})?|{_SEVERAL}"
+_BARE: Final = rf"(?:{_ONE}|{_SEVERAL}|{_UNKNOWN})"
+"""A thing that is told by its look alone."""
+THING: Final = rf"(?:{_KNOWN}|{_UNKNOWN})"
+_SEVERAL_THINGS: Final = rf"{THING}(?:(?:,| and|, and) {THING})*"
+WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
+_METRES: Final = (
+    rf"{NUMBER}(?: of a| an?)? ?(?:m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|steps?)"
+)
+_ANGLE: Final = rf"{NUMBER} ?(?:degrees?|deg|°|rad|radians?)"
+_SECONDS: Final = rf"{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment)"
+_HAND: Final = (
+    r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|claw|fingers|hands|grippers)"
+)
+_IS_THING: Final = re.compile(_KNOWN)
+_THINGS: Final = rf"(?P<what>{_SEVERAL_THINGS})"
+_THING: Final = rf"(?P<what>{THING})"
+# What is moved where: a thing that is told by where it stands leaves it open what goes where.
+_MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
+_WHERE: Final = rf"(?P<where>{WORDS})"
+_WITH: Final = rf"(?: (?:with|in) {_HAND})?"
+_INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
 _TAKE: Final = "(?:pick up|grab|take|get|lift|grasp|hold|collect|take hold of|grab hold of)"
 _PUT: Final = "(?:put|place|set|lay|drop|leave|stick|pop)"
 _CARRY: Final = "(?:put|place|set|take|bring|carry|move|get)"
 _WAY: Final = "(?P<way>forwards?|ahead|straight ahead|backwards?|back)"
 _SIDE: Final = "(?P<way>left|right|around|round)"
-_LITTLE: Final = "(?P<little>a (?:little|bit|little bit)|slightly)"
+_LITTLE: Final = "(?:a (?:little|bit|little bit)|slightly)"
 
 
-class Intent(StrEnum):
-    """Group commands by what they are for; what is urgent comes first where the order is free."""
-
-    STOP = "stop"
-    ASSIST = "assist"
-    NAVIGATION = "navigation"
-    MANIPULATION = "manipulation"
-    SEARCH = "search"
-    QUESTION = "question"
-    CLEANING = "cleaning"
-
-
-PRIORITIES: Final[Mapping[Intent, Priority]] = {
-    Intent.STOP: Priority.HIGH,
-    Intent.ASSIST: Priority.HIGH,
-    Intent.NAVIGATION: Priority.MEDIUM,
-    Intent.MANIPULATION: Priority.MEDIUM,
-    Intent.SEARCH: Priority.MEDIUM,
-    Intent.QUESTION: Priority.MEDIUM,
-    Intent.CLEANING: Priority.LOW,
+# What commands are for, by what their steps do or answer; where it is not listed, a question.
+_INTENTS: Final[Mapping[str, str]] = {
+    "stop": "stop",
+    **dict.fromkeys(("go", "move", "turn"), "navigation"),
+    **dict.fromkeys(("pick", "put", "bring", "give", "open", "close", "pose"), "manipulation"),
+    **dict.fromkeys(("find", "look"), "search"),
+    **dict.fromkeys(("say", "wait", "able", "ready", "thanks"), "assist"),
+    **dict.fromkeys(("tidy", "patrol"), "cleaning"),
 }
+# What is urgent comes first where the order is free.
+PRIORITIES: Final = {
+    "stop": Priority.HIGH,
+    "assist": Priority.HIGH,
+    "cleaning": Priority.LOW,
+}
+
+
+def intent_of(step: Mapping[str, str]) -> str:
+    """Return what a step is for."""
+    return _INTENTS.get(step.get("about", step["do"]), "question")
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Hold one row; a clause that fits `pattern` whole is built by `build`."""
+    """Hold one row; a clause that fits `pattern` whole is a step to `do`, with `given` fields.
 
-    intent: Intent
+    The named groups of `pattern` are the other fields.
+    """
+
     pattern: re.Pattern[str]
-    build: Builder
+    do: str
+    given: Mapping[str, str]
 
 
-_MOVE, _HOLD, _SEE = Intent.NAVIGATION, Intent.MANIPULATION, Intent.SEARCH
-_ASK, _HELP, _TIDY = Intent.QUESTION, Intent.ASSIST, Intent.CLEANING
-_ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
-    (Intent.STOP, "stop|halt|freeze|stand still", steps.stop),
+_ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
+    ("stop|halt|freeze|stand still", "stop", {}),
     # --- go
-    (_MOVE, rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
-     rf"(?: to| into)? {_PLACE}", steps.go),
-    (_MOVE, rf"(?:go|drive|head|come)(?: over)? to {_THING}", steps.approach),
-    (_MOVE, r"(?:go|drive|come) back|return", steps.go_back),
-    (_MOVE, r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", steps.come),
-    (_MOVE, r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?",
-     steps.dock),
+    (r"(?:go|drive|come) back|return", "go", {"where": "back"}),
+    (r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
+    (r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?", "go",
+     {"where": "charging station"}),
     # --- go straight, turn
-    (_MOVE, rf"(?:move|drive|go|roll|come|step)(?: {_LITTLE})? {_WAY}"
-     rf"(?:(?: by| for)? (?P<quantity>{METRES}))?", moving.drive),
-    (_MOVE, rf"(?:move|drive|go|roll|step) (?P<quantity>{METRES}) {_WAY}", moving.drive),
-    (_MOVE, rf"(?:move|drive|go|come) {_WAY} {_LITTLE}|back up", moving.drive),
-    (_MOVE, rf"(?:turn|rotate|spin)(?: {_LITTLE})?(?: to the)? {_SIDE}"
-     rf"(?:(?: by)? (?P<quantity>{ANGLE}))?", moving.turn),
-    (_MOVE, rf"(?:turn|rotate|spin)(?: by)? (?P<quantity>{ANGLE})(?:(?: to the)? {_SIDE})?",
-     moving.turn),
-    (_MOVE, rf"(?:turn|rotate)(?: to the)? {_SIDE} {_LITTLE}", moving.turn),
-    (_MOVE, "(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",
-     moving.turn_whole),
+    (rf"(?:move|drive|go|roll|come|step)(?: (?P<by>{_LITTLE}))? {_WAY}"
+     rf"(?:(?: by| for)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
+    (rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
+    (rf"(?:turn|rotate|spin)(?: (?P<by>{_LITTLE}))?(?: to the)? {_SIDE}"
+     rf"(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?", "turn", {}),
+    (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
+     {}),
+    (rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
+     rf"(?: to| into)? {_WHERE}", "go", {}),
+    ("(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",
+     "turn", {"by": "360 degrees"}),
     # --- look
-    (_SEE, "look a?round|have a look a?round", steps.look_around),
-    (_SEE, r"look(?: to the| to your)? (?P<what>left|right|up|down|ahead|straight ahead)",
-     steps.look),
-    (_SEE, rf"look at (?P<what>{THING}|the floor|the ceiling)", steps.look),
-    (_SEE, rf"(?:find|look for|search for|locate) {_OBJECT}(?: in (?:the )?{_PLACE})?", steps.find),
+    ("look a?round|have a look a?round", "look", {"way": "around"}),
+    (r"look(?: to the| to your)? (?P<way>left|right|up|down|ahead|straight ahead)|"
+     "look at the (?P<way>floor|ceiling)", "look", {}),
+    (rf"look at {_THING}", "look", {}),
+    (rf"(?:find|look for|search for|locate) {_THINGS}"
+     rf"(?: in (?:the )?(?P<from>{WORDS}))?", "find", {}),
     # --- hands
-    (_HOLD, rf"(?P<verb>open|close) {HAND}", steps.gripper),
-    (_HOLD, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", steps.tuck),
-    (_HOLD, r"(?:put|set) (?:it|them|that) down", placing.put_down),
-    (_HOLD, rf"put (?P<object>{THING}) down|put down {_OBJECT}|drop {_THING}", placing.put_down),
-    (_HOLD, rf"{_CARRY} {_THING} back(?: where it was)?", placing.put_back),
-    (_HOLD, rf"(?:put|tidy|clear) {_OBJECT} away|put away {_OBJECT}", placing.put_away),
-    (_HOLD, rf"{_PUT} {_THING} here", placing.put_here),
-    (_HOLD, rf"{_PUT} {_THING} (?P<destination>there|over there)", placing.put_there),
-    (_HOLD, r"empty (?:both )?(?:your )?hands", placing.empty_hands),
-    (_HOLD, rf"empty {HAND}", placing.empty_hand),
-    (_HOLD, rf"keep (?:hold of |holding )?{_THING}", placing.keep),
+    (rf"open {_HAND}", "open", {}),
+    (rf"close {_HAND}", "close", {}),
+    (r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose",
+     {"name": "tuck"}),
+    (rf"(?:put|set) {_THING} down|put down {_THINGS}|drop {_THING}", "put", {}),
+    (rf"{_CARRY} {_THING} back(?: where it was)?", "put", {"where": "back"}),
+    (rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
+    (rf"{_PUT} {_THING} (?P<where>here|there|over there)", "put", {}),
+    (r"empty (?:both )?(?:your )?hands", "put", {"what": "everything you are holding"}),
+    (rf"empty {_HAND}", "put", {}),
     # --- give, bring
-    (_HOLD, rf"(?:give|hand|pass) (?:me|us) {_OBJECT}", giving.give),
-    (_HOLD, rf"(?:give|hand|pass) {_OBJECT} to me|hand over {_OBJECT}|hand {_THING} over",
-     giving.give),
-    (_HOLD, r"let go(?: of (?P<object>it|that|them))?|release (?P<object>it|that|them)",
-     giving.let_go),
-    (_HOLD, rf"(?:bring|fetch|get) (?:me|us) {_OBJECT}", steps.bring),
-    (_HOLD, rf"(?:bring|take|carry) {_OBJECT} (?:over )?(?:to me|here)|(?:fetch|bring) {_OBJECT}",
-     steps.bring),
-    (_HOLD, rf"(?:can|could|may) i have {_OBJECT}", giving.give),
+    (rf"(?:give|hand|pass|bring|fetch|get) (?:me|us) {_THINGS}", "bring", {}),
+    (rf"(?:give|hand|pass) {_THINGS} to me|hand over {_THINGS}|hand {_THING} over",
+     "bring", {}),
+    (rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|"
+     rf"(?:fetch|bring) {_THINGS}|(?:can|could|may) i have {_THINGS}", "bring", {}),
+    (r"let go(?: of (?:it|that|them))?|release (?:it|that|them)", "give", {}),
     # --- put, take
-    (_HOLD, rf"{_PUT} {_OBJECT}(?: down)? {_INTO} {_DESTINATION}", placing.put),
+    (rf"{_PUT} {_MOVED}(?: down)? {_INTO} {_WHERE}", "put", {}),
     # What is taken "beside the ball" or "on the table" stands there.
-    (_HOLD, rf"{_CARRY} {_OBJECT} (?P<relation>to|into|onto) {_DESTINATION}", placing.put),
-    (_HOLD, rf"{_TAKE} {_OBJECT}{_WITH}|(?:pick|lift) {_OBJECT} up", steps.pick),
+    (rf"{_CARRY} {_MOVED} (?P<how>to|into|onto) {_WHERE}", "put", {}),
+    (rf"{_TAKE} {_THINGS}{_WITH}|(?:pick|lift) {_THINGS} up", "pick", {}),
     # --- tidy
-    (_TIDY, r"(?:clean|tidy|clear)(?: up)?", tidying.tidy),
-    (_TIDY, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", tidying.tidy),
-    (_TIDY, rf"(?:patrol|inspect) {_PLACE}", tidying.patrol),
+    (r"(?:clean|tidy|clear)(?: up)?", "tidy", {}),
+    (rf"(?:clean|tidy|clear)(?: up| off)? {_WHERE}", "tidy", {}),
+    (rf"(?:patrol|inspect) {_WHERE}", "patrol", {}),
     # --- say, wait, answer
-    (_HELP, r"(?:say|announce) (?P<text>[^,;:]+)|"
-     r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", steps.speak),
-    (_HELP, rf"wait(?: here)?(?:(?: for)? (?P<quantity>{SECONDS}))?", steps.wait),
-    (_HELP, r"(?:many )?thanks(?: a lot| so much| for that)?|thank you(?: very much| so much)?|"
-     r"good (?:job|robot)", answering.tell_welcome),
-    (_HELP, r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)",
-     answering.tell_ready),
-    (_ASK, r"how (?:much|full is your) battery(?: (?:is left|do you have(?: left)?|have you got))?|"
-     r"(?:how is|what is|how's) your battery(?: level)?", answering.tell_battery),
-    (_HELP, r"help(?: me)?|what can you do|who are you|what are you", answering.tell_abilities),
-    (_ASK, rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
-     rf"where did i (?:leave|put) {_THING}", answering.tell_or_find),
-    (_ASK, r"what (?:do|can) you see|what is there", answering.tell_sight),
-    (_ASK, rf"what(?:'s| is) on (?:the )?{_PLACE}", answering.tell_sight),
-    (_ASK, r"what (?:are you holding|do you hold|do you have in your hands?)",
-     answering.tell_hands),
-    (_ASK, "where are you", answering.tell_place),
-    (_ASK, rf"(?:do you see|is there|are there) (?:any )?{_THING}", answering.tell_whether),
-    (_ASK, rf"how many (?P<object>{KIND}s?)(?: are there| do you see)?", answering.tell_number),
+    (r"(?:say|announce) (?P<text>[^,;:]+)|"
+     r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", "say", {}),
+    (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
+    (r"(?:many )?thanks(?: a lot| so much)?|thank you(?: very much| so much)?|"
+     r"good (?:job|robot)", "ask", {"about": "thanks"}),
+    (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
+     {"about": "ready"}),
+    (r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
+     r"(?:how is|what is|how's) your battery(?: level)?", "ask", {"about": "battery"}),
+    (r"help(?: me)?|what can you do|who are you|what are you", "ask", {"about": "able"}),
+    (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
+     rf"where did i (?:leave|put) {_THING}", "where", {}),
+    (rf"what (?:do|can) you see|what is there|what(?:'s| is) on (?:the )?{_WHERE}", "ask",
+     {"about": "seeing"}),
+    (r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",
+     {"about": "holding"}),
+    ("where are you", "ask", {"about": "place"}),
+    (rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask",
+     {"about": "whether"}),
 )  # fmt: skip
 
 
@@ -168,6 +184,14 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(re.sub(r"\(\?P<([a-z]+)>", numbered, pattern))
 
 
-PATTERNS: Final = tuple(
-    Pattern(intent, _compiled(pattern), build) for intent, pattern, build in _ROWS
-)
+PATTERNS: Final = tuple(Pattern(_compiled(pattern), do, given) for pattern, do, given in _ROWS)
+
+
+def is_place(text: str, places: Mapping[str, str]) -> bool:
+    """Return whether a text is the whole name of a place."""
+    return match_place(text, places) is not None
+
+
+def is_thing(text: str) -> bool:
+    """Return whether a text names a thing in words that the robot knows."""
+    return _IS_THING.fullmatch(text) is not None

@@ -13,8 +13,7 @@ from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Requ
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.recovery.setback import Carried, FailureCause
 from vla_deploy.planning.references import parse_object
-from vla_deploy.planning.symbolic.state import state_of
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
 # What a command is about does not depend on these.
@@ -54,16 +53,14 @@ def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
     return PlanningResult(error=CannotBeDone(f"{error} ({why})"))
 
 
-def skip(carried: Carried, request: Request) -> Steps:
+def skip(carried: Carried, _: Request) -> Steps:
     """Go on without an action that does not matter."""
-    del request
     failed = carried.failed
     return [one for one in carried.left if one != failed] if failed.skill in INESSENTIAL else []
 
 
-def put_in(carried: Carried, request: Request) -> Steps:
+def put_in(carried: Carried, _: Request) -> Steps:
     """Do what is left, with what the world has turned out to lack put in before it."""
-    del request
     return [] if carried.setbacks[-1].cause is FailureCause.SKILL else carried.left
 
 
@@ -82,18 +79,16 @@ def take_again(carried: Carried, request: Request) -> Steps:
     return [_looked_for(lost[-1]), lost[-1], *carried.left] if state.hands and lost else []
 
 
-def look_again(carried: Carried, request: Request) -> Steps:
+def look_again(carried: Carried, _: Request) -> Steps:
     """Look for the thing anew, and try once more from where it is seen then."""
-    del request
     failed = carried.failed
     if failed.skill == "find_object" or _object_of(failed) is None:
         return []
     return [_looked_for(failed), *carried.left]
 
 
-def wait(carried: Carried, request: Request) -> Steps:
+def wait(carried: Carried, _: Request) -> Steps:
     """Give a person who stands in the way time to go, and try once more."""
-    del request
     failed = carried.failed
     if failed.skill not in BLOCKED_BY_OTHERS:
         return []

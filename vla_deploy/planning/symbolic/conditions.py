@@ -4,7 +4,7 @@ What nobody knows is no fault: perception and the skills judge it when the time 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,12 +13,11 @@ from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.symbolic.areas import blocked_on_way, zone_around, zone_at, zone_on_way
-from vla_deploy.planning.symbolic.state import State
-from vla_deploy.planning.symbolic.subjects import Subject, subject_of
+from vla_deploy.planning.symbolic.state import Point, State, Subject, subject_of
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
-from vla_deploy.world.reach import GRIP_HEIGHTS_M
+from vla_deploy.world.footprint import polygon_depth_m
+from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, stands_around
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.thing import FLOOR, Rest
@@ -27,6 +26,8 @@ from vla_deploy.world.thing import FLOOR, Rest
 SURELY_AWAY_M: Final = 1.6
 # Less than that and the robot still stands where it stood.
 SMALL_MOVE_M: Final = 0.1
+# How far apart the points are at which a straight way is judged.
+STEP_M: Final = 0.1
 PUT_INTO: Final = frozenset({"box"})
 
 MET: Final = ""
@@ -72,31 +73,25 @@ def is_known(state: State, setting: Setting) -> Answer:
 
 def is_before(state: State, setting: Setting) -> Answer:
     """Does the robot stand where the thing, or the place, is within reach?"""
-    place = setting.place("destination")
+    place, sites = setting.place("destination"), setting.world.sites
     subject = setting.subject("object") or setting.subject("destination")
+    at = place or (subject.key if subject is not None else "")
+    what = at if place is not None or subject is None else subject.words
+    if not at or state.at == at:
+        return MET
+    spot = None
     if place is not None:
-        return _is_before_place(state, place, setting.world)
-    if subject is None or state.at == subject.key:
-        return MET
-    if subject.thing is None:
-        away = bool(state.at) and state.at in setting.world.sites
-        return f"the robot went to {state.at}; navigate_to it first" if away else None
-    distance_m = state.distance_m(subject.thing)
-    if distance_m is None or distance_m <= SURELY_AWAY_M:
+        spot = (sites[place].pose.x_m, sites[place].pose.y_m) if place in sites else None
+    elif subject is not None and subject.thing is not None:
+        spot = subject.thing.xy_m
+    elif state.at in sites:
+        return f"the robot went to {state.at}; navigate_to it first"
+    if spot is None or state.spot is None:
         return None
-    return f"the {subject.words} is {distance_m:.1f} m away; navigate_to it first"
-
-
-def _is_before_place(state: State, place: str, world: World) -> Answer:
-    if state.at == place:
-        return MET
-    if place not in world.sites or state.spot is None:
-        return None
-    pose = world.sites[place].pose
-    distance_m = math.dist(state.spot, (pose.x_m, pose.y_m))
+    distance_m = math.dist(state.spot, spot)
     if distance_m <= SURELY_AWAY_M:
         return None
-    return f"the {place} is {distance_m:.1f} m away; navigate_to it first"
+    return f"the {what} is {distance_m:.1f} m away; navigate_to it first"
 
 
 def has_free_hand(state: State, setting: Setting) -> Answer:
@@ -137,9 +132,8 @@ def is_not_held(state: State, setting: Setting) -> Answer:
     return f"a hand holds the {subject.words} itself"
 
 
-def can_be_gripped(state: State, setting: Setting) -> Answer:
+def can_be_gripped(_: State, setting: Setting) -> Answer:
     """Is the thing narrow enough, and at a height, for a hand that points down?"""
-    del state
     subject, opening_m = setting.subject("object"), setting.world.opening_max_m
     if subject is None or subject.thing is None or opening_m is None:
         return None
@@ -157,9 +151,8 @@ def can_be_gripped(state: State, setting: Setting) -> Answer:
     return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
 
 
-def is_light_enough(state: State, setting: Setting) -> Answer:
+def is_light_enough(_: State, setting: Setting) -> Answer:
     """Is the thing within what one hand may carry?"""
-    del state
     subject, limit_kg = setting.subject("object"), setting.world.bounds.payload_kg
     mass_kg = None if subject is None else subject.mass_kg
     if mass_kg is None or mass_kg <= limit_kg:
@@ -212,17 +205,17 @@ def may_go_there(state: State, setting: Setting) -> Answer:
     world = setting.world
     place, subject = setting.place("place"), setting.subject("object")
     if subject is not None and subject.thing is not None:
-        return _refusal(zone_around(subject.thing.position_m, world), f"the {subject.words}")
+        return _refusal(_zone_around(subject.thing.position_m, world), f"the {subject.words}")
     if place is not None and place in world.sites:
         pose = world.sites[place].pose
-        return _refusal(zone_at((pose.x_m, pose.y_m), world), f"the {place}")
+        return _refusal(_zone_at((pose.x_m, pose.y_m), world), f"the {place}")
     if "x_m" in setting.parameters and "y_m" in setting.parameters:
         return _may_stand(float(setting.parameters["x_m"]), float(setting.parameters["y_m"]), world)
     return None
 
 
 def _may_stand(x_m: float, y_m: float, world: World) -> Answer:
-    refusal = _refusal(zone_at((x_m, y_m), world), f"the point {x_m:g}, {y_m:g} m")
+    refusal = _refusal(_zone_at((x_m, y_m), world), f"the point {x_m:g}, {y_m:g} m")
     if refusal:
         return refusal
     if world.is_free is not None and not world.is_free(x_m, y_m):
@@ -237,10 +230,10 @@ def way_is_allowed(state: State, setting: Setting) -> Answer:
     x_m, y_m, yaw_rad = state.pose
     way_m = float(setting.parameters["distance_m"])
     end = (x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad))
-    refusal = _refusal(zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
+    refusal = _refusal(_zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
     if refusal or setting.world.is_free is None or abs(way_m) < SMALL_MOVE_M:
         return refusal
-    free_m = blocked_on_way((x_m, y_m), end, setting.world.is_free)
+    free_m = _blocked_on_way((x_m, y_m), end, setting.world.is_free)
     return MET if free_m is None else f"{way_m:g} m asked, the map shows {free_m:.1f} m of room"
 
 
@@ -248,11 +241,67 @@ def _refusal(zone: KeepOutZone | None, what: str) -> Answer:
     return MET if zone is None else f"{what} is in the {zone.name}: {zone.reason}"
 
 
-def is_slow_enough(state: State, setting: Setting) -> Answer:
+def is_slow_enough(_: State, setting: Setting) -> Answer:
     """Is the speed within what the base may do?"""
-    del state
     speed_m_s, most_m_s = setting.parameters.get("speed_m_s"), setting.world.max_speed_m_s
     if speed_m_s is None or most_m_s is None:
         return MET
     too_fast = float(speed_m_s) > most_m_s
     return f"{speed_m_s:g} m/s asked, {most_m_s:g} m/s at most" if too_fast else MET
+
+
+# --- zones, and what the map shows --------------------------------------------------------------
+
+
+def _zone_at(point_m: Point, world: World) -> KeepOutZone | None:
+    """Return the zone that the base would enter at a point, or None."""
+    return next(
+        (zone for zone in world.zones
+         if polygon_depth_m(point_m, zone.polygon_m) > -world.footprint_radius_m), None
+    )  # fmt: skip
+
+
+def _zone_on_way(start: Point, end: Point, world: World) -> KeepOutZone | None:
+    """Return the first zone that a straight way newly enters, or None."""
+    if not world.zones or _zone_at(start, world) is not None:
+        return None
+    found = (_zone_at(point, world) for point in _points(start, end))
+    return next((zone for zone in found if zone is not None), None)
+
+
+def _zone_around(position_m: tuple[float, float, float], world: World) -> KeepOutZone | None:
+    """Return the zone that a thing lies in, or in which one would stand to reach it, or None."""
+    lies_in = (one for one in world.zones if polygon_depth_m(position_m, one.polygon_m) > 0.0)
+    inside = next(lies_in, None)
+    if inside is not None:
+        return inside
+    near = _zone_at(position_m[:2], world)
+    if near is None:
+        return None
+    stands = stands_around(position_m, lambda x_m, y_m: _zone_at((x_m, y_m), world) is None)
+    return near if next(stands, None) is None else None
+
+
+def _blocked_on_way(start: Point, end: Point, is_free: IsFree) -> float | None:
+    """Return how far a straight way leads over free floor, None where all of it is free.
+
+    Furniture that the robot stands at may be nearer than the map allows; away from it is free.
+    """
+    was_free = is_free(*start)
+    for point in _points(start, end):
+        now_free = is_free(*point)
+        if not now_free and (was_free or point == end):
+            return math.dist(start, point)
+        was_free = was_free or now_free
+    return None
+
+
+def _points(start: Point, end: Point) -> Iterator[Point]:
+    count = max(1, math.ceil(math.dist(start, end) / STEP_M))
+    for step in range(1, count + 1):
+        share = step / count
+        yield (
+            end
+            if step == count
+            else (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
+        )

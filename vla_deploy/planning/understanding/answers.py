@@ -24,7 +24,7 @@ from vla_deploy.planning.understanding.phrases import (
     ORDINALS,
     SIDES,
 )
-from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
+from vla_deploy.planning.understanding.questions import from_side
 from vla_deploy.world.query import ORDERS
 from vla_deploy.world.vocabulary import ARTICLES, KIND_WORDS
 
@@ -65,12 +65,10 @@ _WORD: Final = re.compile(r"[a-z0-9_']+")
 _TO: Final = re.compile(r"^(?:(?:go |back |over )*(?:to|into|in|at|on|by) )?(?:(?:the|my|your) )?")
 _PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
 _NOT: Final = re.compile(
-    r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one)? )?(?:the one )?"
-    r"(?:but not|but|not|except|other than|(?:that |which )?is(?:n't| not)|(?:you can )?"
-    r"(?:leave|keep)|i (?:don't|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?"
-    r"(?: but (?P<rest>.+))?"
+    r"(?:no |any |either |the one )*(?:but not|but|not|except|other than|"
+    r"(?:that |which )?is(?:n't| not)|(?:you can )?(?:leave|keep)|"
+    r"i (?:don't|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?"
 )
-_OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
 _FROM_SIDE: Final = re.compile(
     rf"\b({'|'.join(ORDINALS)})(?: one)? (?:from|on) (?:the )?(left|right)\b"
 )
@@ -114,7 +112,7 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
     if verdict is Verdict.ANEW:
         return Reply(verdict=verdict, text=text, conversation=free)
     if verdict is Verdict.UNCLEAR:
-        again = replace(conversation, question=replace(_narrowed(question, text), asked_ns=now_ns))
+        again = replace(conversation, question=replace(question, asked_ns=now_ns))
         return Reply(verdict=verdict, text=question.command_text, conversation=again)
     return _going_on(conversation, question, verdict, chosen)
 
@@ -177,59 +175,22 @@ def _plain(text: str) -> str:
 
 
 def _among(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
-    """Take what is said not to be meant from the candidates; let the rest pick one of those left.
-
-    Where it is said to be any of them, it is the first.
-    """
-    remaining = _remaining(candidates, text)
-    if isinstance(remaining, Verdict):
-        return remaining, None
-    left, said, any_will_do = remaining
-    if len(left) == len(candidates):
-        return _picked(candidates, said)
-    if not left:
-        return Verdict.NO, None
-    if _telling(candidates, said):
-        return _picked(left, said)
-    is_clear = any_will_do or len(left) == 1
-    return (Verdict.CHOSEN, left[0]) if is_clear else (Verdict.UNCLEAR, None)
-
-
-def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool] | Verdict:
-    """Return the candidates that are not ruled out, what is said besides, and if any will do.
-
-    Return what the whole is instead where something unknown is ruled out.
-    """
-    left, rest, any_will_do = list(candidates), list[str](), False
+    """Pick a candidate; what is said not to be meant is left out."""
+    left, rest = candidates, list[str]()
     for piece in _PIECE.split(_plain(text)):
         said = " ".join(_WORD.findall(piece))
-        found = _NOT.fullmatch(said)
-        if found is None:
+        denied = _NOT.fullmatch(said)
+        if denied is None:
             rest.append(said)
             continue
-        named = [_telling(candidates, one) for one in _OR.split(found["not"])]
-        if not all(words and _known(candidates).issuperset(words) for words in named):
-            return Verdict.ANEW if all(named) else Verdict.UNCLEAR
-        left = [one for one in left if not any(one.features.issuperset(it) for it in named)]
-        rest.append(found["rest"] or "")
-        any_will_do = any_will_do or bool(found["any"])
-    return tuple(left), " ".join(part for part in rest if part), any_will_do
-
-
-def _narrowed(question: Question, text: str) -> Question:
-    """Return the question without the candidates that an answer rules out, where several are left.
-
-    "not the blue one", to "the red one, the blue one or the white one?" -> "the red one or the
-    white one?".
-    """
-    remaining = _remaining(question.candidates, text)
-    if isinstance(remaining, Verdict) or len(remaining[0]) < 2:
-        return question
-    left = remaining[0]
-    before, after = (
-        either([one.words for one in some[:MOST_CHOICES]]) for some in (question.candidates, left)
-    )
-    return replace(question, text=question.text.replace(before, after), candidates=left)
+        words = _telling(candidates, denied["not"])
+        if not words or not _known(candidates).issuperset(words):
+            return Verdict.ANEW if words else Verdict.UNCLEAR, None
+        left = tuple(one for one in left if not one.features.issuperset(words))
+    said = " ".join(filter(None, rest))
+    if len(left) == 1 < len(candidates) and not _telling(candidates, said):
+        return Verdict.CHOSEN, left[0]
+    return _picked(left, said) if left else (Verdict.NO, None)
 
 
 def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | None]:

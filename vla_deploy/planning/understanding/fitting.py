@@ -108,13 +108,8 @@ def _in_room(query: Query, setting: Setting) -> list[Thing]:
     if table in ("", room):
         return []
     there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}
-    return _standing_on(there, query, setting)
-
-
-def _standing_on(names: Collection[str], query: Query, setting: Setting) -> list[Thing]:
-    """Return what a query means, but for its relation, among what rests on these."""
     alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
-    return [one for one in alone if _rests_on(one, names)]
+    return [one for one in alone if _rests_on(one, there)]
 
 
 def _rests_on(thing: Thing, names: Collection[str]) -> bool:

@@ -20,10 +20,11 @@ from vla_deploy.planning.plan import (
     dependency_faults,
     execution_order,
 )
-from vla_deploy.planning.symbolic import LOGIC, after, state_of
 from vla_deploy.planning.symbolic.conditions import MET, Setting, has_free_hand, is_before, is_known
 from vla_deploy.planning.symbolic.sharing import in_turn
-from vla_deploy.planning.symbolic.state import State
+from vla_deploy.planning.symbolic.simulation import after
+from vla_deploy.planning.symbolic.state import State, state_of
+from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.planning.understanding.furniture import nearest_furniture
 from vla_deploy.planning.understanding.normaliser import normalised
 from vla_deploy.planning.understanding.referring import Step, grounded_steps

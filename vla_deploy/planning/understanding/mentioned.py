@@ -6,7 +6,7 @@ from typing import Final
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.references import words_of
-from vla_deploy.planning.symbolic.subjects import Subject, subject_of
+from vla_deploy.planning.symbolic.state import Subject, subject_of
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS

@@ -8,8 +8,7 @@ from typing import Any, Final
 from vla_deploy.planning.errors import NotAble, UnknownObject, UnknownPlace
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
-from vla_deploy.planning.symbolic.state import State
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import State, subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import read_expression

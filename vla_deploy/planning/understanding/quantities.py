@@ -80,8 +80,12 @@ def quantity_of(text: str, dimension: str) -> float | None:
 
     A number without a unit is in the dimension's own.
     """
-    words = _TOKEN.findall(re.sub(r"-(?=[a-z])", " ", text.lower()))
-    return amount_of(words, UNITS[dimension], bare=1.0)
+    return amount_of(quantity_words(text), UNITS[dimension], bare=1.0)
+
+
+def quantity_words(text: str) -> list[str]:
+    """Return the words and figures of a quantity: "50cm" is two."""
+    return _TOKEN.findall(re.sub(r"-(?=[a-z])", " ", text.lower()))
 
 
 def amount_of(

@@ -7,8 +7,7 @@ from typing import Final
 
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic.state import Held, Pose, State
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.symbolic.state import Held, Pose, State, subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.places import (
@@ -40,8 +39,7 @@ def grounded_steps(action: Action, resolver: Resolver, state: GetState) -> Itera
     yield from handle(action.parameters, resolver, state)
 
 
-def _navigate(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
-    del state
+def _navigate(given: Parameters, resolver: Resolver, _: GetState) -> Iterator[Step]:
     rest = {name: value for name, value in given.items() if name not in ("place", "object")}
     goal = given.get("place", given.get("object"))
     if not isinstance(goal, str) or ("place" in given and "object" in given):
@@ -76,8 +74,7 @@ def pose_parameters(pose: Pose) -> dict[str, float]:
 
 
 def _see(skill: str) -> Callable[[Parameters, Resolver, GetState], Iterator[Step]]:
-    def handle(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
-        del state
+    def handle(given: Parameters, resolver: Resolver, _: GetState) -> Iterator[Step]:
         if not isinstance(given.get("object"), str):
             yield skill, given
             return

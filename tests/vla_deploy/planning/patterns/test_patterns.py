@@ -34,6 +34,8 @@ def does(text: str, *turns: Turn) -> str:
         ("come here", "navigate_to here"),
         ("dock", "navigate_to charging station"),
         ("move back a bit", "move -0.2"),
+        ("go a little forward", "move 0.2"),
+        ("turn right slightly", "turn -0.2617993877991494"),
         ("drive forward 50 cm", "move 0.5"),
         ("turn left 90 degrees", "turn 1.5707963267948966"),
         ("look up", "look_at up"),
@@ -41,14 +43,22 @@ def does(text: str, *turns: Turn) -> str:
         ("find my keys", "find_object my keys"),
         ("pick up the red cup", "pick_up the red cup"),
         ("grab the ball with your left hand", "pick_up the ball left"),
-        ("put it down", "place"),
+        ("put it down", "place it"),
         ("put the cup in the box", "place the cup the box in"),
         ("put the red cup next to the book", "place the red cup the book next to"),
-        ("empty your left hand", "place what is in your left hand left"),
+        ("empty your left hand", "place left"),
         ("open your right gripper", "open_gripper right"),
         ("tuck your arms", "move_arm tuck"),
-        ("say good morning", "speak good morning"),
+        ("say good morning", "speak Good morning."),
         ("wait 5 seconds", "wait 5.0"),
+        ("spin around once", "turn 6.283185307179586"),
+        ("turn around", "turn 3.141592653589793"),
+        ("bring the cup to the entrance", "pick_up the cup; navigate_to the entrance"),
+        ("bring the cup to the coffee table", "place the cup the coffee table"),
+        (
+            "put the red cup and the ball into the box",
+            "place the red cup the box in; place the ball the box in",
+        ),
         (
             "pick up the red cup and put it in the box, then go to the kitchen",
             "pick_up the red cup; place it the box in; navigate_to the kitchen",
@@ -72,6 +82,7 @@ def test_a_common_command_is_planned_as_it_is_said(text: str, expected: str) -> 
         "go to the kitchen instead of the bedroom",
         "tell Anna to go to the kitchen",
         "pick up the cup that my sister gave me",
+        "put the cup on the table next to the book",
         "colourless green ideas",
         "x" * 5000,
         "",
@@ -85,6 +96,18 @@ def test_what_no_pattern_covers_whole_is_declined(text: str) -> None:
 def test_a_place_that_nobody_knows_is_named() -> None:
     with pytest.raises(UnknownPlace, match="narnia"):
         pattern_plan(request_for("go to narnia"))
+
+
+@pytest.mark.parametrize(
+    ("text", "intents"),
+    [
+        ("stop", "stop"), ("go to the kitchen", "navigation"), ("find my keys", "search"),
+        ("pick up the cup and go to the kitchen", "manipulation, navigation"),
+        ("tidy up", "cleaning"), ("where are you", "question"), ("help me", "assist"),
+    ],
+)  # fmt: skip
+def test_a_plan_says_what_it_is_for(text: str, intents: str) -> None:
+    assert pattern_plan(request_for(text)).summary.startswith(f"{intents}: ")
 
 
 def test_again_does_what_was_done_last() -> None:

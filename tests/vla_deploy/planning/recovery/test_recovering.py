@@ -8,14 +8,14 @@ from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.recovery import (
+from vla_deploy.planning.recovery.setback import (
     Carried,
     FailureCause,
     Setback,
     numbered,
     read_setback,
-    recover,
 )
+from vla_deploy.planning.recovery.strategies import recover
 
 TAKE = ("pick_up", {"object": "cup_1"})
 MOVE = ("move", {"distance_m": 2.0, "speed_m_s": 0.2})

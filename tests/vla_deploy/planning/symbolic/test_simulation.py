@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic import bounds_faults, end_state, symbolic_faults
+from vla_deploy.planning.symbolic.simulation import bounds_faults, end_state, symbolic_faults
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest

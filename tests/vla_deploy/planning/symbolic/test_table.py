@@ -1,5 +1,5 @@
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.symbolic import LOGIC
+from vla_deploy.planning.symbolic.table import LOGIC
 
 
 def test_every_skill_of_the_catalogue_has_its_logic() -> None:

@@ -4,11 +4,12 @@ import math
 
 import pytest
 
+from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.plan import chained
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot
@@ -20,7 +21,8 @@ Skills = list[tuple[str, dict[str, object]]]
 
 def planned(command: str, *steps: Step, request: Request | None = None) -> Skills:
     request = request or Request(command_id="c", text=command, world=WORLD, here=HERE)
-    actions = Steps(command.split(), request).actions(steps)
+    made = Steps(command.split(), request)
+    actions = chained([skill for step in steps for skill in made.skills(step)])
     assert [one.depends_on for one in actions[1:]] == [(one.id,) for one in actions[:-1]]
     return [(one.skill, dict(one.parameters)) for one in actions]
 
