@@ -7,8 +7,6 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
-MOST_CHARACTERS: Final = 1000
-"""Of one command in words."""
 MOST_ACTIONS: Final = 100
 PUT_IN: Final = "put in"
 """What the description of an action says that its author did not ask for."""

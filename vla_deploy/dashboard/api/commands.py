@@ -10,7 +10,7 @@ from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import CommandRecord
 from vla_deploy.dashboard.access import Role, note, require
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.planning.plan import MOST_CHARACTERS
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 

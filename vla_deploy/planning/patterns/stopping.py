@@ -3,8 +3,8 @@
 import re
 from typing import Final
 
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.patterns.phrase import courtesy_off
-from vla_deploy.planning.plan import MOST_CHARACTERS
 from vla_deploy.planning.scope import IDIOMS
 
 STOP_PHRASES: Final = frozenset(

@@ -8,10 +8,10 @@ from string import Template
 from typing import Any, Final
 
 from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.catalogue import SKILLS, Parameter, Type
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import MOST_CHARACTERS
 from vla_deploy.planning.prompts.situation_data import as_data, fitted, plain, situation_of
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
