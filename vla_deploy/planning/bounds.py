@@ -1,4 +1,4 @@
-"""Bound what people and programs may give the planner, for ROS's Python, too: it has no pydantic."""
+"""Bound what people and programs may give the planner; no pydantic, as ROS has its own Python."""
 
 from typing import Final
 
