@@ -32,7 +32,7 @@ LONGEST_DELAY_S: Final = 0.42
 GRID: Final = tuple(round(float(one), 3) for one in np.arange(0.3, 1.0, 0.005))
 REFRACTORY_S: Final = 1.0
 LATE_S: Final = 0.6
-ALARMS_PER_HOUR: Final = {"high": 4.0, "normal": 2.0, "low": 1.0}
+ALARMS_PER_HOUR: Final = {"high": 12.0, "normal": 4.0, "low": 1.0}
 """Of the held voices' talk, half of which is made to sound like a stop word."""
 TALK_SNRS_DB: Final = (None, 20.0, 10.0)
 CURVE: Final = tuple(round(float(one), 2) for one in np.arange(0.4, 1.0, 0.05))
