@@ -64,6 +64,12 @@ def _evaluate(out: Path, settings: Settings) -> None:
     evaluate(out, out / MODELS, settings)
 
 
+def _judge(out: Path, settings: Settings) -> None:
+    from training.stop_words.evaluation import judge
+
+    judge(out, out / MODELS, settings)
+
+
 def _card(out: Path, settings: Settings) -> None:
     from training.stop_words.card import describe
 
@@ -80,6 +86,7 @@ STEPS: dict[str, Callable[[Path, Settings], None]] = {
     "train": _train,
     "export": _export,
     "evaluate": _evaluate,
+    "judge": _judge,
     "card": _card,
 }
 """What `all` does, in this order; each goes on where it was broken off."""

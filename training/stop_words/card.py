@@ -9,11 +9,12 @@ from typing import Any, Final
 import numpy as np
 
 from training.stop_words.cast import PARTS
-from training.stop_words.evaluation import METRICS, REFRACTORY_S, SNRS_DB
+from training.stop_words.evaluation import ALL, ALL_BUT_KOKORO, METRICS, REFRACTORY_S, SNRS_DB
 from training.stop_words.export import FILE, FRAMES, INPUT, MOMENTS, OUTPUT
 from training.stop_words.network import REACH, StopNet
 from training.stop_words.settings import Settings
 from training.stop_words.texts import WORDS
+from training.voices import kokoro
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     KeyWords,
@@ -30,7 +31,12 @@ from vla_deploy.speech.stop_words.features import BANDS, HOP, NAME
 
 CARD: Final = "card.md"
 TEMPLATE: Final = Path(__file__).with_name("card_template.md")
-AIM_MISSED, AIM_ALARMS, AIM_DELAY_S = 0.02, 1.0, 0.5
+AIM_MISSED: Final = {"clean": 0.05, "10": 0.1}
+AIM_ALARMS, AIM_DELAY_S = 1.0, 0.5
+USUAL: Final = "low"
+"""The threshold of the base profile."""
+VOICES: Final = ("other engines", "held styles", "judged styles")
+COSTS: Final = ("missed clean", "missed at 10 dB", "alarms per hour")
 _RUNS: Final = 200
 
 
@@ -67,6 +73,7 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "engines": f"{counts}: clips with a stop word, and without",
         "cpu_minutes": f"{settings.cpu_minutes:g}",
         "seed": settings.seed,
+        "judged": ", ".join(kokoro.JUDGED),
         "tables": tables(metrics),
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
@@ -74,48 +81,79 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
 
 def verdict(metrics: dict[str, Any]) -> str:
     """Return a sentence on whether it does what is asked of it."""
-    told = metrics["at"]["normal"]
-    missed, alarms = told["missed_ratio"]["10"]["all"], told["false_alarms_per_hour"]
+    told = metrics["judged"]["at"][USUAL]
+    missed = {snr: told["missed_ratio"][snr][ALL] for snr in AIM_MISSED}
+    alarms = told["false_alarms_per_hour"][ALL]
     figures = (
-        f"{missed:.1%} of the stops missed in noise at 10 dB, {alarms:.1f} false alarms per hour "
-        f"of talk, told within {told['delay_p95_s']:.2f} s of the word's end (95 of 100)"
+        f"{missed['clean']:.1%} of the stops missed in quiet, {missed['10']:.1%} in noise at "
+        f"10 dB, {alarms:.1f} false alarms per hour of talk, told within "
+        f"{told['delay_p95_s']:.2f} s of the word's end (95 of 100)"
     )
-    if missed <= AIM_MISSED and alarms <= AIM_ALARMS and told["delay_p95_s"] <= AIM_DELAY_S:
-        return f"It reaches its aim on voices that it has not learnt: {figures}."
-    aim = f"{AIM_MISSED:.0%}, {AIM_ALARMS:g}, {AIM_DELAY_S:g} s"
-    return f"**It does not reach its aim ({aim}) on voices that it has not learnt: {figures}.**"
+    is_reached = (
+        all(missed[snr] <= most for snr, most in AIM_MISSED.items())
+        and alarms <= AIM_ALARMS
+        and told["delay_p95_s"] <= AIM_DELAY_S
+    )
+    if is_reached:
+        return f"By itself it reaches its aim on voices that it has not learnt: {figures}."
+    aim = f"{AIM_MISSED['clean']:.0%}, {AIM_MISSED['10']:.0%}, {AIM_ALARMS:g}, {AIM_DELAY_S:g} s"
+    return (
+        f"**By itself it does not reach its aim ({aim}) on voices that it has not learnt: "
+        f"{figures}.**"
+    )
 
 
 def tables(metrics: dict[str, Any]) -> str:
-    """Return misses by noise and voice, then what each threshold costs."""
-    missed = metrics["at"]["normal"]["missed_ratio"]
-    groups = sorted(next(iter(missed.values())))
-    lines = [
-        f"| missed at the threshold `normal` | {' | '.join(groups)} |",
-        f"|---|{'---|' * len(groups)}",
-    ]
-    for snr, told in missed.items():
-        name = snr if SNRS_DB[snr] is None else f"{snr} dB"
-        lines.append(f"| {name} | {' | '.join(f'{told[group]:.1%}' for group in groups)} |")
-    lines += [
-        "",
-        "| threshold | | false alarms per hour | missed clean | missed at 10 dB | delay p95 |",
-        "|---|---|---|---|---|---|",
-    ]
-    for name, told in metrics["at"].items():
-        missed = told["missed_ratio"]
-        lines.append(
-            f"| `{name}` | {told['threshold']} | {told['false_alarms_per_hour']:.1f} "
-            f"| {missed['clean']['all']:.1%} | {missed['10']['all']:.1%} "
-            f"| {told['delay_p95_s']:.2f} s |"
-        )
+    """Return misses by noise and voice, then what each threshold costs whom."""
+    missed = metrics["at"][USUAL]["missed_ratio"]
+    missed_judged = metrics["judged"]["at"][USUAL]["missed_ratio"]
+    groups = sorted(missed["clean"])
     words = ", ".join(f"word_{number + 1} is {word!r}" for number, word in enumerate(WORDS))
-    return "\n".join([*lines, "", f"{metrics['hours']:.1f} h of talk; {words}."])
+    rows = [
+        [
+            snr if SNRS_DB[snr] is None else f"{snr} dB",
+            *(f"{missed[snr][group]:.1%}" for group in groups),
+            f"{missed_judged[snr][ALL]:.1%}",
+        ]
+        for snr in missed
+    ]
+    hours = [f"{one['hours'][ALL]:.1f} h" for one in (metrics, metrics["judged"])]
+    lines = [
+        *_table([f"missed at the threshold `{USUAL}`", *groups, "judged styles"], rows),
+        "",
+        f"{words}; `kokoro` are its held styles.",
+        "",
+        *_table(
+            ["threshold", "", *(f"{voices}: {cost}" for voices in VOICES for cost in COSTS)],
+            [
+                *([f"`{name}`", *_costs(metrics, "at", name)] for name in metrics["thresholds"]),
+                *(["", *_costs(metrics, "curve", place)] for place in range(len(metrics["curve"]))),
+            ],
+        ),
+        "",
+        f"{hours[0]} of talk by held voices, {hours[1]} by judged ones: each clip in quiet, at 20",
+        "and at 10 dB.",
+    ]
+    return "\n".join(lines)
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (head, len(head) * ["---"], *rows)]
+
+
+def _costs(metrics: dict[str, Any], kind: str, key: str | int) -> list[str]:
+    """Return a threshold, and what it costs on other engines, held styles and judged ones."""
+    held, judged = metrics[kind][key], metrics["judged"][kind][key]
+    cells = [str(held["threshold"])]
+    for told, group in ((held, ALL_BUT_KOKORO), (held, kokoro.ENGINE), (judged, ALL)):
+        missed, alarms = told["missed_ratio"], told["false_alarms_per_hour"]
+        cells += [f"{missed[snr][group]:.1%}" for snr in AIM_MISSED] + [f"{alarms[group]:.1f}"]
+    return cells
 
 
 def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
     """Return what the software is told of the model."""
-    told = metrics["at"]["normal"]
+    told = metrics["judged"]["at"][USUAL]
     return Manifest(
         name="stop_words",
         role="key_words",
@@ -132,8 +170,8 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
             refractory_s=REFRACTORY_S,
             thresholds=metrics["thresholds"],
             measured=SpottingMeasured(
-                missed_ratio=round(told["missed_ratio"]["10"]["all"], 4),
-                false_alarms_per_hour=round(told["false_alarms_per_hour"], 2),
+                missed_ratio=round(told["missed_ratio"]["10"][ALL], 4),
+                false_alarms_per_hour=round(told["false_alarms_per_hour"][ALL], 2),
                 delay_p95_s=round(told["delay_p95_s"], 3),
             ),
         ),

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices import espeak, festival, flite, hibari, pico, piper, rhvoice
+from training.voices import espeak, festival, flite, hibari, kokoro, pico, piper, rhvoice
 from training.voices.cast import (
     ACCENTS,
     HELD_OUT_ACCENT,
@@ -27,25 +27,47 @@ def _festival(text: str, voice: str, style: Style) -> Clip:
 class Part:
     """Say how many clips one engine speaks, with stop words and without, to train and to judge.
 
-    `tells_times` is false where only words that come last can be used.
+    `share` is how often a clip of it is learnt from, against those of the others; `held` voices
+    choose the model and its thresholds, `judged` ones nothing. `tells_times` is false where only
+    words that come first or last can be used.
     """
 
     engine: str
     speak: Speak
     tells_times: bool
+    share: float = 0.0
     voices: tuple[str, ...] = ()
     stops: int = 0
     others: int = 0
     held_voices: tuple[str, ...] = ()
     held_stops: int = 0
     held_others: int = 0
+    judged_voices: tuple[str, ...] = ()
+    judged_stops: int = 0
+    judged_others: int = 0
 
 
 PARTS: Final = (
     Part(
+        engine=kokoro.ENGINE,
+        speak=kokoro.speak,
+        tells_times=True,
+        share=0.4,
+        voices=kokoro.VOICES,
+        stops=1000,
+        others=500,
+        held_voices=kokoro.DEVELOPMENT,
+        held_stops=180,
+        held_others=400,
+        judged_voices=kokoro.JUDGED,
+        judged_stops=200,
+        judged_others=400,
+    ),
+    Part(
         engine=espeak.ENGINE,
         speak=espeak.speak,
         tells_times=True,
+        share=0.15,
         voices=tuple(f"{a}+{v}" for a in ACCENTS for v in (*VARIANTS, *ROBOTIC_VARIANTS)),
         stops=8000,
         others=10000,
@@ -60,6 +82,7 @@ PARTS: Final = (
         engine=flite.ENGINE,
         speak=flite.speak,
         tells_times=True,
+        share=0.12,
         voices=tuple(flite.PITCH_HZ),
         stops=4000,
         others=7000,
@@ -68,6 +91,7 @@ PARTS: Final = (
         engine=pico.ENGINE,
         speak=pico.speak,
         tells_times=False,
+        share=0.07,
         voices=("en-US",),
         stops=2000,
         others=6000,
@@ -79,6 +103,7 @@ PARTS: Final = (
         engine=rhvoice.ENGINE,
         speak=rhvoice.speak,
         tells_times=False,
+        share=0.12,
         voices=rhvoice.VOICES,
         stops=3000,
         others=6000,
@@ -90,6 +115,7 @@ PARTS: Final = (
         engine=hibari.ENGINE,
         speak=hibari.speak,
         tells_times=False,
+        share=0.07,
         voices=hibari.VOICES,
         stops=2000,
         others=7000,
@@ -98,6 +124,7 @@ PARTS: Final = (
         engine=piper.ENGINE,
         speak=piper.speak,
         tells_times=False,
+        share=0.07,
         voices=piper.VOICES,
         stops=1600,
         others=2500,
@@ -123,4 +150,4 @@ def draw_style(random: np.random.Generator) -> Style:
     )
 
 
-BY_ENGINE: Final[Mapping[str, Part]] = {part.engine: part for part in PARTS}
+SHARES: Final[Mapping[str, float]] = {part.engine: part.share for part in PARTS}

@@ -22,7 +22,8 @@ from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import SynthesisFailed
 from training.voices.phones import NUMBERS
 
-TRAIN, HELD = "train", "held"
+TRAIN, HELD, JUDGED = "train", "held", "judged"
+SPLITS: Final = (TRAIN, HELD, JUDGED)
 Samples = NDArray[np.int16]
 _MARGIN: Final = RATE_HZ // 30
 _FULL_SCALE: Final = 32_767.0
@@ -95,12 +96,14 @@ def speak(folder: Path, seed: int, scale: float = 1.0) -> None:
             (TRAIN, "others", part.others),
             (HELD, "stops", part.held_stops),
             (HELD, "others", part.held_others),
+            (JUDGED, "stops", part.judged_stops),
+            (JUDGED, "others", part.judged_others),
         ):
             path = folder / f"{split}-{kind}-{part.engine}.npy"
             count = round(wanted * scale)
             if path.with_suffix(".json").exists() or not count:
                 continue
-            random = np.random.default_rng([seed, number, split == HELD, kind == "stops"])
+            random = np.random.default_rng([seed, number, SPLITS.index(split), kind == "stops"])
             _write(path, _clips(part, split, kind, count, random))
             _LOG.info("%s: %d clips", path.name, count)
 
@@ -108,7 +111,7 @@ def speak(folder: Path, seed: int, scale: float = 1.0) -> None:
 def _clips(
     part: Part, split: str, kind: str, count: int, random: np.random.Generator
 ) -> list[Said]:
-    voices = part.held_voices if split == HELD else part.voices
+    voices = {TRAIN: part.voices, HELD: part.held_voices, JUDGED: part.judged_voices}[split]
     talk = other_talk(count, random, _lexicon(), _examples().draw)
     texts = (
         stop_texts(count, talk, random, timed=part.tells_times)

@@ -1,9 +1,13 @@
-"""Judge the network on voices that it has not learnt; choose smoothing and thresholds by that."""
+"""Judge the network on voices that it has not learnt.
+
+Smoothing and thresholds are chosen by the held voices. Then, once, the judged ones tell how good it
+is: nothing is chosen by them.
+"""
 
 import json
 import logging
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,11 +16,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from training.stop_words.corpus import HELD, Clips, Said
+from training.stop_words.corpus import HELD, JUDGED, Clips, Said
 from training.stop_words.export import trained
 from training.stop_words.network import REACH, Scores
 from training.stop_words.rooms import NoiseBank, Sound
 from training.stop_words.settings import Settings
+from training.voices import kokoro
 from training.voices.clip import RATE_HZ
 from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW, log_mel
 
@@ -27,8 +32,12 @@ LONGEST_DELAY_S: Final = 0.42
 GRID: Final = tuple(round(float(one), 3) for one in np.arange(0.3, 1.0, 0.005))
 REFRACTORY_S: Final = 1.0
 LATE_S: Final = 0.6
-ALARMS_PER_HOUR: Final = {"high": 20.0, "normal": 8.0, "low": 3.0}
-"""Of this talk, half of which is made to sound like a stop word: ordinary talk alarms a tenth."""
+ALARMS_PER_HOUR: Final = {"high": 12.0, "normal": 4.0, "low": 1.0}
+"""Of the held voices' talk, half of which is made to sound like a stop word."""
+TALK_SNRS_DB: Final = (None, 20.0, 10.0)
+CURVE: Final = tuple(round(float(one), 2) for one in np.arange(0.4, 1.0, 0.05))
+ALL: Final = "all"
+ALL_BUT_KOKORO: Final = "all_but_kokoro"
 _BEFORE_S, _AFTER_S = 1.0, 0.9
 _LOUDNESS, _HISS = 0.05, 3e-4
 _LOG = logging.getLogger(__name__)
@@ -46,25 +55,74 @@ class Trial:
     scores: Scored
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Talk:
+    """Hold the scores of a clip of other talk."""
+
+    engine: str
+    duration_s: float
+    scores: Scored
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Heard:
+    """Hold all that the network heard of some voices."""
+
+    trials: Sequence[Trial]
+    talk: Sequence[Talk]
+
+    @property
+    def hours(self) -> dict[str, float]:
+        """Return how much other talk there is, of each engine and of all."""
+        hours: dict[str, float] = defaultdict(float)
+        for one in self.talk:
+            for group in _groups(one.engine):
+                hours[group] += one.duration_s / 3600.0
+        return dict(hours)
+
+
 def evaluate(out: Path, models: Path, settings: Settings) -> None:
-    """Write the figures beside the model.
+    """Choose by the held voices, and write what they tell beside the model.
 
     Raises:
         FileNotFoundError: nothing was trained yet, or nothing was spoken to judge by.
     """
+    heard = _heard(out, HELD, settings)
+    choices = [_choice(heard, smoothing) for smoothing in SMOOTHINGS]
+    quick = [one for one in choices if one["at"]["low"]["delay_p95_s"] <= LONGEST_DELAY_S]
+    best = min(quick or choices, key=lambda one: float(one["at"]["low"]["missed_mean"]))
+    _write(models, best)
+    _LOG.info("smoothing %d: %s", best["smoothing"], json.dumps(best["at"]["low"], indent=2))
+
+
+def judge(out: Path, models: Path, settings: Settings) -> None:
+    """Add what the judged voices tell of a model whose thresholds are chosen.
+
+    Raises:
+        FileNotFoundError: the model was not evaluated yet, or nothing was spoken to judge by.
+    """
+    metrics = json.loads((models / METRICS).read_text(encoding="utf-8"))
+    heard = _heard(out, JUDGED, settings)
+    told = _figures(heard, metrics["thresholds"], metrics["smoothing"])
+    _write(models, metrics | {"judged": told})
+    _LOG.info("judged: %s", json.dumps(told["at"]["low"], indent=2))
+
+
+def _write(models: Path, metrics: dict[str, Any]) -> None:
+    text = json.dumps(metrics, indent=2)
+    (models / METRICS).write_text(text + "\n", encoding="utf-8")
+
+
+def _heard(out: Path, split: str, settings: Settings) -> Heard:
+    """Let the network hear phrases and other talk of the voices of one split."""
     torch.set_num_threads(1)
     net = Scores(trained(out)).eval()
     random = np.random.default_rng([settings.seed, 3])
-    others = Clips(out / "clips", HELD, "others")
+    others = Clips(out / "clips", split, "others")
     bank = NoiseBank(others, random)
-    talk, hours = _talk(net, others, bank, settings, random)
-    trials = list(_trials(net, Clips(out / "clips", HELD, "stops"), bank, settings, random))
-    choices = [_choice(trials, talk, hours, smoothing) for smoothing in SMOOTHINGS]
-    quick = [one for one in choices if one["at"]["normal"]["delay_p95_s"] <= LONGEST_DELAY_S]
-    best = min(quick or choices, key=lambda one: float(one["at"]["normal"]["missed_mean"]))
-    text = json.dumps(best, indent=2)
-    (models / METRICS).write_text(text + "\n", encoding="utf-8")
-    _LOG.info("smoothing %d: %s", best["smoothing"], json.dumps(best["at"]["normal"], indent=2))
+    talk = _talk(net, others, bank, settings, random)
+    stops = Clips(out / "clips", split, "stops")
+    return Heard(talk=talk, trials=_trials(net, stops, bank, settings, random))
 
 
 def scores_of(net: Scores, sound: Sound) -> tuple[NDArray[np.float64], Scored]:
@@ -97,8 +155,7 @@ def _trials(
 ) -> Sequence[Trial]:
     trials = []
     offset_s = _BEFORE_S + REACH * HOP / RATE_HZ
-    picks = random.permutation(len(stops))[: settings.judged_stops]
-    for number in picks:
+    for number in random.permutation(len(stops))[: settings.judged_stops]:
         said = stops[int(number)]
         word, start_s, end_s = said.events[0]
         for snr, snr_db in SNRS_DB.items():
@@ -106,7 +163,7 @@ def _trials(
             inside = (times_s > offset_s + start_s) & (times_s < offset_s + end_s + LATE_S)
             trials.append(
                 Trial(
-                    engine=said.voice.partition("/")[0],
+                    engine=_engine(said),
                     word=int(word),
                     snr=snr,
                     times_s=times_s[inside] - offset_s - end_s,
@@ -118,31 +175,55 @@ def _trials(
 
 def _talk(
     net: Scores, others: Clips, bank: NoiseBank, settings: Settings, random: np.random.Generator
-) -> tuple[list[Scored], float]:
-    """Return the scores of clips of other talk, and how many hours they are."""
-    spent_s, talk = 0.0, []
-    while spent_s < 3600.0 * settings.judged_hours:
-        said = others[int(random.integers(len(others)))]
-        snr_db = (None, 20.0, 10.0)[int(random.integers(3))]
-        talk.append(scores_of(net, in_noise(said, snr_db, bank, random))[1])
-        spent_s += len(said.samples) / RATE_HZ
-    return talk, spent_s / 3600.0
+) -> list[Talk]:
+    """Return the scores of clips of other talk, each clip in each noise."""
+    spent_s = 0.0
+    talk: list[Talk] = []
+    for number in random.permutation(len(others)):
+        said = others[int(number)]
+        for snr_db in TALK_SNRS_DB:
+            duration_s = len(said.samples) / RATE_HZ
+            scores = scores_of(net, in_noise(said, snr_db, bank, random))[1]
+            talk.append(Talk(engine=_engine(said), duration_s=duration_s, scores=scores))
+            spent_s += duration_s
+        if spent_s >= 3600.0 * settings.judged_hours:
+            break
+    return talk
 
 
-def _choice(
-    trials: Sequence[Trial], talk: Sequence[Scored], hours: float, smoothing: int
-) -> dict[str, Any]:
+def _engine(said: Said) -> str:
+    return said.voice.partition("/")[0]
+
+
+def _groups(engine: str) -> tuple[str, ...]:
+    """Return the groups of clips that one engine's belong to."""
+    return (ALL, engine) if engine == kokoro.ENGINE else (ALL, engine, ALL_BUT_KOKORO)
+
+
+def _choice(heard: Heard, smoothing: int) -> dict[str, Any]:
     """Return thresholds and figures with one smoothing."""
-    peaks = [peak for scores in talk for peak in _peaks(smoothed(scores, smoothing))]
-    thresholds = {name: _threshold(name, peaks, hours) for name in ALARMS_PER_HOUR}
+    peaks = _peaks(heard, smoothing)[ALL]
+    thresholds = {
+        name: _threshold(peaks, most * heard.hours[ALL]) for name, most in ALARMS_PER_HOUR.items()
+    }
     return {
         "smoothing": smoothing,
-        "hours": hours,
         "thresholds": thresholds,
-        "at": {
-            name: _told(trials, peaks, hours, threshold, smoothing)
-            for name, threshold in thresholds.items()
-        },
+        **_figures(heard, thresholds, smoothing),
+    }
+
+
+def _figures(heard: Heard, thresholds: Mapping[str, float], smoothing: int) -> dict[str, Any]:
+    """Return what is told at each threshold, and the curve of misses against alarms."""
+    peaks = _peaks(heard, smoothing)
+
+    def told(threshold: float) -> dict[str, Any]:
+        return _told(heard, peaks, threshold, smoothing)
+
+    return {
+        "hours": heard.hours,
+        "at": {name: told(threshold) for name, threshold in thresholds.items()},
+        "curve": [told(threshold) for threshold in CURVE],
     }
 
 
@@ -154,28 +235,34 @@ def smoothed(scores: Scored, count: int) -> Scored:
     return best
 
 
-def _peaks(best: Scored) -> list[float]:
-    """Return the highest score of each second."""
+def _peaks(heard: Heard, smoothing: int) -> dict[str, list[float]]:
+    """Return the highest score of each second of talk, by engine and of all."""
     size = round(REFRACTORY_S * RATE_HZ / HOP / STRIDE)
-    return [float(best[at : at + size].max()) for at in range(0, len(best), size)]
+    peaks: dict[str, list[float]] = defaultdict(list)
+    for one in heard.talk:
+        best = smoothed(one.scores, smoothing)
+        highest = [float(best[at : at + size].max()) for at in range(0, len(best), size)]
+        for group in _groups(one.engine):
+            peaks[group] += highest
+    return peaks
 
 
-def _threshold(name: str, peaks: list[float], hours: float) -> float:
-    """Return the lowest threshold of the grid with few enough false alarms."""
+def _threshold(peaks: list[float], most: float) -> float:
+    """Return the lowest threshold of the grid with at most so many false alarms."""
     for threshold in GRID:
-        if sum(peak >= threshold for peak in peaks) <= ALARMS_PER_HOUR[name] * hours:
+        if sum(peak >= threshold for peak in peaks) <= most:
             return threshold
     return GRID[-1]
 
 
 def _told(
-    trials: Sequence[Trial], peaks: list[float], hours: float, threshold: float, smoothing: int
+    heard: Heard, peaks: Mapping[str, Sequence[float]], threshold: float, smoothing: int
 ) -> dict[str, Any]:
     missed: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
     delays_s = []
-    for trial in trials:
+    for trial in heard.trials:
         reached = np.flatnonzero(smoothed(trial.scores, smoothing) >= threshold)
-        for group in ("all", trial.engine, f"word_{trial.word}"):
+        for group in (*_groups(trial.engine), f"word_{trial.word}"):
             missed[trial.snr][group].append(not len(reached))
         if len(reached):
             delays_s.append(float(trial.times_s[reached[0]]))
@@ -183,10 +270,14 @@ def _told(
         snr: {group: float(np.mean(flags)) for group, flags in groups.items()}
         for snr, groups in missed.items()
     }
+    alarms = {
+        group: sum(peak >= threshold for peak in highest) / heard.hours[group]
+        for group, highest in peaks.items()
+    }
     return {
         "threshold": threshold,
-        "false_alarms_per_hour": sum(peak >= threshold for peak in peaks) / hours,
-        "missed_mean": float(np.mean([ratios[snr]["all"] for snr in ("clean", "20", "10")])),
+        "false_alarms_per_hour": alarms,
+        "missed_mean": float(np.mean([ratios[snr][ALL] for snr in ("clean", "20", "10")])),
         "missed_ratio": ratios,
         "delay_p50_s": float(np.percentile(delays_s, 50)) if delays_s else LATE_S,
         "delay_p95_s": float(np.percentile(delays_s, 95)) if delays_s else LATE_S,

@@ -1,12 +1,13 @@
 """Lay clips one after another into long stretches of sound, with rooms, noise and what to learn."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from training.stop_words.cast import SHARES
 from training.stop_words.corpus import Clips, Said
 from training.stop_words.network import REACH
 from training.stop_words.picking import pick
@@ -16,6 +17,7 @@ from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW, log_mel
 
 Sound = NDArray[np.float32]
 Labels = NDArray[np.int64]
+_ByEngine = Mapping[str, NDArray[np.int64]]
 IGNORED: Final = -1
 FIRST_S: Final = 0.14
 """A word is to be told from so long after its end: by then it is no longer word."""
@@ -25,8 +27,6 @@ STOP_SHARE: Final = 0.42
 HARD_SHARE: Final = 0.35
 MAX_HARD: Final = 600
 WORD_SHARES: Final = (0.5, 0.25, 0.25)
-FIRST_ENGINE_SHARE: Final = 0.4
-"""Of all clips; the other engines, which speak fewer, share the rest alike."""
 PHONE_AGO_S: Final = 0.1
 """A phone is told when what follows it can be heard too."""
 
@@ -118,21 +118,22 @@ def varied(stretch: Stretch, random: np.random.Generator) -> Stretch:
     return replace(stretch, frames=frames)
 
 
-def _by_word(stops: Clips) -> list[list[NDArray[np.int64]]]:
+def _by_word(stops: Clips) -> list[_ByEngine]:
     words = np.array([int(stops[k].events[0, 0]) for k in range(len(stops))])
     return [_by_engine(stops.voices, words == k + 1) for k in range(len(WORD_SHARES))]
 
 
-def _by_engine(voices: Sequence[str], wanted: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Return the wanted clips of each engine, of that with most clips first."""
+def _by_engine(voices: Sequence[str], wanted: NDArray[np.bool_]) -> _ByEngine:
+    """Return the wanted clips of each engine."""
     engines = np.array([voice.partition("/")[0] for voice in voices])
-    names, counts = np.unique(engines[wanted], return_counts=True)
-    return [np.flatnonzero(wanted & (engines == names[k])) for k in np.argsort(-counts)]
+    names = [str(name) for name in np.unique(engines[wanted])]
+    return {name: np.flatnonzero(wanted & (engines == name)) for name in names}
 
 
-def _one_of(engines: list[NDArray[np.int64]], random: np.random.Generator) -> int:
-    is_first = len(engines) == 1 or random.random() < FIRST_ENGINE_SHARE
-    clips = engines[0 if is_first else int(random.integers(1, len(engines)))]
+def _one_of(engines: _ByEngine, random: np.random.Generator) -> int:
+    """Return one clip: of each engine as often as its share says, however many it has."""
+    shares = np.array([SHARES[name] for name in engines])
+    clips = engines[str(random.choice(list(engines), p=shares / shares.sum()))]
     return int(clips[random.integers(len(clips))])
 
 

@@ -20,8 +20,8 @@ class Settings:
     seen: int = 12
     stretch_s: float = 7.5
     learning_rate: float = 3e-3
-    judged_hours: float = 1.0
-    judged_stops: int = 500
+    judged_hours: float = 3.0
+    judged_stops: int = 1000
     start_from: Path | None = None
     """The exported model to go on from, else from random weights."""
 

@@ -26,7 +26,7 @@ def word_times(clip: Clip, word: str, *, is_last: bool) -> list[tuple[float, flo
     count = clip.text.lower().count(word)
     found = list(_by_sounds(clip, word))
     if len(found) == count:
-        return found
+        return [(start_s, _heard_until(clip.samples, start_s, end_s)) for start_s, end_s in found]
     if clip.sounds or not can_be_timed(clip.text, word, is_last=is_last):
         return []
     start_s, end_s = (edge / RATE_HZ for edge in sounding(clip.samples))
@@ -50,6 +50,13 @@ def sounding(samples: Wave) -> tuple[int, int]:
     level = np.sqrt(np.mean(whole**2, axis=1))
     loud = np.flatnonzero(level > _QUIET_RATIO * level.max(initial=1e-6))
     return (int(loud[0]) * step, (int(loud[-1]) + 1) * step) if len(loud) else (0, len(samples))
+
+
+def _heard_until(samples: Wave, start_s: float, end_s: float) -> float:
+    """Return the end without the pause before what comes next."""
+    start, end = round(start_s * RATE_HZ), round(end_s * RATE_HZ)
+    heard_s = (start + sounding(samples[start:end])[1]) / RATE_HZ
+    return min(end_s, heard_s)
 
 
 def _by_sounds(clip: Clip, word: str) -> Iterator[tuple[float, float]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from training.voices import espeak, flite, rhvoice
+from training.voices import espeak, flite, kokoro, rhvoice
 from training.voices.cast import HELD_OUT_VARIANTS, ROBOTIC_VARIANTS, VARIANTS, Speaker, say
 from training.voices.clip import Clip, Style
 from training.voices.errors import EngineMissing, SynthesisFailed
@@ -67,6 +67,9 @@ def test_flite_names_the_voices_that_it_has() -> None:
 
 def test_nobody_is_both_trained_on_and_held_out() -> None:
     assert not {*VARIANTS, *ROBOTIC_VARIANTS} & set(HELD_OUT_VARIANTS)
+    trained = {style for voice in kokoro.VOICES for style in voice.split(kokoro.BLEND)}
+    assert not trained & {*kokoro.DEVELOPMENT, *kokoro.JUDGED}
+    assert not set(kokoro.DEVELOPMENT) & set(kokoro.JUDGED)
 
 
 def test_without_rhvoice_it_is_said_where_to_get_it(
@@ -76,3 +79,36 @@ def test_without_rhvoice_it_is_said_where_to_get_it(
     rhvoice._speaker.cache_clear()
     with pytest.raises(EngineMissing, match=f"libRHVoice.*name its folder in {rhvoice.ROOT}"):
         rhvoice.speak("hello", rhvoice.VOICES[0], Style())
+
+
+@pytest.mark.parametrize("folder", ["", "nowhere"])
+def test_without_its_styles_kokoro_says_where_to_get_them(
+    monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    monkeypatch.setenv(kokoro.FOLDER, folder)
+    kokoro._table.cache_clear()
+    with pytest.raises(EngineMissing, match=f"npm pack kokoro-js.*{kokoro.FOLDER}"):
+        kokoro.style_vector(kokoro.JUDGED[0], 3)
+
+
+@needs_espeak
+def test_a_word_of_kokoro_is_found_by_how_long_its_tokens_last(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for style in ("af_sky", "bm_lewis"):
+        np.zeros((kokoro._LONGEST + 1, 256), "<f4").tofile(tmp_path / f"{style}.bin")
+    monkeypatch.setenv(kokoro.FOLDER, str(tmp_path))
+    kokoro._table.cache_clear()
+
+    def four_frames_each(
+        tokens: list[int], style: np.ndarray, rate_ratio: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        frames = np.full(len(tokens), 4.0, np.float32)
+        return np.full(int(600 * frames.sum()), 0.2, np.float32), frames
+
+    monkeypatch.setattr(kokoro, "synthesise", four_frames_each)
+    for voice, vowel in (("af_sky", "aa"), ("bm_lewis+af_sky", "aa")):
+        clip = kokoro.speak("please stop!", voice, Style())
+        assert _phones(clip) == ["p", "l", "iy", "z", "s", "t", vowel, "p"]
+        starts_s = {sound.phone: sound.began_s for sound in clip.sounds}
+        assert starts_s["aa"] == pytest.approx(starts_s["t"] + 0.1)

@@ -331,7 +331,7 @@ def test_a_command_in_words_is_planned_carried_out_and_told(run, link, topic, wo
     turn, speak = ranked
     assert turn["action_type"] in ("turn_left", "turn_right")
     assert turn["parameters"] == {"angle": 10.0}
-    assert speak["parameters"] == {"text_to_speak": "hello"}
+    assert speak["parameters"] == {"text_to_speak": "Hello."}
     assert [one["priority"] for one in ranked] == [1, 2]
     (of_command,) = told["on plan"]["/llm_planner/action_sequence"]
     assert of_command["action_sequence"] == ranked
