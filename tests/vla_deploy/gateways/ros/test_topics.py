@@ -349,7 +349,7 @@ def test_a_command_in_words_is_planned_carried_out_and_told(run, link, topic, wo
     assert "State: NAVIGATING, Tasks: 2" in told["capstone"]
     assert told["status"][-1] == "completed"
     assert "executing" in told["status"]
-    assert told["said"] == ["hello"]
+    assert told["said"] == ["Hello."]
     assert ["task_event", "finished"] in told["events"]
 
 
