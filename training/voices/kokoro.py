@@ -125,7 +125,7 @@ def style_vector(voice: str, count: int) -> NDArray[np.float32]:
         SynthesisFailed: there is no such style.
     """
     vectors = [_table(name)[count] for name in voice.split(BLEND)]
-    mean: NDArray[np.float32] = np.mean(vectors, axis=0, dtype=np.float32)[None]
+    mean: NDArray[np.float32] = np.mean(np.stack(vectors), axis=0, keepdims=True)
     return mean
 
 
