@@ -21,7 +21,7 @@ from vla_deploy.planning.dialogue.command import (
 )
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.crash_recovery import unfinished
-from vla_deploy.planning.dialogue.event_publisher import EventPublisher
+from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.planner import Planner
@@ -63,7 +63,7 @@ class PlannerNode:
         self._status_due_ns = 0
         self._is_stopped = False
         self._manager: CommandManager
-        self._publisher: EventPublisher
+        self._publisher: PlannerEvents
         self._status: CellWriter
         self._utterances: RingReader
         self._events: RingReader
@@ -74,7 +74,7 @@ class PlannerNode:
         self._events = self._space.ring_reader("task_event", from_start=True)
         plans = self._space.ring_reader("plan", from_start=True)
         before = unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
-        self._publisher = EventPublisher(self._space, self._clock)
+        self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
             self._keeper = self._new_keeper(self._memory)
         self._manager = CommandManager(

@@ -22,7 +22,7 @@ _LONGEST_OTHER: Final = 200
 """What is longer is no command that may have been misheard."""
 
 
-class EventPublisher:
+class SpeechEvents:
     """Hold the ways out.
 
     The robot asks again each time twice as seldom, until something is understood: whoever talks

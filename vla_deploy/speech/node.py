@@ -16,7 +16,7 @@ from vla_deploy.one_line import one_line
 from vla_deploy.robots import RobotDescription
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError, SpeechMissing
-from vla_deploy.speech.event_publisher import EventPublisher
+from vla_deploy.speech.event_publisher import SpeechEvents
 from vla_deploy.speech.hot_words import HotWords
 from vla_deploy.speech.microphone import Microphone, OpenInput
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
@@ -87,7 +87,7 @@ class SpeechNode:
     def start(self) -> None:
         """Open topics, voice and listeners; the recogniser follows beside the steps."""
         self._status: CellWriter = self._space.cell_writer("speech_status")
-        self._publisher = EventPublisher(self._space, self._clock)
+        self._publisher = SpeechEvents(self._space, self._clock)
         self._page = PageMicrophone(self._space.record_reader("page_sound"), self._clock)
         if self._voice is not None:
             self._voice.start(self._space)

@@ -12,7 +12,7 @@ from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
-from vla_deploy.speech.event_publisher import EventPublisher
+from vla_deploy.speech.event_publisher import SpeechEvents
 from vla_deploy.speech.hot_words import HotWords, hot_words_of
 from vla_deploy.speech.transcript import Alternative, Transcript
 from vla_deploy.speech.verdict import Judgement, Verdict
@@ -68,12 +68,12 @@ def told(space: SharedSpace) -> Callable[[str], list[Any]]:
 
 
 @pytest.fixture
-def publisher(space: SharedSpace, clock: ManualClock) -> EventPublisher:
-    return EventPublisher(space, clock)
+def publisher(space: SharedSpace, clock: ManualClock) -> SpeechEvents:
+    return SpeechEvents(space, clock)
 
 
 def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
-    publisher: EventPublisher, told: Any, clock: ManualClock
+    publisher: SpeechEvents, told: Any, clock: ManualClock
 ) -> None:
     clock.ns = NS_PER_S + 300_000_000
     publisher.publish(heard("pick up the red cup", Verdict.ACCEPTED))
@@ -89,7 +89,7 @@ def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
     assert publisher.document()["end_to_text_p95_s"] == pytest.approx(0.3, rel=0.13)
 
 
-def test_a_stop_presses_the_button_and_is_no_command(publisher: EventPublisher, told: Any) -> None:
+def test_a_stop_presses_the_button_and_is_no_command(publisher: SpeechEvents, told: Any) -> None:
     publisher.publish(heard("stop!", Verdict.STOP))
     (press,) = told("operator")
     assert (press["act"], press["source"], press["reason"]) == ("estop", "voice", 'heard "stop!"')
@@ -97,14 +97,14 @@ def test_a_stop_presses_the_button_and_is_no_command(publisher: EventPublisher, 
     assert [event["verdict"] for event in told("heard")] == ["stop"]
 
 
-def test_a_refusal_is_never_a_command(publisher: EventPublisher, told: Any) -> None:
+def test_a_refusal_is_never_a_command(publisher: SpeechEvents, told: Any) -> None:
     publisher.publish(heard("nice weather", Verdict.REJECTED))
     assert told("utterance") == told("operator") == told("say") == []
     assert told("heard")[0]["reason"] == "because"
 
 
 def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
-    publisher: EventPublisher, told: Any
+    publisher: SpeechEvents, told: Any
 ) -> None:
     others = (Alternative("put it in the box", 0.7), Alternative("word " * 60, 0.1))
     publisher.publish(heard("put it in the boss", Verdict.DOUBTED, others=others))
@@ -118,7 +118,7 @@ def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
 
 
 def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
-    publisher: EventPublisher, told: Any, clock: ManualClock
+    publisher: SpeechEvents, told: Any, clock: ManualClock
 ) -> None:
     asked = []
     for second in range(120):

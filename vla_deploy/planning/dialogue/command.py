@@ -76,6 +76,12 @@ class PlannedCommand:
     request: Request
     answer: PlanningResult
 
+    @property
+    def awaits_word(self) -> bool:
+        """Return whether its plan is held until the person says go."""
+        proposal = self.answer.proposal
+        return self.command.awaits_word or (proposal is not None and proposal.awaits_word)
+
 
 def asks_to_stop(event: Event) -> bool:
     """Return whether the words of an utterance want what is under way to end."""

@@ -20,7 +20,7 @@ from vla_deploy.planning.dialogue.confirmation import agreement_to, question_abo
 from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
-from vla_deploy.planning.dialogue.event_publisher import EventPublisher
+from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
@@ -50,7 +50,7 @@ class CommandManager:
         self,
         planner: Planner,
         situation: Situation,
-        events: EventPublisher,
+        events: PlannerEvents,
         executor: Executor,
         clock: Clock,
         further_plans: int = NOT_BOUNDED.further_plans,
@@ -87,13 +87,23 @@ class CommandManager:
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
             self._dispatcher.refuse(command, reason)
-        elif (pending is not None and self._takes_as_answer(command, pending)) or (
-            pending is None and self._takes_as_word(command)
-        ):
             return
-        elif command.is_answer:
+        is_taken = (
+            self._takes_as_word(command)
+            if pending is None
+            else self._takes_as_answer(command, pending)
+        )
+        if is_taken:
+            return
+        if command.is_answer:
             self._dispatcher.refuse(command, Says.NOTHING_ASKED)
-        elif self._objects(command) and only_objects(command.text):
+        else:
+            self._take_anew(command)
+
+    def _take_anew(self, command: UserCommand) -> None:
+        """Take an utterance that answers nothing: an objection, or a command of its own."""
+        is_objection = self._objects(command)
+        if is_objection and only_objects(command.text):
             self.stop_all(command.command_id)
             self._events.say(command, Says.LEFT)
         elif self._async.command is not None and self._forbids(command):
@@ -101,7 +111,7 @@ class CommandManager:
         elif len(self._queue) >= MOST_WAITING:
             self._dispatcher.refuse(command, Says.MANY_WAIT)
         else:
-            if self._objects(command):  # "don't take that, take the blue one"
+            if is_objection:  # "don't take that, take the blue one"
                 self.stop_all(f"{command.command_id}-objects")
             self._queue.append(command)
             if self._async.command is not None:
@@ -482,6 +492,5 @@ class CommandManager:
 
 def _stands_still(done: PlannedCommand) -> bool:
     """Tell whether what was planned begins with standing still, now."""
-    plan, proposal = done.answer.plan, done.answer.proposal
-    is_held = done.command.awaits_word or (proposal is not None and proposal.awaits_word)
-    return plan is not None and plan.actions[0].skill == "stop" and not is_held
+    plan = done.answer.plan
+    return plan is not None and plan.actions[0].skill == "stop" and not done.awaits_word

@@ -11,7 +11,7 @@ from vla_deploy.planning.dialogue.confirmation import (
     things_named,
 )
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
-from vla_deploy.planning.dialogue.event_publisher import EventPublisher
+from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
@@ -33,7 +33,7 @@ class CommandDispatcher:
         self,
         accepted: Callable[[Request, PlanningResult], None],
         situation: Situation,
-        events: EventPublisher,
+        events: PlannerEvents,
         dialogue: DialogueState,
         active: ActivePlans,
     ) -> None:
@@ -55,8 +55,7 @@ class CommandDispatcher:
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
             self._events.check_length(answer.plan)
-            is_held = command.awaits_word or (answer.proposal and answer.proposal.awaits_word)
-            if is_held and not command.recovers:  # the word has been said
+            if done.awaits_word and not command.recovers:  # the word has been said
                 self.hold(done, answer.plan)
                 return
             agreed = self._active.agreed(command)

@@ -19,7 +19,7 @@ _MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
 _MOST_SPOKEN: Final = 16
 
 
-class EventPublisher:
+class PlannerEvents:
     """Publish the planner's side of every command."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:

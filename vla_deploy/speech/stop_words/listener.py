@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class ListeningPlace:
     """Name where a listener listens: in `speech_status`, as a source of stops, and in the log."""
 
     name: str
@@ -45,8 +45,10 @@ class Place:
     how: str
 
 
-ROOM: Final = Place(name="stop_words", source="voice", how="by voice")
-PAGE: Final = Place(name="page_stop_words", source="page_voice", how="by voice into the page")
+ROOM: Final = ListeningPlace(name="stop_words", source="voice", how="by voice")
+PAGE: Final = ListeningPlace(
+    name="page_stop_words", source="page_voice", how="by voice into the page"
+)
 
 
 class State(StrEnum):
@@ -70,7 +72,7 @@ class StopWords:
         settings: SpeechSettings,
         clock: Clock,
         playing: Callable[[], Playing | None] = lambda: None,
-        place: Place = ROOM,
+        place: ListeningPlace = ROOM,
     ) -> None:
         """Take how the network is opened, which of its thresholds holds, what the robot says."""
         self.name = place.name
@@ -204,7 +206,10 @@ class StopWords:
 
 
 def build_stop_words(
-    context: NodeContext, profile: Profile, voice: RobotVoice | None = None, place: Place = ROOM
+    context: NodeContext,
+    profile: Profile,
+    voice: RobotVoice | None = None,
+    place: ListeningPlace = ROOM,
 ) -> StopWords:
     """Return the listener to a place; it opens the profile's network when the node starts."""
     # It claims no memory: what hears a spoken stop is never refused for want of it.
