@@ -1,7 +1,9 @@
 """Run the real processes on a twin as a user does, and talk to them by the command line."""
 
+import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -225,6 +227,27 @@ class ProcessStack:
 
     def close(self) -> None:
         """End the run in order; ending twice is allowed."""
+        self._let_go()
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGTERM)
+        self._wait()
+
+    def cut(self) -> None:
+        """End the run as a power cut does: its end in order takes longer than many a test."""
+        if self.run_dir == self.base:  # it has not come up: only the supervisor knows its parts
+            self.close()
+            return
+        self._let_go()
+        self.process.kill()
+        self._wait()
+        members = self.members()
+        for member in members:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                member.kill()
+        psutil.wait_procs(members, timeout=_END_S)
+        shutil.rmtree((self.run_dir / "ipc").resolve(), ignore_errors=True)
+
+    def _let_go(self) -> None:
         if self._session is not None:
             self._session.close()
             self._session = None
@@ -232,8 +255,8 @@ class ProcessStack:
             begun.kill()  # nothing, where it has ended
             begun.communicate()  # closes its pipes, too
         self._begun.clear()
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGTERM)
+
+    def _wait(self) -> None:
         self.process.wait(_END_S)
         if self.process.stdout is not None:
             self.process.stdout.close()

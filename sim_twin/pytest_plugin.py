@@ -149,7 +149,7 @@ def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
             stack.wait_until_armed()
             yield stack
         finally:
-            stack.close()
+            stack.cut()
 
 
 @pytest.fixture

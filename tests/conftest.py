@@ -29,7 +29,7 @@ settings.load_profile("any machine")
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-SHARING = ("end_to_end/browser",)
+SHARING = ("end_to_end/browser", "end_to_end/ros")
 """Folders whose tests share one robot."""
 
 
@@ -60,6 +60,12 @@ def pytest_collection_finish() -> None:
 
 
 TREES = Path(__file__).parent / "platforms" / "trees"
+
+
+@pytest.fixture(scope="session")
+def coarse() -> str:
+    """A profile with fewer ticks: for what is done and told, not how soon."""
+    return str(Path(__file__).with_name("coarse.toml"))
 
 
 @pytest.fixture

@@ -12,12 +12,6 @@ CUP_ON_THE_TABLE = (2.25, 1.6, 0.4975, 0.0)
 BOX_ON_THE_TABLE = (1.93, 1.5, 0.45, 0.0)
 
 
-@pytest.fixture(scope="session")
-def coarse() -> str:
-    """A profile with fewer ticks: for what is done and told, not how soon."""
-    return str(Path(__file__).with_name("coarse.toml"))
-
-
 @pytest.fixture
 def make_stack(tmp_path: Path) -> Iterator[Callable[..., LockstepStack]]:
     """Build whole robots in the flat with a seed, and a robot file or profile if one is named."""

@@ -1,7 +1,10 @@
 """The dashboard commands and stops the robot, and the robot does not need the dashboard."""
 
 import json
+import tempfile
+from collections.abc import Iterator
 from http.client import HTTPConnection
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -17,6 +20,18 @@ pytestmark = [
 
 MOVING_RAD_S = 1.0
 STANDSTILL_RAD_S = 0.05
+
+
+@pytest.fixture(scope="module")
+def stack(coarse: str) -> Iterator[ProcessStack]:
+    """The real processes, armed: each test leaves them so, but for the last."""
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
+        stack = ProcessStack(Path(folder) / "base", "--fast", "--profile", coarse)
+        try:
+            stack.wait_until_armed()
+            yield stack
+        finally:
+            stack.cut()
 
 
 class Page:
@@ -65,44 +80,44 @@ def stands(stack: ProcessStack) -> bool:
     return stack.wait_until(lambda: stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
 
 
-def test_it_commands_the_robot_and_stops_it(twin_stack: ProcessStack) -> None:
-    page = Page(twin_stack)
-    stopped_id = page.drive()
-    assert page.ask("POST", "stop", {"reason": "test"}) == {"pressed": True}
-    assert stands(twin_stack), twin_stack.truth()
-    assert twin_stack.wait_until(lambda: twin_stack.state() == "stopped", 3.0)
-    control = page.ask("GET", "state")["control"]
-    assert (control["estop_latched"], control["cause"]) == (True, "estop")
-    assert twin_stack.wait_until(lambda: page.state(stopped_id) == "failed")
-    assert page.ask("POST", "reset", {})["control"]["state"] == "disarmed"
-    assert page.ask("POST", "arm", {})["control"]["state"] == "armed"
-
-
 def test_the_robot_drives_on_without_it_and_its_history_is_found_again(
-    twin_stack: ProcessStack,
+    stack: ProcessStack,
 ) -> None:
-    page = Page(twin_stack)
+    page = Page(stack)
     ended_id = page.ask("POST", "commands", {"text": "bring me the moon"})["command_id"]
-    assert twin_stack.wait_until(lambda: page.state(ended_id) == "rejected")
+    assert stack.wait_until(lambda: page.state(ended_id) == "rejected")
     # No longer than it takes: a busy computer loses a servo for a moment about once a minute.
-    pid = twin_stack.row("dashboard")["pid"]
+    pid = stack.row("dashboard")["pid"]
     command_id = page.drive("turn left 180 degrees")
-    twin_stack.kill("dashboard")
-    assert twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
-    assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["pid"] not in (pid, None))
-    assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["state"] == "ready", 60.0)
-    assert Page(twin_stack).url == page.url
-    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
+    stack.kill("dashboard")
+    assert stack.wait_until(lambda: stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
+    assert stack.wait_until(lambda: stack.row("dashboard")["pid"] not in (pid, None))
+    assert stack.wait_until(lambda: stack.row("dashboard")["state"] == "ready", 60.0)
+    assert Page(stack).url == page.url
+    is_done = stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
     assert page.state(ended_id) == "rejected"
 
 
-def test_the_stop_door_stops_the_robot_while_it_hangs(twin_stack: ProcessStack) -> None:
-    page = Page(twin_stack)
+def test_it_commands_the_robot_and_stops_it(stack: ProcessStack) -> None:
+    page = Page(stack)
+    stopped_id = page.drive()
+    assert page.ask("POST", "stop", {"reason": "test"}) == {"pressed": True}
+    assert stands(stack), stack.truth()
+    assert stack.wait_until(lambda: stack.state() == "stopped", 3.0)
+    control = page.ask("GET", "state")["control"]
+    assert (control["estop_latched"], control["cause"]) == (True, "estop")
+    assert stack.wait_until(lambda: page.state(stopped_id) == "failed")
+    assert page.ask("POST", "reset", {})["control"]["state"] == "disarmed"
+    assert page.ask("POST", "arm", {})["control"]["state"] == "armed"
+
+
+def test_the_stop_door_stops_the_robot_while_it_hangs(stack: ProcessStack) -> None:
+    page = Page(stack)
     page.drive()
-    twin_stack.freeze("dashboard")
-    assert press_the_door(twin_stack)["pressed"] is True
-    assert stands(twin_stack), twin_stack.truth()
-    assert press_the_door(twin_stack)["control"]["estop_latched"] is True
-    twin_stack.thaw("dashboard")
-    assert twin_stack.wait_until(lambda: "estop" in page.alarms(), 10.0)
+    stack.freeze("dashboard")
+    assert press_the_door(stack)["pressed"] is True
+    assert stands(stack), stack.truth()
+    assert press_the_door(stack)["control"]["estop_latched"] is True
+    stack.thaw("dashboard")
+    assert stack.wait_until(lambda: "estop" in page.alarms(), 10.0)

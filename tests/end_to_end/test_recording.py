@@ -23,6 +23,7 @@ pytestmark = [
     pytest.mark.gl,
     pytest.mark.stack,
     pytest.mark.timeout(300),
+    pytest.mark.twin(profile=str(Path(__file__).parents[1] / "coarse.toml")),
 ]
 
 JOBS = [

@@ -3,6 +3,7 @@
 Loopback is not trusted here: every test goes through the doors that an operator goes through.
 """
 
+import shutil
 import tempfile
 import wave
 from collections.abc import Iterator
@@ -46,7 +47,7 @@ expect.set_options(timeout=PATIENCE_MS)
 
 
 @pytest.fixture(scope="package")
-def stack(chromium: Browser) -> Iterator[ProcessStack]:
+def stack(chromium: Browser, coarse: str) -> Iterator[ProcessStack]:
     """The real processes on a twin, armed, with a dashboard that trusts nobody unknown.
 
     The browser is up before: beside the robot that takes long.
@@ -58,7 +59,7 @@ def stack(chromium: Browser) -> Iterator[ProcessStack]:
         settings.write_text("trust_loopback = false\n", encoding="utf-8")
         add_accounts(base)
         profile = Path(folder) / "shipped.toml"  # tests write another one beside it
-        profile.write_text('inherits = "desktop"\n', encoding="utf-8")
+        shutil.copyfile(coarse, profile)
         stack = ProcessStack(base, "--profile", str(profile))
         try:
             stack.wait_until_armed()

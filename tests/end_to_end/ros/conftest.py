@@ -6,13 +6,16 @@ import pytest
 from sim_twin.process_stack import ProcessStack
 
 
-@pytest.fixture(scope="module")  # two robots in one domain would answer each other's callers
+@pytest.fixture(scope="package")  # two robots in one domain would answer each other's callers
 def robot(
-    ros_environment: object, ros_domain: int, tmp_path_factory: pytest.TempPathFactory
+    ros_environment: object,
+    ros_domain: int,
+    tmp_path_factory: pytest.TempPathFactory,
+    coarse: str,
 ) -> Iterator[ProcessStack]:
     before = os.environ.get("ROS_DOMAIN_ID")
     os.environ["ROS_DOMAIN_ID"] = str(ros_domain)
-    stack = ProcessStack(tmp_path_factory.mktemp("ros"), "--ros")
+    stack = ProcessStack(tmp_path_factory.mktemp("ros"), "--ros", "--profile", coarse)
     try:
         stack.wait_until_armed()
         # A robot without its gateway would carry on, and each test wait for it in vain.

@@ -39,6 +39,7 @@ credential = "house_key"
 @pytest.fixture
 def robot(
     ros_domain: int,
+    coarse: str,
     tmp_path: Path,
     tmp_path_factory: pytest.TempPathFactory,
     monkeypatch: pytest.MonkeyPatch,
@@ -51,7 +52,7 @@ def robot(
     file.write_text(yaml.safe_dump({"cognitive_robot": {"ros__parameters": GIVEN}}))
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
     monkeypatch.setenv(API_KEY_VARIABLE, KEY)
-    stack = ProcessStack(base, "--ros", "--params-file", str(file))
+    stack = ProcessStack(base, "--ros", "--profile", coarse, "--params-file", str(file))
     try:
         stack.wait_until_armed()
         yield stack

@@ -231,13 +231,13 @@ finish({kind: dict(of("vla_deploy", "/")) for kind, of in ask.items()})
 
 
 @pytest.fixture(scope="module")
-def robot(ros_environment, ros_domain: int) -> Iterator[ProcessStack]:
+def robot(ros_environment, ros_domain: int, coarse: str) -> Iterator[ProcessStack]:
     with (
         pytest.MonkeyPatch.context() as patch,
         tempfile.TemporaryDirectory(prefix="vla-") as folder,
     ):
         patch.setenv("ROS_DOMAIN_ID", str(ros_domain))
-        stack = ProcessStack(Path(folder) / "base", "--fast", "--ros")
+        stack = ProcessStack(Path(folder) / "base", "--fast", "--ros", "--profile", coarse)
         try:
             stack.wait_until_armed()
             ended = stack.say("turn right 35 degrees and look at the red cup")
