@@ -117,10 +117,10 @@ def chromium(playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def write_spoken(path: Path) -> None:
-    """Write a command as sound, with the quiet before and after by which phrases are told apart."""
+    """Write a command as sound, with quiet around it; the button is let go before it comes again."""
     words = EspeakEngine().synthesise(SPOKEN).at_rate(MICROPHONE_HZ).wave
-    quiet = np.zeros(MICROPHONE_HZ * 3 // 2, np.float32)
-    sound = np.concatenate([quiet, 0.6 * words / np.abs(words).max(), quiet])
+    before, after = (np.zeros(round(MICROPHONE_HZ * span_s), np.float32) for span_s in (1.5, 10.0))
+    sound = np.concatenate([before, 0.6 * words / np.abs(words).max(), after])
     with wave.open(str(path), "wb") as file:
         file.setnchannels(1)
         file.setsampwidth(2)
