@@ -117,7 +117,7 @@ def chromium(playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def write_spoken(path: Path) -> None:
-    """Write a command as sound, with quiet around it; the button is let go before it comes again."""
+    """Write a command as sound, with quiet around it: it comes again when nobody listens."""
     words = EspeakEngine().synthesise(SPOKEN).at_rate(MICROPHONE_HZ).wave
     before, after = (np.zeros(round(MICROPHONE_HZ * span_s), np.float32) for span_s in (1.5, 10.0))
     sound = np.concatenate([before, 0.6 * words / np.abs(words).max(), after])
