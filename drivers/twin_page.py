@@ -167,6 +167,14 @@ STOPPED: Final = frozenset("Tt")
 def process_state(pid: int) -> str:
     """Return the state of a process as proc_pid_stat(5) has it, "X" for one that is no more."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0]
+        handle = os.open(
+            f"/proc/{pid}/stat", os.O_RDONLY
+        )  # the twin asks hundreds of times a second
     except OSError:
         return "X"
+    try:
+        return chr(os.read(handle, 512).rpartition(b") ")[2][0])
+    except (OSError, IndexError):
+        return "X"
+    finally:
+        os.close(handle)
