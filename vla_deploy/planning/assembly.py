@@ -116,7 +116,7 @@ def _open(
             PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
         )
         return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
-    return shelf.load(model, choice, lambda: open_local_model(model, choice, robot, checked))
+    return shelf.load(model, choice, lambda: open_local_model(model, choice, robot))
 
 
 def _servers(

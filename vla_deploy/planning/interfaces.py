@@ -53,24 +53,31 @@ class Request:
 class Proposal:
     """Hold a plan that is not checked yet, and which back end made it.
 
-    `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
-    before the person agrees. With `may_be_kept` the plan took seconds and may be given again in the
-    same situation; `origin` is the back end that made it first, where it was. `covers` are the
-    words that change the scope of a command and are represented in the plan, None for all;
-    `knows_grammar` is set where the back end has read the whole sentence. An `order` stands once
-    the plan is dispatched. With `awaits_word` it is held until the person says go.
+    `confidence` is 0 to 1. Where the back end `is_unsure`, or words of the command are `left_out`,
+    nothing moves before the person agrees. With `may_be_kept` the plan took seconds and may be
+    given again in the same situation; `origin` is the back end that made it first, where it was.
+    `covers` are the words that change the scope of a command and are represented in the plan, None
+    for all; `knows_grammar` is set where the back end has read the whole sentence. An `order`
+    stands once the plan is dispatched. With `awaits_word` it is held until the person says go.
     """
 
     plan: Plan
     back_end: str
     confidence: float
-    read_back: str = ""
+    is_unsure: bool = False
+    left_out: tuple[str, ...] = ()
     may_be_kept: bool = False
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
     order: StandingOrder | None = None
     awaits_word: bool = False
+
+    @property
+    def is_read_back(self) -> bool:
+        """Return whether a person must agree to the plan first, whatever it risks."""
+        asks = self.order is not None and bool(self.order.question)
+        return self.is_unsure or bool(self.left_out) or asks
 
 
 class AttemptOutcome(StrEnum):
@@ -113,11 +120,6 @@ class PlanningResult:
     proposal: Proposal | None = None
     error: PlanningError | None = None
     is_unchecked: bool = False
-
-    @property
-    def read_back(self) -> str:
-        """Return what the back end wants to be agreed to before anything moves, "" for nothing."""
-        return "" if self.proposal is None else self.proposal.read_back
 
     @property
     def is_final(self) -> bool:

@@ -1,5 +1,6 @@
 """Know the robot as plans see it: its places, poses, hands, limits, and where it must not go."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -32,6 +33,35 @@ class World:
     opening_max_m: float | None = None
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
+
+    def is_surface(self, name: str) -> bool:
+        """Tell whether one stands before furniture at a place itself, not elsewhere in the room."""
+        site = self.sites.get(name)
+        return site is not None and site.pose in site.viewpoints
+
+    def surface_of(self, name: str) -> str:
+        """Return the furniture that putting something "in the kitchen" means, or the place."""
+        site = self.sites.get(name)
+        if site is None or not site.viewpoints or self.is_surface(name):
+            return name
+        first = site.viewpoints[0]
+        return next((one for one, other in self.sites.items() if other.pose == first), name)
+
+    def surfaces_of(self, name: str) -> frozenset[str]:
+        """Return a place, and the furniture that one looks at there."""
+        views = self.sites[name].viewpoints if name in self.sites else ()
+        return frozenset({name, *(one for one, site in self.sites.items() if site.pose in views)})
+
+    def nearest_surface(self, spot: tuple[float, float] | None) -> str | None:
+        """Return the place with something to put things on that is nearest, or None."""
+        poses = {name: site.pose for name, site in self.sites.items() if self.is_surface(name)}
+        if spot is None:
+            return next(iter(poses), None)
+        return min(
+            poses,
+            key=lambda name: math.dist(spot, (poses[name].x_m, poses[name].y_m)),
+            default=None,
+        )
 
 
 def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
-from vla_deploy.planning.builders.tidying import REACH_M, surfaces_of
+from vla_deploy.planning.builders.tidying import REACH_M
 from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World
@@ -122,7 +122,6 @@ def proposal_of(order: StandingOrder, request: Request, back_end: str) -> Propos
         plan=plan,
         back_end=back_end,
         confidence=1.0,
-        read_back=order.question,
         covers=None,
         order=order,
     )
@@ -141,7 +140,7 @@ def held_to(
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
     closed = [one for one in standing if one.what is Forbidden.PLACE]
-    places = frozenset[str]().union(*(surfaces_of(one.words, world) for one in closed))
+    places = frozenset[str]().union(*(world.surfaces_of(one.words) for one in closed))
     if places and _searches(plan, scene) and not _open_views(world, places):
         told = " and ".join(map(str, closed))
         raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
@@ -188,7 +187,7 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
         touched = [given.get("object")] if action.skill == "pick_up" else []
         touched += [given.get("destination")] if action.skill == "place" else []
         return any(_may_be(str(text), one.words, scene) for text in touched if text)
-    inside = surfaces_of(one.words, world)
+    inside = world.surfaces_of(one.words)
     if "x_m" in given and "y_m" in given:
         return _is_near((float(given["x_m"]), float(given["y_m"])), inside, world)
     named = {str(given[name]) for name in ("place", "destination") if name in given}

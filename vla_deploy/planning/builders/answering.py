@@ -1,11 +1,12 @@
 """Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words
+from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.references import match_place
@@ -35,7 +36,7 @@ def _tell_sight(fields: Fields, request: Request) -> list[Skill]:
         where = f" on the {place.replace('_', ' ')}"
     if not things:
         return _say(f"I see nothing{where}.")
-    return _say(f"I see {listed(things)}{where}.")
+    return _say(f"I see {_things(things)}{where}.")
 
 
 def _tell_hands(_: Fields, request: Request) -> list[Skill]:
@@ -46,7 +47,7 @@ def _tell_hands(_: Fields, request: Request) -> list[Skill]:
         for hand, kind in request.world.holding.items()
         if kind
     ]
-    return _say(f"I hold {_and(full)}." if full else "My hands are empty.")
+    return _say(f"I hold {listed(full)}." if full else "My hands are empty.")
 
 
 def _tell_place(_: Fields, request: Request) -> list[Skill]:
@@ -71,14 +72,14 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
 def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
     """Say whether a thing is in sight."""
     found = _known(fields["what"], request)
-    return _say(f"Yes, I see {listed(found)}." if found else "No, I do not see that.")
+    return _say(f"Yes, I see {_things(found)}." if found else "No, I do not see that.")
 
 
-def listed(things: Sequence[Thing]) -> str:
+def _things(things: Sequence[Thing]) -> str:
     """Return things as one says them: "a red cup, a blue ball and 3 more"."""
     words = [_a(str(one)) for one in things[:MOST_TOLD]]
     more = len(things) - len(words)
-    return _and([*words, f"{more} more"] if more > 0 else words)
+    return listed([*words, f"{more} more"] if more > 0 else words)
 
 
 def _places_of(things: Sequence[Thing], request: Request) -> str:
@@ -126,12 +127,6 @@ def _a(words: str) -> str:
     if words.split()[-1:] == ["keys"]:
         return words
     return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
-
-
-def _and(words: Iterable[str]) -> str:
-    listed_words = list(words)
-    start = ", ".join(listed_words[:-1])
-    return " and ".join(part for part in (start, *listed_words[-1:]) if part)
 
 
 def _say(text: str) -> list[Skill]:

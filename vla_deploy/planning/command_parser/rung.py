@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from platforms import ModelChoice
+from vla_deploy.action_words import skill_words
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
 from vla_deploy.inference.manifest import Certainty, Use
 from vla_deploy.inference.memory_claims import MemoryClaim
@@ -25,7 +26,6 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
     asks_about_speaker,
@@ -82,7 +82,7 @@ class CommandParser(BackEnd):
         self._weights = model.language.certainty or UNMEASURED
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
-        """Return the plan that a command means, with what to read back where that is unsure.
+        """Return the plan that a command means, which is read back where that is unsure.
 
         Raises:
             Declined: it is no command, none that can be planned, or too unsure.
@@ -109,12 +109,7 @@ class CommandParser(BackEnd):
             raise CannotBeDone(
                 "I wait for a word only before I begin; say the rest when it is time"
             )
-        asked = question(parsed.steps[awaits_word:])
-        plan = Plan(
-            goal=request.text.strip(),
-            summary=asked.removeprefix("Shall I ").removesuffix("?"),
-            actions=chained(skills),
-        )
+        plan = Plan(goal=request.text.strip(), summary=skill_words(skills), actions=chained(skills))
         sure = self._confidence(parsed)
         if request.heard_confidence is not None:
             sure = min(sure, request.heard_confidence)
@@ -124,7 +119,7 @@ class CommandParser(BackEnd):
             plan=plan,
             back_end=self.name,
             confidence=round(sure, 3),
-            read_back=asked if sure < self._weights.read_back_below else "",
+            is_unsure=sure < self._weights.read_back_below,
             covers=_covered(parsed),
             awaits_word=awaits_word,
         )

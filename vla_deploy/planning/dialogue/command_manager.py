@@ -16,7 +16,7 @@ from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.dialogue.confirmation import agreement_to, question_about
+from vla_deploy.planning.dialogue.confirmation import agreement_to
 from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
@@ -33,9 +33,16 @@ from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
 from vla_deploy.planning.recovery.strategies import recover
-from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
-from vla_deploy.planning.understanding.answers import judge_answer
-from vla_deploy.planning.understanding.mentioned import mentions_of
+from vla_deploy.planning.understanding import (
+    Candidate,
+    Outcome,
+    Turn,
+    Verdict,
+    described,
+    guess,
+    judge_answer,
+)
+from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 MOST_WAITING: Final = 8
@@ -374,20 +381,20 @@ class CommandManager:
         """Return how an utterance lets the pending command go on, None where it is no answer."""
         if command.plan is not None:
             return None
-        said = self.dialogue.read(command.text)
+        verdict, chosen = self.dialogue.judge(command.text)
         full = described(pending.question, command.text)
-        if said.verdict is not Verdict.ANEW and not (full and said.verdict is Verdict.UNCLEAR):
-            return partial(self._go_on, pending, said)
+        if verdict is not Verdict.ANEW and not (full and verdict is Verdict.UNCLEAR):
+            return partial(self._go_on, pending, verdict, chosen)
         if pending.is_open and not self._at_once(command).is_final:
             return partial(self._replan, pending, f"{pending.command.text}: {command.text}")
         if corrected := self._corrected(pending, command.text):
             return partial(self._replace, corrected)
         if full:
             return partial(self._replan, pending, full)
-        guessed = guess(self.dialogue.conversation, command.text)
+        guessed = guess(pending.question, command.text)
         if guessed and self._at_once(command).plan is None:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
-            return partial(self._go_on, replace(pending, command=doubted), guessed)
+            return partial(self._go_on, replace(pending, command=doubted), Verdict.CHOSEN, guessed)
         return None
 
     def _at_once(self, command: UserCommand) -> PlanningResult:
@@ -395,18 +402,17 @@ class CommandManager:
         deadline = self._deadline(self.planner.within_s)
         return self.planner.plan_at_once(self._request(command), deadline)
 
-    def _go_on(self, pending: PendingQuestion, said: Reply) -> None:
-        if said.verdict is Verdict.NO:
+    def _go_on(self, pending: PendingQuestion, verdict: Verdict, chosen: Candidate | None) -> None:
+        if verdict is Verdict.NO:
             self._leave(Says.LEFT)
-        elif said.verdict is Verdict.UNCLEAR:
-            question = said.conversation.question or pending.question
-            asked = self.dialogue.ask_again(pending, question)
+        elif verdict is Verdict.UNCLEAR:
+            asked = self.dialogue.ask_again(pending)
             if asked is None:
                 self._leave(Says.STILL_UNCLEAR)
             else:
                 self._events.asked(pending.command, asked, pending.plan)
         else:
-            self.dialogue.settle(said)
+            self.dialogue.choose(pending.question, chosen)
             if pending.plan is None:
                 self._queue.appendleft(pending.command)
             elif pending.command.awaits_word:
@@ -455,14 +461,11 @@ class CommandManager:
 
     def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:
         """Read a plan back that takes the place of the one that was asked about or has begun."""
-        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0)
+        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0, is_unsure=True)
         try:
-            checked = self.planner.check(plan, request)
+            answer = PlanningResult(plan=self.planner.check(plan, request), proposal=proposal)
         except PlanningError as error:
             answer = PlanningResult(error=error)
-        else:
-            proposal = replace(proposal, read_back=question_about(checked, request))
-            answer = PlanningResult(plan=checked, proposal=proposal)
         corrected = replace(command, corrected=plan)
         self._dispatcher.conclude(PlannedCommand(corrected, request, answer))
 
@@ -483,7 +486,8 @@ class CommandManager:
         if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):
             self._dispatcher.dispatch(done, checked)
             return
-        asks = replace(pending.answer, plan=checked, proposal=replace(proposal, read_back=""))
+        agreed = replace(proposal, is_unsure=False, left_out=())
+        asks = replace(pending.answer, plan=checked, proposal=agreed)
         self._dispatcher.conclude(PlannedCommand(pending.command, request, asks))
 
     def _leave(self, why: Says) -> None:

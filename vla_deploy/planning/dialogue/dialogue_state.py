@@ -10,13 +10,13 @@ from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import (
+    Candidate,
     Conversation,
     Outcome,
     Question,
-    Reply,
     Turn,
     Verdict,
-    reply,
+    judge_answer,
 )
 
 MOST_ASKED: Final = 3
@@ -72,24 +72,19 @@ class DialogueState:
         question = Question(
             text=unclear.question,
             asked_ns=self._clock.now_ns(),
-            command_id=done.command.command_id,
             command_text=done.command.text,
             expression=unclear.expression,
             candidates=unclear.candidates,
             choices=done.request.conversation.choices,
         )
-        self.conversation = self.conversation.asks(question)
         self.pending = PendingQuestion(command=done.command, answer=done.answer, question=question)
         return self.pending
 
     def hold(self, done: PlannedCommand, text: str) -> PendingQuestion:
         """Hold a plan until it is agreed to."""
+        now_ns = self._clock.now_ns()
         question = Question(
-            text=text,
-            asked_ns=self._clock.now_ns(),
-            command_id=done.command.command_id,
-            command_text=done.command.text,
-            limit_s=HELD_S,
+            text=text, asked_ns=now_ns, command_text=done.command.text, limit_s=HELD_S
         )
         self.held = PendingQuestion(command=done.command, answer=done.answer, question=question)
         return self.held
@@ -99,33 +94,35 @@ class DialogueState:
         held, self.held = self.held, None
         return held
 
-    def ask_again(self, pending: PendingQuestion, question: Question) -> Question | None:
-        """Wait once more, and return the question in other words; None when that was enough.
-
-        `question` is the one that waits, or what an answer has left of it.
-        """
+    def ask_again(self, pending: PendingQuestion) -> Question | None:
+        """Wait once more, and return the question in other words; None when that was enough."""
         if pending.times_asked >= MOST_ASKED:
             return None
-        asked = replace(question, asked_ns=self._clock.now_ns())
-        self.conversation = self.conversation.asks(asked)
+        asked = replace(pending.question, asked_ns=self._clock.now_ns())
         self.pending = replace(pending, question=asked, times_asked=pending.times_asked + 1)
         return replace(asked, text=Says.NOT_CLEAR.format(question=asked.text))
 
-    def read(self, text: str) -> Reply:
-        """Return what an utterance is to the question that waits, changing nothing."""
-        return reply(self.conversation, text, self._clock.now_ns())
+    def judge(self, text: str) -> tuple[Verdict, Candidate | None]:
+        """Return what an utterance is to the question that waits, and which candidate it picks."""
+        if self.pending is None or self.is_overdue:
+            return Verdict.ANEW, None
+        return judge_answer(self.pending.question, text)
 
     def declines(self, text: object) -> bool:
         """Return whether words such as "never mind" mean the question, and not all that goes on."""
-        if self.pending is None or not isinstance(text, str):
-            return False
-        return self.read(text).verdict is Verdict.NO
+        return isinstance(text, str) and self.judge(text)[0] is Verdict.NO
 
-    def settle(self, said: Reply | None = None) -> PendingQuestion | None:
-        """Wait no more, and return what waited; what a reply has settled counts from now on."""
+    def settle(self) -> PendingQuestion | None:
+        """Wait no more, and return what waited; nothing that was chosen counts any more."""
         pending, self.pending = self.pending, None
-        self.conversation = self.conversation.settled() if said is None else said.conversation
+        self.conversation = replace(self.conversation, choices={})
         return pending
+
+    def choose(self, question: Question, chosen: Candidate | None) -> None:
+        """Wait no more; what was chosen counts while the command that waited is planned."""
+        picked = {} if chosen is None else {question.expression: chosen.name}
+        self.pending = None
+        self.conversation = replace(self.conversation, choices={**question.choices, **picked})
 
     def remember(self, turn: Turn) -> None:
         """Add a turn to the conversation."""

@@ -8,7 +8,6 @@ from vla_deploy.planning.dialogue.confirmation import (
     agreement_to,
     confirmation_of,
     question_about,
-    things_named,
 )
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
@@ -20,7 +19,7 @@ from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import numbered
 from vla_deploy.planning.understanding import Outcome, Turn
-from vla_deploy.planning.understanding.mentioned import mentions_of
+from vla_deploy.planning.understanding.conversation import mentions_of
 
 
 class CommandDispatcher:
@@ -59,10 +58,9 @@ class CommandDispatcher:
                 self.hold(done, answer.plan)
                 return
             agreed = self._active.agreed(command)
-            question = answer.read_back or confirmation_of(answer.plan, done.request, agreed)
+            question = confirmation_of(answer.plan, done.request, answer.proposal, agreed)
             if question:
-                named = things_named(answer.plan, done.request)
-                raise Ambiguous(f"{question} {named}".strip())
+                raise Ambiguous(question)
             self.dispatch(done, answer.plan)
         except Ambiguous as unclear:
             if command.recovers:  # the robot stands in the middle of it: it does not wait
@@ -77,9 +75,8 @@ class CommandDispatcher:
     def hold(self, done: PlannedCommand, plan: Plan) -> None:
         """Read a plan back, and hold it until the person says go; one that was held is dropped."""
         self.drop(self._dialogue.take_held(), Says.REPLACED)
-        question = done.answer.read_back or confirmation_of(plan, done.request)
-        asked = (question or question_about(plan, done.request), things_named(plan, done.request))
-        held = self._dialogue.hold(done, Says.HELD.format(question=" ".join(filter(None, asked))))
+        question = question_about(plan, done.request, done.answer.proposal)
+        held = self._dialogue.hold(done, Says.HELD.format(question=question))
         self.metrics.asked += 1
         self._events.asked(done.command, held.question, plan, choices=("go",))
         # "No, the blue one" means this plan, not what was done before it.

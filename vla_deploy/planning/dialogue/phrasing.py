@@ -24,6 +24,7 @@ class Says(StrEnum):
 
     WORKING = "One moment."
     CONFIRM = "Shall I {steps}?"
+    LEFT_OUT = "You said {words}, which I may not have understood."
     HELD = "{question} I wait for you to say go."
     STILL_HELD = "I wait for you to say go."
     NOT_CLEAR = "Sorry, I did not get that. {question}"

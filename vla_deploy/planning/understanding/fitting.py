@@ -9,7 +9,6 @@ from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
 from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope
-from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
@@ -104,7 +103,7 @@ def _in_room(query: Query, setting: Setting) -> list[Thing]:
     """Return what stands on the furniture of a room, where "in the kitchen" names no furniture."""
     world = setting.request.world
     room = query.anchor.surface if query.anchor is not None and query.relation == IN else ""
-    table = surface_of(room, world) if room else ""
+    table = world.surface_of(room) if room else ""
     if table in ("", room):
         return []
     there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}

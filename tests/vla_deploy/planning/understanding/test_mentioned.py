@@ -3,8 +3,8 @@ from typing import TYPE_CHECKING
 
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.understanding import Conversation, Role, Turn
+from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.planning.understanding.grounding import ground_plan
-from vla_deploy.planning.understanding.mentioned import mentions_of
 
 if TYPE_CHECKING:
     from conftest import Home

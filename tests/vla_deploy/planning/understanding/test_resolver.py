@@ -63,7 +63,7 @@ def test_three_are_told_apart_too(home: "Home") -> None:
 
 
 def test_the_answer_settles_it(home: "Home") -> None:
-    talk = Conversation().settled({"cup": "cup_2"})
+    talk = Conversation(choices={"cup": "cup_2"})
     assert name(home.ask("cup_1", "cup_2", conversation=talk), "the cup") == "cup_2"
 
 
@@ -71,7 +71,7 @@ def test_a_word_that_only_sounds_like_a_known_one_is_asked(home: "Home") -> None
     with pytest.raises(Ambiguous) as asked:
         name(home.ask("cup_1"), "the red cap")
     assert asked.value.question == "Did you mean the cup?"
-    talk = Conversation().settled({"red cap": asked.value.candidates[0].name})
+    talk = Conversation(choices={"red cap": asked.value.candidates[0].name})
     assert name(home.ask("cup_1", conversation=talk), "the red cap") == "red cup"
 
 
