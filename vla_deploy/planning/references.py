@@ -2,33 +2,13 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 
 from vla_deploy.planning.errors import DependsOnView, UnknownObject
-from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, Viewpoint, find, parse_query
+from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.query import FROM_A_VIEW
 from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ObjectQuery:
-    """Say which objects are meant; an empty colour means any.
-
-    `asked` is the whole question, with sizes and what they stand next to.
-    """
-
-    kind: str
-    colour: str = ""
-    track_id: str = ""
-    asked: Query
-
-    def among(self, snapshot: Snapshot, view: Viewpoint | None = None) -> list[Thing]:
-        """Return the things meant, the nearest to who looks first."""
-        return find(self.asked, snapshot, view)
-
-    def __str__(self) -> str:
-        return str(self.asked)
 
 
 def words_of(text: str) -> list[str]:
@@ -38,8 +18,10 @@ def words_of(text: str) -> list[str]:
 
 
 @lru_cache(maxsize=512)
-def parse_object(text: str) -> ObjectQuery:
+def parse_object(text: str) -> Query:
     """Read "the red cup", "mug", "the small cup next to the book", or an id such as "cup_1".
+
+    Its kind is known of an id, too; an empty colour means any.
 
     Raises:
         UnknownObject: no word of it, or one word too many, is a kind or colour the robot knows.
@@ -54,7 +36,7 @@ def parse_object(text: str) -> ObjectQuery:
     kind = asked.thing_id.rpartition("_")[0] or asked.kind
     if kind not in OBJECT_CLASSES or not asked.is_named:
         raise UnknownObject(text.strip(), OBJECT_CLASSES)
-    return ObjectQuery(kind=kind, colour=asked.colour, track_id=asked.thing_id, asked=asked)
+    return replace(asked, kind=kind)
 
 
 def match_place(text: str, places: Mapping[str, str]) -> str | None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
+from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.scope import IDIOMS
 from vla_deploy.planning.understanding import Question
 from vla_deploy.world import Query, UnknownWord, parse_query
@@ -101,7 +101,7 @@ def corrected(plan: Plan, words: str) -> Plan | None:
     is_kind = wanted is not None and wanted.is_named
     alike = [one for one in things if is_kind and wanted and one[2].kind == wanted.kind]
     meant = alike or [one for one in things if one[0] == "object"]
-    if len({(thing.kind, thing.colour, thing.track_id) for _, _, thing in meant}) != 1:
+    if len({(thing.kind, thing.colour, thing.thing_id) for _, _, thing in meant}) != 1:
         return None
     kind, named = meant[0][2].kind, {text for _, text, _ in meant}
     instead = f"the other {kind}" if is_other else words if is_kind else _of_kind(words, kind)
@@ -172,7 +172,7 @@ def _saying(action: Action, kind: str, instead: str) -> Action:
         words = found["words"].split()
         for count in range(len(words), 0, -1):
             thing = _thing(" ".join(words[:count]))
-            if thing is not None and thing.kind == kind and not thing.asked.relation:
+            if thing is not None and thing.kind == kind and not thing.relation:
                 the = "The" if found["article"][0].isupper() else "the"
                 return " ".join((the, name, *words[count:]))
         return found[0]
@@ -189,7 +189,7 @@ def _query(words: str) -> Query | None:
         return None
 
 
-def _thing(words: object) -> ObjectQuery | None:
+def _thing(words: object) -> Query | None:
     if not isinstance(words, str):
         return None
     try:

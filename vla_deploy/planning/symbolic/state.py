@@ -133,7 +133,7 @@ def subject_of(text: str, scene: Snapshot | None) -> Subject:
     query = parse_object(text)
     found = query.among(scene) if scene is not None else []
     words = str(query)
-    if len(found) == 1 or (found and query.asked.order):
+    if len(found) == 1 or (found and query.order):
         thing = found[0]
         return Subject(key=thing.thing_id, kind=thing.kind, words=words, thing=thing)
     return Subject(key=words, kind=query.kind, words=words, others=len(found))
