@@ -11,9 +11,47 @@ from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prohibition import Prohibition, StandingOrder
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.world import Snapshot
+
+
+class Forbidden(StrEnum):
+    """Name what may be forbidden."""
+
+    THING = "thing"
+    PLACE = "place"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prohibition:
+    """Hold what is forbidden: the words for a thing, or the name of a place."""
+
+    what: Forbidden
+    words: str
+
+    def __str__(self) -> str:
+        """Return it as one says it."""
+        named = self.words.replace("_", " ")
+        verb = "touch the" if self.what is Forbidden.THING else "go into the"
+        return f"{verb} {named}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandingOrder:
+    """Hold a command that forbids something, or permits it again."""
+
+    forbids: bool
+    of: Prohibition
+
+    @property
+    def answer(self) -> str:
+        """Return what the robot says to it."""
+        return f"All right, I will {'not' if self.forbids else 'now'} {self.of}."
+
+    @property
+    def question(self) -> str:
+        """Return what is asked before it stands; to forbid something is safe at once."""
+        return "" if self.forbids else f"May I {self.of} again?"
 
 
 class Aid(Enum):

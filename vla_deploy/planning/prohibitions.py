@@ -15,13 +15,11 @@ from typing import Final, Self
 
 from vla_deploy.planning.builders.tidying import REACH_M
 from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
-from vla_deploy.planning.interfaces import Proposal, Request
-from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.interfaces import Forbidden, Prohibition, Proposal, Request, StandingOrder
+from vla_deploy.planning.knowledge import World, match_place, parse_object
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
-from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of

@@ -16,12 +16,15 @@ from vla_deploy.planning.catalogue import (
     Type,
 )
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
-from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.knowledge import World, match_place, parse_object
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
-from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.conditions import Setting
-from vla_deploy.planning.symbolic.sharing import sharing_faults
-from vla_deploy.planning.symbolic.simulation import bounds_faults, first_broken, symbolic_faults
+from vla_deploy.planning.symbolic.simulation import (
+    bounds_faults,
+    first_broken,
+    sharing_faults,
+    symbolic_faults,
+)
 from vla_deploy.planning.symbolic.state import Pose
 from vla_deploy.planning.symbolic.table import GRASPABLE, LOGIC, PAYLOAD, TAKES_THINGS
 from vla_deploy.world import Body, Snapshot, Thing, access_to

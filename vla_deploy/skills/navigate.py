@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, Final, TypeVar
 
-from vla_deploy.planning.knowledge import spoken_places
-from vla_deploy.planning.references import match_place, parse_object
+from vla_deploy.planning.knowledge import match_place, parse_object, spoken_places
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext, spoken

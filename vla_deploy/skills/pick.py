@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
-from vla_deploy.planning.references import parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.arms import (
     feel,
     feel_way,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.references import parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.arms import (
     believe_fingers,
     feel_way,

@@ -11,9 +11,8 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.knowledge import parse_object, world_of
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.references import parse_object
 from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
 from vla_deploy.planning.symbolic.state import Pose, State, state_of
 from vla_deploy.planning.symbolic.table import LOGIC

@@ -8,12 +8,11 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.planning.understanding.questions import did_you_mean
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
 

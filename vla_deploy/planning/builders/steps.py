@@ -23,10 +23,10 @@ from vla_deploy.planning.errors import (
     UnknownPlace,
 )
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.planning.understanding.normaliser import RELATIONS
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import (
@@ -36,7 +36,6 @@ from vla_deploy.planning.understanding.quantities import (
     is_silent,
     quantity_words,
 )
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 DEFAULT_MOVE_M: Final = 0.5

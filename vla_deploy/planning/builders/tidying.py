@@ -7,12 +7,11 @@ from vla_deploy.memory.episode import LastSeen
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.conversation import Mention
 from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.world import Thing
 
 STORE: Final = "box"

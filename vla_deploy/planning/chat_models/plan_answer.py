@@ -16,7 +16,7 @@ from vla_deploy.planning.catalogue import SKILLS, Parameter, SkillSpec, Type
 from vla_deploy.planning.dialects import PLAN_LISTS, parse_plan
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prompts.situation_data import plain
+from vla_deploy.planning.prompts.composing import plain
 
 _REASON_CHARACTERS: Final = 400
 _QUESTION_CHARACTERS: Final = 160

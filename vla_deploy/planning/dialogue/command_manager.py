@@ -12,9 +12,8 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
-from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to
 from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.knowledge import match_place, parse_object
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.scope import IDIOMS
 from vla_deploy.planning.understanding import Question
 from vla_deploy.world import Query, UnknownWord, parse_query

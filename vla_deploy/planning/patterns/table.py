@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Priority
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.quantities import NUMBER
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 

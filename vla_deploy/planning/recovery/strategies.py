@@ -10,9 +10,9 @@ from typing import Final
 
 from vla_deploy.planning.errors import CannotBeDone, PlanningError, UnknownObject
 from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Request
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.recovery.setback import Carried, FailureCause
-from vla_deploy.planning.references import parse_object
 from vla_deploy.planning.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"

@@ -11,8 +11,7 @@ from typing import Any, Final
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.references import match_place
+from vla_deploy.planning.knowledge import World, match_place
 from vla_deploy.planning.symbolic.state import Point, State, Subject, subject_of
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot

@@ -10,8 +10,8 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import words_of
 from vla_deploy.planning.symbolic.state import Pose, Subject, subject_of
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS

@@ -22,8 +22,7 @@ from vla_deploy.planning.plan import (
     execution_order,
 )
 from vla_deploy.planning.symbolic.conditions import MET, Setting, has_free_hand, is_before, is_known
-from vla_deploy.planning.symbolic.sharing import in_turn
-from vla_deploy.planning.symbolic.simulation import after
+from vla_deploy.planning.symbolic.simulation import after, in_turn
 from vla_deploy.planning.symbolic.state import Held, State, state_of, subject_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.planning.understanding import phrases

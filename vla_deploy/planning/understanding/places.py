@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from vla_deploy.planning.errors import NotAble, UnknownObject, UnknownPlace
-from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
 from vla_deploy.planning.symbolic.state import Pose, State, subject_of
 from vla_deploy.planning.understanding import phrases

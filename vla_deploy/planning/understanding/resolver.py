@@ -13,13 +13,12 @@ from typing import Final
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotThere, UnknownObject
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.references import words_of
+from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
-from vla_deploy.planning.understanding.fitting import Use, alike, fitting, suits
+from vla_deploy.planning.understanding.fitting import Setting, Use, alike, fitting, suits
 from vla_deploy.planning.understanding.questions import did_you_mean, which_hand, which_thing
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
 

@@ -18,10 +18,9 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
 from vla_deploy.planning.command_parser.wording import plain_words
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import Forbidden, Prohibition, Request, StandingOrder
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {})

@@ -1,5 +1,5 @@
 from vla_deploy.planning.plan import Action, Priority
-from vla_deploy.planning.symbolic.sharing import in_turn, sharing_faults
+from vla_deploy.planning.symbolic.simulation import in_turn, sharing_faults
 
 
 def action(name: str, skill: str, *after: str, **changes: object) -> Action:
