@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from random import Random
 from typing import Final, NamedTuple
 
@@ -54,6 +55,7 @@ class Group:
     free: tuple[Sequence, ...]
 
 
+@cache
 def load_groups(held_out: bool) -> dict[str, list[Group]]:
     """Return the groups of phrases by what they do: those to train on, or those to judge by."""
     prefix = "held_" if held_out else ""
