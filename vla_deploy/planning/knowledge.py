@@ -44,6 +44,16 @@ def parse_object(text: str) -> Query:
     return replace(asked, kind=kind)
 
 
+def object_or_none(text: object) -> Query | None:
+    """Return what a text names, None where it names a place, or nothing known."""
+    if not isinstance(text, str):
+        return None
+    try:
+        return parse_object(text)
+    except UnknownObject:
+        return None
+
+
 def match_place(text: str, places: Mapping[str, str]) -> str | None:
     """Return the place that `text` names, or None; `places` maps every spoken name to a place."""
     spoken = " ".join(words_of(text.replace("_", " ")))

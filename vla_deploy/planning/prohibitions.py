@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Final, Self
 
 from vla_deploy.planning.builders.tidying import REACH_M
-from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
+from vla_deploy.planning.errors import CannotBeDone, NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, Proposal, Request, StandingOrder
-from vla_deploy.planning.knowledge import World, match_place, parse_object
+from vla_deploy.planning.knowledge import World, match_place, object_or_none
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import subject_of
+from vla_deploy.planning.symbolic.state import thing_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
@@ -159,7 +159,7 @@ def is_broken(
 def _searches(plan: Plan, scene: Snapshot | None) -> bool:
     """Tell whether a plan looks for something that is not in the scene."""
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
-    return any(subject_of(str(text), scene).thing is None for text in sought)
+    return any(thing_of(text, scene) is None for text in sought)
 
 
 def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
@@ -172,11 +172,8 @@ def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None
     place = match_place(groups.get("place") or "", world.places)
     if place is not None:
         return Prohibition(what=Forbidden.PLACE, words=place)
-    try:
-        words = str(parse_object(groups.get("thing") or ""))
-    except UnknownObject:
-        return None
-    return Prohibition(what=Forbidden.THING, words=words)
+    thing = object_or_none(groups.get("thing") or "")
+    return None if thing is None else Prohibition(what=Forbidden.THING, words=str(thing))
 
 
 def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | None) -> bool:
@@ -200,25 +197,19 @@ def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool
 
 def _may_be(text: str, words: str, scene: Snapshot | None) -> bool:
     """Tell whether an action names a forbidden thing; one that is not seen may be, if it can."""
-    try:
-        subject, asked, query = subject_of(text, scene), parse_object(text), parse_object(words)
-    except UnknownObject:
+    thing, asked, query = thing_of(text, scene), object_or_none(text), object_or_none(words)
+    if asked is None or query is None:
         return False
-    if subject.thing is not None and scene is not None:
-        return any(one.thing_id == subject.thing.thing_id for one in query.among(scene))
+    if thing is not None and scene is not None:
+        return any(one.thing_id == thing.thing_id for one in query.among(scene))
     colours = {asked.colour, query.colour} - {""}
     return len({asked.kind, query.kind} - {ANY_CLASS}) < 2 and len(colours) < 2
 
 
 def _rests(text: object, scene: Snapshot | None) -> set[str]:
     """Return all that a thing rests on which an action names, where that is known."""
-    if not isinstance(text, str) or scene is None:
-        return set()
-    try:
-        thing = subject_of(text, scene).thing
-    except UnknownObject:
-        return set()
-    return set() if thing is None else {*scene.below(thing.thing_id)}
+    thing = thing_of(text, scene)
+    return set() if thing is None or scene is None else {*scene.below(thing.thing_id)}
 
 
 def _read(file: Path) -> tuple[Prohibition, ...]:

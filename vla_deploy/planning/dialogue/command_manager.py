@@ -16,7 +16,6 @@ from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to
-from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
 from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
@@ -26,7 +25,14 @@ from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.patterns.awaiting import is_word
-from vla_deploy.planning.patterns.follow_up import asked_for, last_done
+from vla_deploy.planning.patterns.follow_up import (
+    CORRECTED,
+    asked_for,
+    corrected_by,
+    corrected_text,
+    last_done,
+    rejects,
+)
 from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.knowledge import World, parse_object
+from vla_deploy.planning.knowledge import World, object_or_none, parse_object
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.thing import Rest
 
@@ -121,6 +121,17 @@ class Subject:
         length_m, width_m, height_m = self.thing.size_m
         density = DENSITY_KG_M3.get(self.kind, OTHER_DENSITY_KG_M3)
         return density * length_m * width_m * height_m
+
+
+def subject_or_none(text: object, scene: Snapshot | None) -> Subject | None:
+    """Return what a parameter names, None where that is a place, or nothing known."""
+    return None if object_or_none(text) is None else subject_of(str(text), scene)
+
+
+def thing_of(text: object, scene: Snapshot | None) -> Thing | None:
+    """Return the one thing in the scene that a parameter names, None where it names none there."""
+    subject = subject_or_none(text, scene)
+    return None if subject is None else subject.thing
 
 
 def subject_of(text: str, scene: Snapshot | None) -> Subject:

@@ -9,10 +9,9 @@ from enum import StrEnum
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import Pose, Subject, subject_of
+from vla_deploy.planning.symbolic.state import Pose, Subject, subject_of, subject_or_none
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS
 
@@ -200,12 +199,11 @@ def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Me
         if not isinstance(value, str):
             continue
         role = _role(value, role, plan)
-        try:
-            subject = subject_of(value, scene)
-        except UnknownObject:
+        subject = subject_or_none(value, scene)
+        if subject is None:
             yield Mention(said=value, means=value, role=Role.PLACE)
-            continue
-        yield _mention(value, subject, role)
+        else:
+            yield _mention(value, subject, role)
 
 
 def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
