@@ -127,7 +127,7 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
     denies = any(group_of(word) is ScopeGroup.NEGATION for word in left_out)
     if denies and not proposal.knows_grammar and _DENIED.match(_plain(request.text)):
         raise CannotBeDone(f"I would leave out {quoted(left_out)}; say just what to do now")
-    return replace(proposal, left_out=left_out)
+    return replace(proposal, left_out=(*proposal.left_out, *left_out))
 
 
 def moves_anything(plan: Plan) -> bool:

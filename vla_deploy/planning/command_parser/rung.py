@@ -43,7 +43,6 @@ from vla_deploy.planning.scope import WORDS, ScopeGroup
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
 MOST_FOREIGN: Final = 0.2
-_DOUBT: Final = 0.01
 # What standing orders call the fields of a step.
 _ORDER_GROUPS: Final = {"what": "thing", "where": "place"}
 # A model that nobody has measured is asked back about everything.
@@ -110,7 +109,7 @@ class CommandParser(BackEnd):
                 "I wait for a word only before I begin; say the rest when it is time"
             )
         plan = Plan(goal=request.text.strip(), summary=skill_words(skills), actions=chained(skills))
-        sure = self._confidence(parsed)
+        sure, uncovered, covers = parsed.confidence, parsed.oddities.uncovered, _covered(parsed)
         if request.heard_confidence is not None:
             sure = min(sure, request.heard_confidence)
         if sure < self._weights.decline_below:
@@ -119,16 +118,11 @@ class CommandParser(BackEnd):
             plan=plan,
             back_end=self.name,
             confidence=round(sure, 3),
-            is_unsure=sure < self._weights.read_back_below,
-            covers=_covered(parsed),
+            is_unsure=sure < self._weights.read_back_below or bool(uncovered),
+            left_out=tuple(word for word in uncovered if word not in covers),
+            covers=covers,
             awaits_word=awaits_word,
         )
-
-    def _confidence(self, parsed: Parsed) -> float:
-        """Return how sure an answer is: too little to go unasked where it leaves words out."""
-        if not (parsed.oddities.uncovered or parsed.oddities.left_out):
-            return parsed.confidence
-        return min(parsed.confidence, self._weights.read_back_below - _DOUBT)
 
     def parse(self, text: str, deadline: Deadline) -> Parsed:
         """Return the steps that a text means, and how sure that is.

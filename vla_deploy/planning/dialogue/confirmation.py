@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Set
 from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
-from vla_deploy.planning.dialogue.phrasing import Says, listed, steps_in_words
+from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
 from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.scope import quoted
@@ -54,7 +54,7 @@ def question_about(plan: Plan, request: Request, proposal: Proposal | None = Non
     left_out = () if proposal is None else proposal.left_out
     steps = steps_in_words(_called_by_words(plan, request))
     parts = (
-        Says.LEFT_OUT.format(words=quoted(left_out)) if left_out else "",
+        Says.LEFT_OUT.format(words=first_part(quoted(left_out))) if left_out else "",
         Says.CONFIRM.format(steps=steps),
         *(f"{reason}." for reason in _reasons(plan, request).values() if reason),
         _things_named(plan, request),

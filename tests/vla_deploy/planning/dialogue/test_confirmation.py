@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of, question_about
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.understanding.grounding import PUT_IN
@@ -70,6 +70,16 @@ def test_each_risk_of_a_plan_is_told(butler: World) -> None:
     assert ask(butler, GO, heard_confidence=0.9) == ""
     assert "I would move 4 things." in ask(butler, *[PICK] * 4)
     assert "It takes 70 steps and about 18 minutes." in ask(butler, *[GO] * 70)
+
+
+def test_what_was_left_out_is_named_without_a_word_that_would_end_all(butler: World) -> None:
+    plan = Plan(goal="x", actions=(GO,))
+    proposal = Proposal(plan=plan, back_end="t", confidence=1.0, left_out=("not", "freeze", "not"))
+    request = Request(command_id="c", text="x", world=butler)
+    assert confirmation_of(plan, request, proposal) == (
+        'You said "not" and "standstill", which I may not have understood. '
+        "Shall I go to the kitchen?"
+    )
 
 
 def test_doubt_is_asked_even_where_risks_are_not(butler: World) -> None:
