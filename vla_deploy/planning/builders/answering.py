@@ -5,16 +5,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.memory.episode import unix_s
-from vla_deploy.memory.wording import place_words
+from vla_deploy.memory.wording import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
+from vla_deploy.planning.symbolic.state import Point
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.planning.understanding.questions import did_you_mean
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
+from vla_deploy.world.thing import FLOOR
 
 Fields = Mapping[str, str]
 MOST_TOLD = 6
@@ -85,7 +87,7 @@ def _places_of(things: Sequence[Thing], request: Request) -> str:
     """Return where things are, a sentence each."""
     sites = request.world.sites.values()
     places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
-    return " ".join(_where(one, place_of(one, places), request) for one in things[:MOST_TOLD])
+    return " ".join(_where(one, places, request) for one in things[:MOST_TOLD])
 
 
 def _known(text: str, request: Request) -> list[Thing]:
@@ -108,18 +110,12 @@ def _remembered(text: str, request: Request) -> list[Skill]:
     return []
 
 
-def _where(thing: Thing, place: str, request: Request) -> str:
+def _where(thing: Thing, places: Mapping[str, Point], request: Request) -> str:
     unseen_s = request.scene.unseen_s(thing) if request.scene is not None else 0.0
-    seen = seen_words(unseen_s)
-    where = place.replace("_", " ")
-    where = f"in my {where}" if thing.held_by else f"on the {where}"
-    if thing.rests is not None and thing.rests.relation == "in":
-        where = f"in the {place.rpartition('_')[0] or place}"
-    elif where.startswith("on the near"):
-        where = where.removeprefix("on the ").replace("near ", "near the ")
-    elif where.startswith("on the floor near"):
-        where = where.replace("near ", "near the ")
-    return f"The {thing} is {where}, {seen}."
+    rests = None if thing.held_by else thing.rests
+    on_something = rests is not None and rests.of != FLOOR
+    where = rests.words if rests and on_something else at_words(place_of(thing, places))
+    return f"The {thing} is {where}, {seen_words(unseen_s)}."
 
 
 def _a(words: str) -> str:

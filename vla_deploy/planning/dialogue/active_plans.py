@@ -86,9 +86,10 @@ class ActivePlans:
         """Return the plans that are carried out."""
         return tuple(carried.plan for _, carried in self._active.values())
 
-    def end(self, command_id: str) -> None:
-        """Forget a command: it has come to its end."""
-        self._active.pop(command_id, None)
+    def end(self, command_id: str) -> tuple[UserCommand, Plan] | None:
+        """Forget a command that has come to its end; return it with its plan, if it is known."""
+        command, carried = self._active.pop(command_id, (None, None))
+        return (command, carried.plan) if command and carried else None
 
     def end_all(self) -> None:
         """Forget all: they are cancelled, so a setback that is still under way starts nothing."""

@@ -170,9 +170,10 @@ class CommandManager:
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
-        self._active.end(command_id)
+        ended = self._active.end(command_id)
         turn = self.dialogue.ended(command_id, success, error)
-        self._events.ended(command_id, success, error)
+        if ended is not None:
+            self._events.ended(*ended, success, error)
         if turn is not None and not success:
             self.planner.cache.forget(turn.said)
 
@@ -287,7 +288,10 @@ class CommandManager:
             self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _cancel_all(self, command_id: str) -> None:
-        """Let the executor end what it does; no setback that it tells of by then is mended."""
+        """Let the executor end what it does; no setback that it tells of by then is mended.
+
+        The person who wanted that needs no answer aloud.
+        """
         self._events.cancelled_all(command_id)
         self._active.end_all()
 
