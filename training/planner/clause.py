@@ -1,7 +1,7 @@
-"""Make one clause of a command from a group of phrases: its words, and the step that it means."""
+"""Make one clause of a command from a group of phrases, and write the steps that clauses mean."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from random import Random
@@ -12,7 +12,7 @@ from training.planner.grammar import Sequence, Slot, expand, parse
 from training.planner.lists import PHRASES, read_file
 from training.planner.manners import SLIPS
 from training.planner.referring import SOURCES
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, field_names
 
 # What people say of a closed field, and its value.
 CLOSED: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
@@ -119,3 +119,21 @@ def _other_clause(random: Random, groups: Mapping[str, list[Group]]) -> Clause:
     commanding = [one for one in choices if one.imperative]
     group = random.choice(commanding)
     return make_clause(Group(group.fixed, group.imperative, ()), random, groups)
+
+
+def answer_text(steps: Iterable[Step]) -> str:
+    """Return steps as the model writes them: fields in their order, no spaces between.
+
+    Raises:
+        KeyError: a step lacks a field that it must have, or is none.
+    """
+    return '{"steps":[' + ",".join(map(_step_text, steps)) + "]}"
+
+
+def _step_text(step: Step) -> str:
+    fields = [f'"do":"{step["do"]}"']
+    for name, is_needed in field_names(step["do"]):
+        if is_needed or name in step:
+            space = " " if name in COPIED_FIELDS else ""
+            fields.append(f'"{name}":"{space}{step[name]}"')
+    return "{" + ",".join(fields) + "}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Final
 
-from training.planner.clause import Clause, Group, Said, load_groups, make_clause
+from training.planner.clause import Clause, Group, Said, answer_text, load_groups, make_clause
 from training.planner.grammar import Sequence, expand
 from training.planner.hearing import misheard
 from training.planner.manners import (
@@ -21,7 +21,6 @@ from training.planner.manners import (
 )
 from training.planner.telling import AFTER, BEFORE, load_remarks, load_told
 from training.planner.words import DOUBLING
-from training.planner.writing import answer_text
 from vla_deploy.planning.command_parser.wording import MOST_COMMAND_WORDS
 
 # How often each kind of step is drawn, of those that may stand among others.

@@ -14,11 +14,10 @@ from random import Random
 from typing import Final
 from zlib import crc32
 
-from training.planner.clause import Clause, Said, filled
+from training.planner.clause import Clause, Said, answer_text, filled
 from training.planner.grammar import PatternInvalid, Slot
 from training.planner.lists import PHRASES
 from training.planner.referring import SOURCES
-from training.planner.writing import answer_text
 from vla_deploy.planning.command_parser.grammar import (
     COPIED_FIELDS,
     STEPS,
