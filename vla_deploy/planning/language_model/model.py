@@ -80,8 +80,9 @@ class LanguageModel:
         with self._one_at_a_time:
             done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
         return ModelAnswer(
-            text=self.tokenizer.decode([token.number for token in done.tokens]),
+            text=self.tokenizer.decode(list(done.tokens)),
             tokens=done.tokens,
+            chosen=done.chosen,
             prompt_tokens=len(prompt),
             reused_tokens=done.reused_tokens,
             runs=done.runs,

@@ -89,11 +89,11 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
 
 def _fitting(clause: str, request: Request) -> Step:
     unknown: Step = {}
-    for pattern in PATTERNS:
-        found = pattern.pattern.fullmatch(clause)
+    for pattern, given in PATTERNS:
+        found = pattern.fullmatch(clause)
         if found is not None:
             said = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
-            step = {"do": pattern.do, **pattern.given, **said}
+            step = {**given, **said}
             if _are_known(said, request):
                 return step
             unknown = unknown or step
