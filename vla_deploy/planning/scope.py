@@ -119,9 +119,10 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
     Raises:
         CannotBeDone: without them it may be the very thing that was not to be done.
     """
-    if not moves_anything(proposal.plan):
+    covers = proposal.covers
+    if covers is None or not moves_anything(proposal.plan):
         return proposal
-    left_out = _without(scope_words(request.text), proposal.covers)
+    left_out = tuple(word for word in scope_words(request.text) if word not in covers)
     if not left_out:
         return proposal
     denies = any(group_of(word) is ScopeGroup.NEGATION for word in left_out)
@@ -138,7 +139,3 @@ def moves_anything(plan: Plan) -> bool:
 def quoted(words: Iterable[str]) -> str:
     """Return words as one quotes them, each once."""
     return " and ".join(f'"{word}"' for word in dict.fromkeys(words))
-
-
-def _without(words: Iterable[str], covered: frozenset[str] | None) -> tuple[str, ...]:
-    return () if covered is None else tuple(word for word in words if word not in covered)

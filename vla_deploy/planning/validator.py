@@ -52,16 +52,11 @@ def check_plan(
     faults, advice = _form_faults(plan, world), ""
     if not faults:
         # A plan whose actions are all right one by one is gone through symbol by symbol.
-        faults = _faults_here(plan, world, scene, here)
+        faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
+        faults += symbolic_faults(plan.actions, world, scene, here)
         advice = _instead_of(plan, world, scene, here) if faults else ""
     if faults:
         raise PlanInvalid(faults, advice)
-
-
-def _faults_here(plan: Plan, world: World, scene: Snapshot | None, here: Pose | None) -> list[str]:
-    """Return why a well-formed plan cannot be done as things stand."""
-    faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
-    return faults + symbolic_faults(plan.actions, world, scene, here)
 
 
 def _form_faults(plan: Plan, world: World) -> list[str]:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from vla_deploy.memory.episode import LastSeen
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.interfaces import Request
@@ -150,12 +149,9 @@ def _places(meant: Mention, request: Request) -> Iterator[str]:
         if is_same and one.rested and _takes_things(one.rested, request):
             yield one.rested
     for seen in request.last_seen:
-        if _is_same(seen, meant) and _takes_things(seen.place, request):
+        is_same = seen.kind == meant.kind and meant.colour in ("", seen.colour)
+        if is_same and _takes_things(seen.place, request):
             yield str(match_place(seen.place, request.world.places))
-
-
-def _is_same(seen: LastSeen, meant: Mention) -> bool:
-    return seen.kind == meant.kind and meant.colour in ("", seen.colour)
 
 
 def _takes_things(place: str, request: Request) -> bool:

@@ -47,7 +47,9 @@ def is_stop(text: str) -> bool:
     if len(text) > MOST_CHARACTERS:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]
-    return any(bare) and all(map(_is_stop, filter(None, bare)))
+    return any(bare) and all(
+        part in STOP_PHRASES or _STOP_DOING.fullmatch(part) for part in bare if part
+    )
 
 
 def objects(text: str) -> bool:
@@ -72,10 +74,6 @@ def _objecting(text: str) -> list[str]:
     bare = (courtesy_off(part) for part in _SENTENCE.split(said[:MOST_CHARACTERS]))
     without = (re.sub(r"^(?:(?:no|oh|and|but|hey) )+(?=\w)", "", part) for part in bare)
     return [part for part in without if part]
-
-
-def _is_stop(said: str) -> bool:
-    return said in STOP_PHRASES or _STOP_DOING.fullmatch(said) is not None
 
 
 def _urged_off(text: str) -> str:

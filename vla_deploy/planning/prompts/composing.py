@@ -58,7 +58,7 @@ def chat_for(
     fields = {
         "robot": plain(robot),
         "skills": skills_in_words(),
-        "limits": limits_in_words(request.world),
+        "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
     for name in (variant, *_SHORTER[variant]):
         system = "\n\n".join(filled(part, **fields) for part in (*VARIANTS[name], *more))
@@ -99,12 +99,8 @@ def skills_in_words() -> str:
     return "\n".join(lines)
 
 
-def limits_in_words(world: World) -> str:
-    """Return what bounds a plan for this robot, a line each."""
-    return "\n".join(f"- {one}" for one in _limits(world))
-
-
-def _limits(world: World) -> Iterator[str]:
+def limits(world: World) -> Iterator[str]:
+    """Yield what bounds a plan for this robot."""
     yield f"it recognises these kinds of things: {', '.join(OBJECT_CLASSES)}"
     yield f"at most {world.bounds.max_actions} steps"
     if math.isfinite(world.bounds.payload_kg):
@@ -161,7 +157,9 @@ def situation_of(request: Request) -> dict[str, Any]:
         "things": things,
         "left_out": 0 if scene is None else len(scene.things) - len(things),
         "gone": gone,
-        "hands": {plain(hand): _held(what) for hand, what in request.world.holding.items()},
+        "hands": {
+            plain(hand): what and plain(what) for hand, what in request.world.holding.items()
+        },
         "places": sorted({plain(place) for place in request.world.places.values()}),
         "said_before": [_turn(one) for one in reversed(request.conversation.turns)],
         "remembered": [
@@ -196,10 +194,6 @@ def _thing(thing: Thing, robot: Viewpoint | None) -> Iterator[tuple[str, Any]]:
 
 def _distance_m(thing: Thing, robot: Viewpoint | None) -> float:
     return 0.0 if robot is None else math.dist(thing.xy_m, (robot.x_m, robot.y_m))
-
-
-def _held(what: str | None) -> str | None:
-    return None if what is None else plain(what)
 
 
 def _turn(turn: Turn) -> dict[str, str]:
