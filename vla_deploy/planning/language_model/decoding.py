@@ -56,11 +56,11 @@ class Generated:
 def generate(
     decoder: "Decoder",
     prompt: Sequence[int],
-    constraint: "Constraint | None",
+    constraint: "Constraint",
     end_ids: Sequence[int],
     bounds: AnswerBounds,
 ) -> Generated:
-    """Answer a prompt; without a constraint, until the model ends by itself.
+    """Answer a prompt.
 
     Forced tokens go in with the next token that the model is asked for, in one run. A long prompt
     is read piece by piece.
@@ -77,12 +77,11 @@ def generate(
     chosen: list[float] = []
     runs = 0
     while True:
-        forced = [] if constraint is None else constraint.forced()
-        if constraint is not None and forced:
+        if forced := constraint.forced():
             constraint.take(forced)
             tokens += forced
             waiting += forced
-        if constraint is not None and constraint.is_done:
+        if constraint.is_done:
             break
         decoder.check_room(len(waiting))
         for begin in range(0, len(waiting), PIECE_TOKENS):
@@ -95,16 +94,13 @@ def generate(
         tokens.append(token)
         chosen.append(log_probability)
         waiting = [token]
-        if constraint is not None:
-            constraint.take(waiting)
+        constraint.take(waiting)
     return Generated(tokens=tuple(tokens), chosen=tuple(chosen), reused_tokens=reused, runs=runs)
 
 
-def _likeliest(scores: Scores, constraint: "Constraint | None") -> tuple[int, float]:
+def _likeliest(scores: Scores, constraint: "Constraint") -> tuple[int, float]:
     """Return the likeliest token of those allowed, and its log-probability among all."""
-    allowed = scores
-    if constraint is not None:
-        allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
+    allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
     number = int(np.argmax(allowed))
     highest = float(scores.max())
     total = highest + float(np.log(np.exp(scores - highest).sum()))

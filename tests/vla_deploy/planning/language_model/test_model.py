@@ -145,7 +145,7 @@ def test_an_answer_ends_when_nobody_waits_any_more(model: LanguageModel) -> None
 
 def test_an_answer_is_cut_at_its_most_tokens(model: LanguageModel) -> None:
     with pytest.raises(AnswerCut, match="3 tokens"):
-        model.answer(ASKED, bounds(most_tokens=3))
+        model.answer(ASKED, bounds(most_tokens=3), SCHEMA)
 
 
 def test_a_prompt_beyond_the_context_is_refused(model: LanguageModel) -> None:
