@@ -19,7 +19,7 @@ SPEAKERS: Final = ("planning", "memory", "world", "speech/event_publisher.py")
 """Where sentences stand that are said aloud."""
 NOT_SAID: Final = frozenset(
     {
-        "planning/patterns/stopping.py",  # what a person may say
+        "planning/patterns/steering.py",  # what a person may say
         "planning/patterns/phrase.py",
         "planning/patterns/table.py",
         "planning/command_parser/certainty.py",

@@ -12,8 +12,7 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd
-from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd, PlanAnswer
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, Check, Proposal, Request

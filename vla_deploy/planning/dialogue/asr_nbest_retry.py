@@ -16,7 +16,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.patterns.awaiting import awaiting
+from vla_deploy.planning.patterns.steering import awaiting
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to back ends that take time, too."""

@@ -24,7 +24,6 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
-from vla_deploy.planning.patterns.awaiting import is_word
 from vla_deploy.planning.patterns.follow_up import (
     CORRECTED,
     asked_for,
@@ -33,7 +32,7 @@ from vla_deploy.planning.patterns.follow_up import (
     last_done,
     rejects,
 )
-from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
+from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order

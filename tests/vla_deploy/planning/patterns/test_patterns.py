@@ -5,9 +5,8 @@ import pytest
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.patterns.awaiting import awaiting, is_word
 from vla_deploy.planning.patterns.backend import pattern_plan
-from vla_deploy.planning.patterns.stopping import is_stop, objects, only_objects
+from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 
