@@ -16,14 +16,12 @@ from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to
-from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
-from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
+from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
-from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.patterns.follow_up import (
     CORRECTED,
     asked_for,
@@ -68,7 +66,6 @@ class CommandManager:
         prohibitions: Prohibitions | None = None,
     ) -> None:
         self.planner = planner
-        self.dialogue = DialogueState(clock)
         self._situation = situation
         self._events = events
         self._async = AsyncPlanner(executor)
@@ -77,14 +74,8 @@ class CommandManager:
         self._active = ActivePlans(further_plans)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
-        self._dispatcher = CommandDispatcher(
-            self._accept, situation, events, self.dialogue, self._active
-        )
-
-    @property
-    def metrics(self) -> PlannerMetrics:
-        """Return the counts of commands."""
-        return self._dispatcher.metrics
+        self.dialogue = Dialogue(self._accept, situation, events, self._active, clock)
+        self.metrics = self.dialogue.metrics
 
     # --- what comes in --------------------------------------------------------------------------
 
@@ -97,7 +88,7 @@ class CommandManager:
         command = self._doubted_yes(command)
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
-            self._dispatcher.refuse(command, reason)
+            self.dialogue.refuse(command, reason)
             return
         is_taken = (
             self._takes_as_word(command)
@@ -107,7 +98,7 @@ class CommandManager:
         if is_taken:
             return
         if command.is_answer:
-            self._dispatcher.refuse(command, Says.NOTHING_ASKED)
+            self.dialogue.refuse(command, Says.NOTHING_ASKED)
         else:
             self._take_anew(command)
 
@@ -120,7 +111,7 @@ class CommandManager:
         elif self._async.command is not None and self._forbids(command):
             self._begin(command)  # it holds for what is being planned, too
         elif len(self._queue) >= MOST_WAITING:
-            self._dispatcher.refuse(command, Says.MANY_WAIT)
+            self.dialogue.refuse(command, Says.MANY_WAIT)
         else:
             if is_objection:  # "don't take that, take the blue one"
                 self.stop_all(f"{command.command_id}-objects")
@@ -162,7 +153,7 @@ class CommandManager:
         self._retry.forget()
         for command in dropped:
             if command is not None:
-                self._dispatcher.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+                self.dialogue.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
         # "Again" after a stop cannot mean what was done before it.
         stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
         self.dialogue.remember(stop)
@@ -178,8 +169,7 @@ class CommandManager:
 
     def turned_away(self, command_id: str, error: str) -> None:
         """Note that the executor does not carry out a plan that it was given."""
-        if self._active.of(command_id) is not None:
-            self._active.end(command_id)
+        if self._active.end(command_id) is not None:
             self.dialogue.ended(command_id, False, error)
 
     def set_back(self, command_id: str, setback: Mapping[str, Any]) -> None:
@@ -193,10 +183,7 @@ class CommandManager:
 
     def advance(self) -> None:
         """Go on with what has become possible."""
-        if self.dialogue.is_overdue:
-            self._leave(Says.NO_ANSWER)
-        if self.dialogue.is_held_too_long:
-            self._dispatcher.drop(self.dialogue.take_held(), Says.NO_ANSWER)
+        self.dialogue.drop_overdue()
         self._look_after_job()
         while self._queue and self._async.command is None and self.dialogue.pending is None:
             command = self._queue.popleft()
@@ -221,7 +208,7 @@ class CommandManager:
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
-            self._dispatcher.conclude(PlannedCommand(command, request, answer))
+            self.dialogue.conclude(PlannedCommand(command, request, answer))
             return
         if command.recovers:
             carried = self._active.of(command.command_id)
@@ -276,7 +263,7 @@ class CommandManager:
         if _stands_still(found) and self._is_moving:
             # A plan is turned away while another runs, and nobody needs to be asked about a halt.
             self._cancel_all(f"{found.command.command_id}-stops")
-        self._dispatcher.conclude(found)
+        self.dialogue.conclude(found)
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -284,7 +271,7 @@ class CommandManager:
         if error is not None:
             _log.error("planning %r failed", command.text, exc_info=error)
             self.metrics.failed += 1
-            self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
+            self.dialogue.refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _cancel_all(self, command_id: str) -> None:
         """Let the executor end what it does; no setback that it tells of by then is mended.
@@ -344,13 +331,13 @@ class CommandManager:
         if verdict is Verdict.NO and not command.is_doubted and not self._goes_on:
             self.dialogue.take_held()
             self._events.answered(command, held.command)
-            self._dispatcher.drop(held, Says.LEFT)
+            self.dialogue.drop(held, Says.LEFT)
         elif begins and not command.is_doubted and not command.awaits_word:
             self.dialogue.take_held()
             self._events.answered(command, held.command)
             self._run_confirmed(held, held.plan)
         elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
-            self._dispatcher.refuse(command, Says.STILL_HELD)
+            self.dialogue.refuse(command, Says.STILL_HELD)
         else:
             return False
         return True
@@ -377,7 +364,7 @@ class CommandManager:
             self._events.answered(command, pending.command)
             go_on()
         elif command.is_answer:
-            self._dispatcher.refuse(command, f"that does not answer: {pending.question.text}")
+            self.dialogue.refuse(command, f"that does not answer: {pending.question.text}")
         else:
             self._leave(Says.REPLACED)
             return False
@@ -414,11 +401,7 @@ class CommandManager:
         if verdict is Verdict.NO:
             self._leave(Says.LEFT)
         elif verdict is Verdict.UNCLEAR:
-            asked = self.dialogue.ask_again(pending)
-            if asked is None:
-                self._leave(Says.STILL_UNCLEAR)
-            else:
-                self._events.asked(pending.command, asked, pending.plan)
+            self.dialogue.ask_again(pending)
         else:
             self.dialogue.choose(pending.question, chosen)
             if pending.plan is None:
@@ -426,7 +409,7 @@ class CommandManager:
             elif pending.command.awaits_word:
                 request = self._request(pending.command)
                 done = PlannedCommand(pending.command, request, pending.answer)
-                self._dispatcher.hold(done, pending.plan)
+                self.dialogue.hold(done, pending.plan)
             else:
                 self._run_confirmed(pending, pending.plan)
 
@@ -475,7 +458,7 @@ class CommandManager:
         except PlanningError as error:
             answer = PlanningResult(error=error)
         corrected = replace(command, corrected=plan)
-        self._dispatcher.conclude(PlannedCommand(corrected, request, answer))
+        self.dialogue.conclude(PlannedCommand(corrected, request, answer))
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought.
@@ -488,18 +471,18 @@ class CommandManager:
             self._situation.check_ready()
             checked = self.planner.check(plan, request)
         except PlanningError as error:
-            self._dispatcher.refuse(pending.command, error, pending.answer)
+            self.dialogue.refuse(pending.command, error, pending.answer)
             return
         proposal = pending.answer.proposal
         if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):
-            self._dispatcher.dispatch(done, checked)
+            self.dialogue.dispatch(done, checked)
             return
         agreed = replace(proposal, is_unsure=False, left_out=())
         asks = replace(pending.answer, plan=checked, proposal=agreed)
-        self._dispatcher.conclude(PlannedCommand(pending.command, request, asks))
+        self.dialogue.conclude(PlannedCommand(pending.command, request, asks))
 
     def _leave(self, why: Says) -> None:
-        self._dispatcher.drop(self.dialogue.settle(), why)
+        self.dialogue.drop(self.dialogue.settle(), why)
 
 
 def _stands_still(done: PlannedCommand) -> bool:
