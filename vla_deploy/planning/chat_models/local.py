@@ -5,10 +5,8 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from platforms import ModelChoice
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.memory_claims import MemoryClaim
-from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
@@ -20,7 +18,6 @@ from vla_deploy.planning.language_model import (
     LanguageModel,
     Message,
     ModelAnswer,
-    open_language_model,
 )
 from vla_deploy.planning.prompts.composing import chat_for
 from vla_deploy.robots import RobotDescription
@@ -77,12 +74,3 @@ def messages_of(chat: Chat) -> list[Message]:
     """Return a question as chat templates take it; images are left out."""
     turns: list[Message] = [{"role": one.role.value, "content": one.text} for one in chat.messages]
     return [{"role": "system", "content": chat.system}, *turns] if chat.system else turns
-
-
-def open_local_model(model: Model, choice: ModelChoice, robot: RobotDescription) -> LocalModel:
-    """Open a model of the store.
-
-    Raises:
-        InferenceError: it cannot be opened; each kind says why.
-    """
-    return LocalModel(model.manifest.name, open_language_model(model, choice), robot)

@@ -381,11 +381,12 @@ class CommandManager:
         if verdict is not Verdict.ANEW and not (full and verdict is Verdict.UNCLEAR):
             return partial(self._go_on, pending, verdict, chosen)
         if pending.is_open and not self._at_once(command).is_final:
-            return partial(self._replan, pending, f"{pending.command.text}: {command.text}")
+            text = f"{pending.command.text}: {command.text}"
+            return partial(self._replace, replace(pending.command, text=text))
         if corrected := self._corrected(pending, command.text):
             return partial(self._replace, corrected)
         if full:
-            return partial(self._replan, pending, full)
+            return partial(self._replace, replace(pending.command, text=full))
         guessed = guess(pending.question, command.text)
         if guessed and self._at_once(command).plan is None:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
@@ -412,10 +413,6 @@ class CommandManager:
                 self.dialogue.hold(done, pending.plan)
             else:
                 self._run_confirmed(pending, pending.plan)
-
-    def _replan(self, pending: PendingQuestion, text: str) -> None:
-        """Plan a command anew in the words that an answer makes of it."""
-        self._replace(replace(pending.command, text=text))
 
     def _replace(self, command: UserCommand) -> None:
         """Begin anew with the command that an answer has made of the one that waited."""
