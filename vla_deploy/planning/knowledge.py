@@ -37,7 +37,7 @@ def parse_object(text: str) -> Query:
     except UnknownWord as error:
         raise UnknownObject(text.strip(), OBJECT_CLASSES) from error
     if asked.relation in FROM_A_VIEW:
-        raise DependsOnView(text.strip(), OBJECT_CLASSES)
+        raise DependsOnView(text.strip())
     kind = asked.thing_id.rpartition("_")[0] or asked.kind
     if kind not in OBJECT_CLASSES or not asked.is_named:
         raise UnknownObject(text.strip(), OBJECT_CLASSES)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.planning.builders.steps import way_back
-from vla_deploy.planning.errors import Declined, NothingBefore
+from vla_deploy.planning.errors import Declined, NotAble
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place, object_or_none
 from vla_deploy.planning.plan import PUT_IN, Action, Plan, chained
@@ -60,7 +60,7 @@ def follow_up(text: str, request: Request) -> Plan | None:
     """Return the plan of a clause that only points at the command before it, else None.
 
     Raises:
-        NothingBefore: there is none, it did not end well, or it has no amount.
+        NotAble: there is none, it did not end well, or it has no amount.
         Declined: there is no other thing that it could be done with.
     """
     if _AGAIN.fullmatch(text):
@@ -94,14 +94,14 @@ def _last(request: Request) -> Turn:
     """Return the turn before this one, where that may be done again.
 
     Raises:
-        NothingBefore: it may not.
+        NotAble: it may not.
     """
     turns = request.conversation.turns
     if not turns:
-        raise NothingBefore("there is no command yet that I could repeat; say the whole command")
+        raise NotAble("there is no command yet that I could repeat; say the whole command")
     last = turns[-1]
     if not _is_done(last):
-        raise NothingBefore(
+        raise NotAble(
             f'"{last.said[:60]}" was not done ({last.outcome.value}), so I do not repeat it; '
             "say the whole command"
         )
@@ -129,7 +129,7 @@ def _more(ratio: float, request: Request) -> Plan:
     last = _last(request)
     amount = _amount(last)
     if amount is None:
-        raise NothingBefore(
+        raise NotAble(
             f'"{last.said[:60]}" has no distance, angle or time of which I could do more; '
             "say how much"
         )

@@ -14,7 +14,7 @@ from vla_deploy.planning.understanding.selection import by_distance, in_place, m
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.resting import IN
-from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
+from vla_deploy.world.vocabulary import ANY_CLASS
 
 
 @dataclass(slots=True)
@@ -100,7 +100,7 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     """
     query, view = _query(read, use, setting), setting.view
     if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
-        raise DependsOnView(read.said, OBJECT_CLASSES)
+        raise DependsOnView(read.said)
     found = find(replace(query, order=""), setting.scene, view)
     found = found or _in_room(query, setting)
     if read.is_other and use is Use.PUT and not read.query.is_named:

@@ -168,7 +168,7 @@ def thing_unless_place(
 
     Raises:
         UnknownObject: it is to take something, and names nothing known.
-        NotThere: things are known, but none that it can mean.
+        NotAble: things are known, but none that it can mean.
         Ambiguous: only the speaker can tell.
     """
     if match_place(text, resolver.setting.request.world.places):
