@@ -8,11 +8,9 @@ those that nobody answered or that ended the planner, `attacks_read_back` those 
 for a person's yes.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.command import parser, show
 from benchmarks.planner_corpus import PLAN, attacks
 from benchmarks.planner_play import Verdict, play_afresh
 
@@ -54,16 +52,3 @@ def _line(verdict: Verdict) -> str:
     last = verdict.judged[-1]
     why = "; ".join((last.wrong, *last.broken))
     return f"{verdict.case.name}: {last.say:.80}: {last.answer.outcome}: {why:.200}"
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the figures."""
-    arguments = parser("planner_attacks", __doc__)
-    arguments.add_argument("--misses", action="store_true", help="list those that got through")
-    given = arguments.parse_args(argv)
-    show(measure(misses=given.misses), as_json=given.json)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

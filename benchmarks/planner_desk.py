@@ -22,7 +22,7 @@ from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import open_local_models, open_planner
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.node import PlannerNode
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotDescription, load_robot
 
 ANSWER_LIMIT_S: Final = 20.0
 # No state of a user: what ships is measured.
@@ -69,10 +69,15 @@ def fresh_desk() -> Iterator["Desk"]:
 
 
 @cache
+def _robot() -> RobotDescription:
+    return load_robot(ROBOT)
+
+
+@cache
 def opened(profile: str) -> tuple[tuple[BackEnd, ...], dict[str, str]]:
     """Open the shipped models that a profile names, once for all desks: that takes longest."""
-    clock, robot = MonotonicClock(), load_robot(ROBOT)
-    return open_local_models(robot, load_profile(profile), ModelShelf.of_base(NOWHERE, clock))
+    shelf = ModelShelf.of_base(NOWHERE, MonotonicClock())
+    return open_local_models(_robot(), load_profile(profile), shelf)
 
 
 class Desk:
@@ -161,7 +166,7 @@ class Desk:
 
     def _built(self) -> PlannerNode:
         """Build the node as its process does, with models that are open already."""
-        robot, profile = load_robot(ROBOT), load_profile(self._context.profile)
+        robot, profile = _robot(), load_profile(self._context.profile)
         base = self._context.run_dir.parent
         local, away = opened(self._context.profile)
         planner = open_planner(robot, profile.planning, self._clock, base, local, away)

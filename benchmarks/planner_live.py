@@ -9,7 +9,6 @@ Memory and CPU are the planner's, as the supervisor accounts them to its budget.
 the physics too, so these are upper bounds.
 """
 
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -18,7 +17,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.command import parser, show
 from benchmarks.live_robot import PROFILE_FILE, NotReached, arm, live_stack
 from benchmarks.percentiles import spread_s
 from benchmarks.perception_live import HERE
@@ -159,18 +157,3 @@ def _cost(stack: ProcessStack, path: Path, named: str) -> dict[str, Any]:
             report[f"{name}_{key}"] = usage[key]
             report[f"{name}_{key}_of_budget"] = usage[key] and usage[key] / budget
     return report
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the figures."""
-    arguments = parser("planner_live", __doc__)
-    arguments.add_argument("--rounds", type=int, default=1, help="how often each command is given")
-    arguments.add_argument("--typed-only", action="store_true", help="leave out spoken commands")
-    arguments.add_argument("--profile", default=PROFILE, help="whose budgets")
-    given = arguments.parse_args(argv)
-    show(measure(given.rounds, not given.typed_only, given.profile), as_json=given.json)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

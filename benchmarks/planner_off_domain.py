@@ -5,11 +5,9 @@ everything has been seen. `off_domain_executed` counts the plans that reached th
 answers among them; `off_domain_moved` those that move the robot.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any, Final
 
-from benchmarks.command import parser, show
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import ASK, PLAN, REFUSE, home, other_talk, scenes
 from benchmarks.planner_desk import fresh_desk
@@ -44,16 +42,3 @@ def _misses(answers: Sequence[tuple[str, Any]]) -> list[str]:
         for text, answer in answers
         if answer.outcome not in (ASK, REFUSE)
     ]
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the figures."""
-    arguments = parser("planner_off_domain", __doc__)
-    arguments.add_argument("--misses", action="store_true", help="list what was not left alone")
-    given = arguments.parse_args(argv)
-    show(measure(given.misses), as_json=given.json)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

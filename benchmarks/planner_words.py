@@ -16,20 +16,9 @@ KINDS: Final = frozenset(
     {"cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote"}
 )
 COLOURS: Final = frozenset(
-    {
-        "red",
-        "orange",
-        "yellow",
-        "green",
-        "blue",
-        "purple",
-        "pink",
-        "brown",
-        "white",
-        "grey",
-        "black",
-    }
-)
+    {"red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "grey",
+     "black"}
+)  # fmt: skip
 SAME: Final[Mapping[str, str]] = MappingProxyType({
     "mug": "cup", "glass": "cup", "beaker": "cup", "tumbler": "cup", "sphere": "ball",
     "novel": "book", "notebook": "book", "flask": "bottle", "smartphone": "phone",

@@ -87,13 +87,13 @@ def _ship(arguments: argparse.Namespace, _settings: Settings) -> None:
 
 
 def _mean(arguments: argparse.Namespace, _settings: Settings) -> None:
-    from training.planner.mean import mean
+    from training.planner.going_on import mean
 
     mean(arguments.out, arguments.start_from, arguments.mean_into)
 
 
 def _unpack(arguments: argparse.Namespace, _settings: Settings) -> None:
-    from training.planner.unpacking import unpack
+    from training.planner.going_on import unpack
 
     unpack(arguments.out)
 

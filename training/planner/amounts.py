@@ -3,45 +3,14 @@
 from random import Random
 from typing import Final
 
+from training.planner.lists import read_lists
+
 Word = tuple[str, bool]
-_ONES: Final = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine",
-    "ten",
-                "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen",
-                "eighteen", "nineteen")  # fmt: skip
-_TENS: Final = (
-    "",
-    "",
-    "twenty",
-    "thirty",
-    "forty",
-    "fifty",
-    "sixty",
-    "seventy",
-    "eighty",
-    "ninety",
-)
+_AMOUNTS: Final = read_lists("amounts")
+_ONES: Final = _AMOUNTS["ones"]
+_TENS: Final = _AMOUNTS["tens"]
 _METRES: Final = ("meters", "metres", "meter", "metre", "m")
 _CENTIMETRES: Final = ("centimeters", "centimetres", "centimeter", "cm", "centimetre")
-_ODD_LENGTHS: Final = (
-    "a bit", "a little", "a little bit", "a few centimeters", "half a meter", "half a metre",
-    "a meter", "a metre", "one and a half meters", "a quarter of a meter", "a step", "two steps",
-    "a few steps", "a foot", "two feet", "three feet", "ten inches", "a couple of meters",
-    "some more",
-    "a tiny bit", "a hand's width", "a meter and a half", "half meter", "quarter meter", "an inch",
-    "two and a half meters", "a yard", "a few inches", "a couple of steps", "half a foot",
-)  # fmt: skip
-_ODD_ANGLES: Final = (
-    "a bit", "a little", "a little bit", "a quarter turn", "half a turn", "a full turn", "half way",
-    "a full circle", "a quarter", "a half turn", "one full turn", "two full turns", "a right angle",
-    "a few degrees", "half a circle", "halfway", "a quarter of a turn", "slightly", "completely",
-)  # fmt: skip
-_ODD_TIMES: Final = (
-    "a moment", "a second", "a minute", "half a minute", "a while", "a bit", "a few seconds",
-    "a couple of seconds", "a couple of minutes", "a little while", "one minute", "half a second",
-    "a minute and a half", "a few minutes", "a sec", "a little", "an hour", "a quarter of an hour",
-    "a quarter of a minute", "a little bit", "one and a half minutes", "half an hour",
-    "a short while",
-)  # fmt: skip
 
 
 def spelt(number: int) -> str:
@@ -63,7 +32,7 @@ def spelt(number: int) -> str:
 def length(random: Random) -> list[Word]:
     """Return a length."""
     if random.random() < 0.3:
-        return _all(random.choice(_ODD_LENGTHS))
+        return _all(random.choice(_AMOUNTS["lengths"]))
     if random.random() < 0.5:
         return _all(f"{_number(random, random.randint(1, 5), whole=0.5)} {random.choice(_METRES)}")
     return _all(f"{_number(random, random.randint(1, 200))} {random.choice(_CENTIMETRES)}")
@@ -72,7 +41,7 @@ def length(random: Random) -> list[Word]:
 def angle(random: Random) -> list[Word]:
     """Return an angle."""
     if random.random() < 0.25:
-        return _all(random.choice(_ODD_ANGLES))
+        return _all(random.choice(_AMOUNTS["angles"]))
     value = random.choice(
         (15, 30, 45, 60, 90, 90, 90, 120, 135, 180, 270, 360, random.randint(1, 360))
     )
@@ -84,7 +53,7 @@ def angle(random: Random) -> list[Word]:
 def duration(random: Random) -> list[Word]:
     """Return a length of time."""
     if random.random() < 0.3:
-        return _all(random.choice(_ODD_TIMES))
+        return _all(random.choice(_AMOUNTS["times"]))
     unit = random.choice(
         ("seconds", "seconds", "seconds", "minutes", "sec", "secs", "s", "second", "minute")
     )

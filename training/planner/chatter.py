@@ -7,21 +7,10 @@ import json
 from pathlib import Path
 from typing import Final
 
+from training.planner.lists import read_lists
 from vla_deploy.planning.command_parser.wording import plain_words
 
-_LEFT_OUT: Final = frozenset({
-    "find_phone", "yes", "no", "maybe", "cancel", "repeat", "what_can_i_ask_you", "smart_home",
-    "order",
-    "play_music", "next_song", "update_playlist", "change_volume", "make_call", "text", "timer",
-    "alarm",
-    "reminder", "reminder_update", "calendar_update", "shopping_list_update", "todo_list_update",
-    "spelling",
-    "book_flight", "book_hotel", "restaurant_reservation", "translate", "schedule_meeting",
-    "pay_bill",
-    "schedule_maintenance", "calculator", "change_speed", "whisper_mode", "reset_settings",
-    "sync_device",
-    "what_song", "uber", "share_location", "current_location",
-})  # fmt: skip
+_LEFT_OUT: Final = frozenset(read_lists("chatter")["left_out"])
 _MOST_WORDS: Final = 24
 
 

@@ -1,63 +1,24 @@
-"""Make one clause of a command from a group of phrases: its words, and the step that it means."""
+"""Make one clause of a command from a group of phrases, and write the steps that clauses mean."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 from random import Random
 from typing import Final, NamedTuple
 
 from training.planner.describing import Word
 from training.planner.grammar import Sequence, Slot, expand, parse
+from training.planner.lists import PHRASES, read_file
+from training.planner.manners import SLIPS
 from training.planner.referring import SOURCES
-from training.planner.slips import SLIPS
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, field_names
 
-PHRASES: Final = Path(__file__).with_name("phrases")
-# What people say of a closed field, and its value; an often-said form stands twice.
+# What people say of a closed field, and its value.
 CLOSED: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
-    "how": (
-        ("in", "in"), ("in", "in"), ("into", "in"), ("inside", "in"), ("inside of", "in"),
-            ("within", "in"),
-        ("on", "on"), ("on", "on"), ("onto", "on"), ("on top of", "on"), ("upon", "on"),
-            ("on to", "on"),
-        ("next to", "next to"), ("beside", "next to"), ("by", "near"), ("near", "near"),
-            ("close to", "near"),
-        ("under", "under"), ("below", "under"), ("behind", "behind"), ("in front of",
-            "in front of"),
-        ("left of", "left of"), ("to the left of", "left of"), ("right of", "right of"),
-        ("to the right of", "right of"), ("alongside", "next to"), ("underneath", "under"),
-        ("to", "to"), ("in to", "in"), ("over on", "on"), ("over to", "to"), ("back in", "in"),
-            ("back on", "on"),
-    ),
-    "arm": (("left", "left"), ("right", "right")),
-    "side": (("left", "left"), ("right", "right"), ("left hand side", "left"),
-    ("right hand side", "right"),
-             ("left", "left"), ("right", "right"), ("counterclockwise", "left"), ("clockwise",
-                 "right"),
-             ("anticlockwise", "left")),
-    "way": (
-        ("forward", "forward"), ("forwards", "forward"), ("ahead", "forward"), ("straight ahead",
-            "forward"),
-        ("straight on", "forward"), ("straight", "forward"), ("to the front", "forward"),
-            ("onward", "forward"),
-        ("backward", "backward"), ("backwards", "backward"), ("back", "backward"), ("in reverse",
-            "backward"),
-        ("back up", "backward"), ("to the back", "backward"), ("closer", "forward"), ("away",
-            "backward"),
-        ("further", "forward"), ("towards me", "forward"), ("rearward", "backward"),
-    ),
-    "direction": (
-        ("left", "left"), ("right", "right"), ("up", "up"), ("down", "down"), ("ahead", "ahead"),
-        ("straight ahead", "ahead"), ("forward", "ahead"), ("to the front", "ahead"), ("upwards",
-            "up"),
-        ("downwards", "down"), ("at the ceiling", "up"), ("at the floor", "down"),
-            ("to the ceiling", "up"),
-        ("to the ground", "down"), ("higher", "up"), ("lower", "down"), ("leftwards", "left"),
-            ("rightwards", "right"),
-        ("straight", "ahead"), ("in front of you", "ahead"),
-    ),
-}  # fmt: skip
+    name: tuple((said, value) for said, value in forms)
+    for name, forms in read_file("closed").items()
+}
 # The field of a step that a closed slot fills.
 _FIELD_OF: Final[Mapping[str, str]] = {
     "how": "how",
@@ -94,6 +55,7 @@ class Group:
     free: tuple[Sequence, ...]
 
 
+@cache
 def load_groups(held_out: bool) -> dict[str, list[Group]]:
     """Return the groups of phrases by what they do: those to train on, or those to judge by."""
     prefix = "held_" if held_out else ""
@@ -157,3 +119,21 @@ def _other_clause(random: Random, groups: Mapping[str, list[Group]]) -> Clause:
     commanding = [one for one in choices if one.imperative]
     group = random.choice(commanding)
     return make_clause(Group(group.fixed, group.imperative, ()), random, groups)
+
+
+def answer_text(steps: Iterable[Step]) -> str:
+    """Return steps as the model writes them: fields in their order, no spaces between.
+
+    Raises:
+        KeyError: a step lacks a field that it must have, or is none.
+    """
+    return '{"steps":[' + ",".join(map(_step_text, steps)) + "]}"
+
+
+def _step_text(step: Step) -> str:
+    fields = [f'"do":"{step["do"]}"']
+    for name, is_needed in field_names(step["do"]):
+        if is_needed or name in step:
+            space = " " if name in COPIED_FIELDS else ""
+            fields.append(f'"{name}":"{space}{step[name]}"')
+    return "{" + ",".join(fields) + "}"

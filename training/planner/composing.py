@@ -5,15 +5,22 @@ from dataclasses import dataclass
 from random import Random
 from typing import Final
 
-from training.planner.asking import ASKING, GERUND_ASKING
-from training.planner.clause import Clause, Group, Said, load_groups, make_clause
+from training.planner.clause import Clause, Group, Said, answer_text, load_groups, make_clause
 from training.planner.grammar import Sequence, expand
 from training.planner.hearing import misheard
-from training.planner.manners import CALLS, ENDINGS
-from training.planner.openings import OPENINGS, REASONS
-from training.planner.slips import CLAUSE_SLIPS, FILLERS, JOINTS
+from training.planner.manners import (
+    ASKING,
+    CALLS,
+    CLAUSE_SLIPS,
+    ENDINGS,
+    FILLERS,
+    GERUND_ASKING,
+    JOINTS,
+    OPENINGS,
+    REASONS,
+)
 from training.planner.telling import AFTER, BEFORE, load_remarks, load_told
-from training.planner.writing import answer_text
+from training.planner.words import DOUBLING
 from vla_deploy.planning.command_parser.wording import MOST_COMMAND_WORDS
 
 # How often each kind of step is drawn, of those that may stand among others.
@@ -30,10 +37,6 @@ _ONLY_REMARKS: Final = 0.12
 """Share of what commands nothing."""
 _LATER: Final = frozenset(WEIGHTS) - {"where", "stop"}
 _ALONE: Final[Mapping[str, float]] = {"unknown": 12, "impossible": 7, "nothing": 3}
-_DOUBLING: Final = frozenset({"get", "put", "grab", "set", "stop", "spin", "run", "drop", "pop",
-    "let", "shut",
-                              "slip", "zip", "step", "sit", "swim", "hop", "hit", "cut", "dig",
-                              "trot"})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +210,7 @@ def _with_fillers(sentence: list[Said], random: Random) -> list[Said]:
 
 
 def _gerund(verb: str) -> str:
-    if verb in _DOUBLING:
+    if verb in DOUBLING:
         return f"{verb}{verb[-1]}ing"
     return f"{verb[:-1] if verb.endswith('e') and not verb.endswith('ee') else verb}ing"
 

@@ -1,7 +1,9 @@
 """Write the trained decoder as a folder that the robot loads: graph, configuration, tokenizer."""
 
 import json
+from collections import Counter
 from pathlib import Path
+from random import Random
 from typing import Any, Final
 
 import numpy as np
@@ -12,9 +14,8 @@ from numpy.typing import NDArray
 from training.planner.composing import Composer
 from training.planner.files import CONFIG, GRAPH, KNOWN_WORDS, TOKENIZER, TOKENIZER_CONFIG
 from training.planner.graph import Sizes, decoder_graph, genai_config
-from training.planner.known_words import known_words
 from training.planner.network import Decoder
-from training.planner.shape import Shape
+from training.planner.settings import Shape
 from training.planner.tokens import ANSWER, COMMAND, END, PAD, load_tokenizer
 from training.planner.training import STATE, WEIGHTS
 
@@ -23,6 +24,9 @@ CONTEXT_TOKENS: Final = 384
 TEMPLATE: Final = COMMAND + " {{ messages[-1]['content'] }}" + ANSWER
 _LINES: Final = ("query", "key", "value", "out", "gate", "up", "down")
 _NORMS: Final = ("attention_norm", "inner_norm")
+_EXAMPLES: Final = 40_000
+_SEED: Final = 77
+_LEAST_SHOWN: Final = 4
 
 
 def export(out: Path, models: Path, shape: Shape, chatter: tuple[str, ...] = ()) -> None:
@@ -51,6 +55,18 @@ def export(out: Path, models: Path, shape: Shape, chatter: tuple[str, ...] = ())
             "chat_template": TEMPLATE,
         },
     )
+
+
+def known_words(composer: Composer) -> list[str]:
+    """Return the words that training shows often: any other is strange to the model.
+
+    They are in the order of the alphabet; invented ones come up too seldom.
+    """
+    random = Random(_SEED)
+    counts: Counter[str] = Counter()
+    for _ in range(_EXAMPLES):
+        counts.update(composer.example(random).command.split())
+    return sorted(word for word, count in counts.items() if count >= _LEAST_SHOWN)
 
 
 def sizes_of(shape: Shape) -> Sizes:

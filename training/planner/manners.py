@@ -1,103 +1,18 @@
-"""List what people wrap commands in: calls and politeness at either end; all manners together."""
+"""Name what people wrap commands in, joins them, or takes them back; none of it changes them."""
 
 from typing import Final
 
-from training.planner.asking import ASKING, GERUND_ASKING
-from training.planner.grammar import Sequence, parse
-from training.planner.openings import OPENINGS, REASONS
-from training.planner.slips import CLAUSE_SLIPS, JOINTS, SLIPS
+from training.planner.grammar import parse
+from training.planner.lists import read_file
 
-CALLS: Final = parse(
-    "(robot|hey robot|ok robot|okay robot|hi robot|hello robot|butler|hey "
-    "butler|listen|hey|alright|okay|okay so|right|so|well|now|now then|dear "
-    "robot|yo|attention|jarvis|excuse me|hello|buddy|hey there|my friend|okay listen|good "
-    "morning|good morning robot|okay next|next|and|also|yes|oh|ah|mister robot|(hey "
-    "jarvis|listen to me|ok then|mate)|(attention robot|chap|hello there|robot please)|(to "
-    "start with|okay then|hey mate|hi)|(lovely|attention please|excuse me robot|to begin "
-    "with)|(look here|okay butler|here you|oh yes)|(my dear|hello jarvis|so then|psst)|(very "
-    "well|sir|hello robot can you hear me|boss)|(ok butler|ah robot|hi there|robot are you "
-    "listening)|(thank you and now|right then|yoo hoo|good evening)|(chief|ma'am|oh by the "
-    "way|pal)|(for now|thank you|one more|hey you)|(now robot|ahem|now "
-    "listen|good)|(anyway|look|yes robot|fine)|(oi robot|oh and|oh robot|perfect)|(love|old "
-    "boy|er excuse me|good afternoon)|(alright robot|sorry robot|finally|thanks robot)|(so "
-    "now|machine|robot dear|well then)|(and then|sweetheart|great now|my little "
-    "helper)|(super|robo|okay good|hello butler)|(um robot|dear|oi|first off)|(hey "
-    "buddy|boy|right so|computer)|(little one|hey robo|lastly|yes please)|(good evening "
-    "robot|anyhow|you|robot can you hear me)|(sorry|you there|morning|darling)|(listen "
-    "robot|here robot|say|pardon me)|(listen up|by the way|great|mister)|(and now|wakey "
-    "wakey|alright then|first of all)|(tell you what|thanks))"
-)
-ENDINGS: Final = parse(
-    "(please|thanks|thank you|for me|now|right now|right away|if you can|if you could|if you "
-    "would|if you don't mind|if possible|if that is possible|would you|will you|could you|can "
-    "you|okay|quickly|carefully|gently|slowly|immediately|asap|as soon as possible|at "
-    "once|when you can|when you are ready|when you have time|robot|butler|buddy|my "
-    "friend|real quick|again|one more time|once more|already|then|today|that would be "
-    "great|that'd be great|that would be nice|that's all|for us|for a change|will you "
-    "please|please and thank you|thank you very much|thanks a lot|and be careful|and "
-    "hurry|and be quick|don't rush|no rush|take your time|quick|alright|if you are free|you "
-    "got that|got it|if it isn't too much trouble|without bumping into anything|on your "
-    "own|next|first|as well|too|instead|(could you do that for me|this time|do you think you "
-    "could|hurry|take care|with caution)|(like i showed you|if you get the chance|that's a "
-    "good robot|please please|go on then|if you're able)|(one time|just this once|my dear|if "
-    "you have a minute|if you have time|as usual)|(and thank you|at your own pace|when you've "
-    "got a second|at your leisure|the usual way|this minute)|(that'd help|darling|if you've "
-    "got time|you hear|if you are not too busy|did you get that)|(i suppose|mind the "
-    "carpet|whenever you have time|it would help me|anyway|i'd like)|(i would be so "
-    "grateful|yeah|like last time|if you get a chance|nice and slow|thank you in advance)|(if "
-    "i may ask|is that alright|will you do that for me|straightaway|finally|when you have a "
-    "moment)|(is that possible|ever so gently|much obliged|for me now|you hear me|if you "
-    "like)|(man|that would be very kind|could you do that|get it|mind the kids|like a good "
-    "robot)|(do you think you can do that|make it quick|that'd be a help|as fast as you "
-    "can|if it's possible|but carefully)|(i'd be grateful|as your next task|right now "
-    "please|as quickly as possible|and quickly|thank you so much)|(huh|old chap|for my "
-    "sake|if you're able to|nice and carefully|and thanks)|(pls|many thanks|if you "
-    "please|there's no rush|hurry please|sharpish)|(are you listening|off you go|i beg "
-    "you|bro|there's a good robot|would you please)|(understand|be careful with that|there's "
-    "a good lad|thank you robot|for today|understood)|(when you get a chance|for goodness "
-    "sake|that would be wonderful|that'd be lovely|nothing more|i'd be very grateful)|(when "
-    "you've got time|if it's not too much trouble|mate|mind the dog|and don't drop "
-    "anything|or something)|(very quickly|would you do that for me|without knocking anything "
-    "over|can you do that|this once|nice and gently)|(slowly and carefully|love|if that's "
-    "alright|dear|would you dear|that's all i need)|(chop chop|next please|perhaps|as "
-    "always|if i may|if you'd be so kind)|(no need to rush|quick march|i'd say|can you manage "
-    "that|innit|and take care)|(for once|very slowly|at last|do you hear me|to start "
-    "with|maybe)|(don't worry|but be careful|please robot|i would appreciate it|for us "
-    "please|alright robot)|(there's a love|to start|whenever you're ready|okay please|that "
-    "would help|if that works for you)|(quick please|like a gentleman|do you understand|and "
-    "make it snappy|pretty please|that'd be grand)|(as i told you|i guess|is that something "
-    "you can do|like you did before|for heaven's sake|okay robot)|(for now|okay thanks|very "
-    "carefully|won't you|as the next step|and try not to drop anything)|(do you hear|to begin "
-    "with|just once|and mind the step|i'd appreciate it|there's no hurry)|(please sir|will "
-    "you do that|if that's okay|and mind the cat|can you please|come on now)|(be gentle|good "
-    "robot|quick sharp|for me if you can|or so|and don't break anything)|(that will be "
-    "all|nice and easy|all by yourself|for me please|and all that|slow and steady)|(do you "
-    "think you can manage that|nothing else|i say|as agreed|but slowly|i hope)|(thank you "
-    "kindly|would you be so kind|go on|my little helper|as i said|thanks love)|(i think|if "
-    "it's no bother|okay mate|for the moment|in your own time|as discussed)|(if you'd "
-    "like|though|that would be lovely|that is all|if that's not too much trouble|this "
-    "instant)|(before anything else|in one go|this very minute|for me dear|there's a "
-    "dear|take it easy)|(whenever it suits you|only that|if you wouldn't mind|please i beg "
-    "you|possibly|i said)|(quickly please|if you're not busy|you know|and everything|you "
-    "understand|straight away)|(for the love of god|come on|make it snappy|first thing|but "
-    "quickly|pal)|(that'd be nice|i tell you|and hurry up|after all|can't you|for me would "
-    "you)|(got me|did you hear me|now please|is that okay|by yourself|no hurry)|(that's "
-    "it|when you have a minute|and be gentle|when you get a minute|without breaking "
-    "anything|please dear)|(that would help me a lot|just for me|thanks so much|but take "
-    "care|but be gentle|don't hurry)|(thanks robot|hurry up|yourself|as we said|eh|that'd be "
-    "ace)|(please now|that's all i ask|come on then|please love|hey|just that)|(honey|be "
-    "careful|dude|like always|with care|cheers)|(old boy|very gently|it would be a great "
-    "help|couldn't you|as quick as you can|and such)|(no need to hurry|be quick about "
-    "it|thank you dear|my boy|and take your time|would you mind)|(first of all|could you "
-    "please|let's go|would you kindly|jarvis|sweetheart)|(quick as you can|on the double|as a "
-    "first step|can you do that for me|cheers mate|ta)|(whenever you can|when you've got a "
-    "minute|for me will you|as soon as you can|if you would be so kind|pronto)|(and make it "
-    "quick|please mate|good boy|hurry up please|could you do that please|thanks in "
-    "advance)|(watch out for the cat|same as always|if you have a moment|off you pop|and be "
-    "careful please|ok)|(that's all for now|but gently|if you're ready|without delay|that "
-    "would be super|alright mate)|(that's all i want|much appreciated|you got it|be "
-    "quick|yes|without dropping anything))"
-)
-ALL_MANNERS: Final[tuple[Sequence, ...]] = (
-    CALLS, ASKING, GERUND_ASKING, ENDINGS, REASONS, OPENINGS, JOINTS, SLIPS, CLAUSE_SLIPS,
-)  # fmt: skip
+_MANNERS: Final = read_file("manners")
+CALLS: Final = parse(_MANNERS["calls"])
+ENDINGS: Final = parse(_MANNERS["endings"])
+ASKING: Final = parse(_MANNERS["asking"])
+GERUND_ASKING: Final = parse(_MANNERS["gerund_asking"])
+OPENINGS: Final = parse(_MANNERS["openings"])
+REASONS: Final = parse(_MANNERS["reasons"])
+JOINTS: Final = parse(_MANNERS["joints"])
+SLIPS: Final = parse(_MANNERS["slips"])
+CLAUSE_SLIPS: Final = parse(_MANNERS["clause_slips"])
+FILLERS: Final[tuple[str, ...]] = tuple(_MANNERS["fillers"])

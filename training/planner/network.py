@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.planner.shape import Shape
+from training.planner.settings import Shape
 
 
 class Norm(nn.Module):

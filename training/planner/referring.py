@@ -127,28 +127,7 @@ def target(random: Random) -> list[Word]:
     if chance < 0.56:
         return said(random.choice(("it", "there", "here", "that", "them")))
     if chance < 0.75:
-        container = random.choice(
-            (
-                "box",
-                "bowl",
-                "basket",
-                "crate",
-                "bin",
-                "container",
-                "drawer",
-                "bag",
-                "cup",
-                "box",
-                "bowl",
-                "tray",
-                "carton",
-                "bucket",
-                "jar",
-                "hamper",
-                "mug",
-                "tin",
-            )
-        )
+        container = random.choice(words.CONTAINERS)
         return [
             *unmeant(random.choice(pointing.ARTICLES)),
             *maybe_size(random),

@@ -1,10 +1,26 @@
-"""Set the sizes of a training."""
+"""Set the sizes of the network and of a training."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from training.planner.shape import Shape
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """Hold the sizes of the network."""
+
+    vocabulary: int = 2048
+    width: int = 192
+    layers: int = 4
+    heads: int = 4
+    inner: int = 512
+    rope_theta: float = 10_000.0
+    epsilon: float = 1e-5
+
+    @property
+    def head_width(self) -> int:
+        """Return the width of one head."""
+        return self.width // self.heads
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,15 +8,16 @@ that stand before or after a command, and ask for nothing, are lines of `phrases
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Final
 from zlib import crc32
 
-from training.planner.clause import PHRASES, Clause, Said, filled
+from training.planner.clause import Clause, Said, answer_text, filled
 from training.planner.grammar import PatternInvalid, Slot
+from training.planner.lists import PHRASES
 from training.planner.referring import SOURCES
-from training.planner.writing import answer_text
 from vla_deploy.planning.command_parser.grammar import (
     COPIED_FIELDS,
     STEPS,
@@ -66,19 +67,21 @@ class Frame:
         return [Clause((), step, False) for step in self.steps], sentence
 
 
+@cache
 def load_told(held_out: bool) -> tuple[Frame, ...]:
     """Return the frames to train on, or those to judge by.
 
     Raises:
         PatternInvalid: a line is none.
     """
-    told = {repr(frame): frame for frame in map(read_frame, _lines(TOLD, "*", held_out=False))}
-    if not held_out:
-        return tuple(told.values())
-    kept = {repr(frame): frame for frame in map(read_frame, _lines(TOLD, "*", held_out=True))}
-    return tuple(frame for name, frame in kept.items() if name not in told)
+    frames = {repr(frame): frame for frame in map(read_frame, _lines(TOLD, "*", held_out))}
+    if held_out:
+        learnt = set(map(repr, load_told(held_out=False)))
+        frames = {name: frame for name, frame in frames.items() if name not in learnt}
+    return tuple(frames.values())
 
 
+@cache
 def load_remarks(where: str, held_out: bool) -> tuple[tuple[str, ...], ...]:
     """Return the words of remarks that stand `BEFORE` or `AFTER` a command."""
     return tuple(tuple(plain_words(line)) for line in _lines(REMARKS, where, held_out))

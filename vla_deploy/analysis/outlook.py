@@ -11,8 +11,8 @@ import numpy as np
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.question import Question
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.planning.alternatives import others_like
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.planning.validator import others_like
 from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.memory import still_there, where_to_look
 

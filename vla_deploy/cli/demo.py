@@ -26,7 +26,7 @@ from vla_deploy.cli.narrate import line_of
 from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments, add_twin_arguments
 from vla_deploy.cli.session import Session
-from vla_deploy.planning.references import parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 

@@ -3,9 +3,10 @@
 import argparse
 import dataclasses
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from platforms import ModelChoice, Profile
 from vla_deploy.cli.errors import UsageError
@@ -22,7 +23,7 @@ from vla_deploy.planning.language_model.adding import (
     add_language_model,
     try_out,
 )
-from vla_deploy.planning.language_model.benching import LanguageModelBench, bench
+from vla_deploy.planning.language_model.benching import bench
 from vla_deploy.planning.language_model.fetching import PUBLISHED, PublishedLanguageModel
 from vla_deploy.planning.language_model.fetching import fetch as fetch_files
 
@@ -109,7 +110,7 @@ def measure(
     if arguments.threads:
         choice = dataclasses.replace(choice, threads=arguments.threads)
     figures = bench(model, choice, rounds=arguments.rounds, clock=shelf.clock)
-    return figures.document(), _text(figures)
+    return figures, _text(figures)
 
 
 def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterator[Finding]:
@@ -141,16 +142,16 @@ def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
         return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
-def _text(figures: LanguageModelBench) -> str:
+def _text(figures: Mapping[str, Any]) -> str:
     return "\n".join(
         [
-            f"answer      {1000 * figures.answer_median_s:8.1f} ms median, "
-            f"{1000 * figures.answer_p95_s:.1f} ms p95",
-            f"reads       {figures.read_tokens_per_s:8.0f} tokens/s, "
-            f"a prompt of {figures.prompt_tokens}",
-            f"tells       {figures.told_tokens_per_s:8.0f} tokens/s",
-            *(f"note: {notice}" for notice in figures.notices),
-            f"{figures.provider}, {figures.threads} threads; loaded in {figures.load_s:.2f} s, "
-            f"{figures.memory_mb:.0f} MB",
+            f"answer      {1000 * figures['answer_median_s']:8.1f} ms median, "
+            f"{1000 * figures['answer_p95_s']:.1f} ms p95",
+            f"reads       {figures['read_tokens_per_s']:8.0f} tokens/s, "
+            f"a prompt of {figures['prompt_tokens']}",
+            f"tells       {figures['told_tokens_per_s']:8.0f} tokens/s",
+            *(f"note: {notice}" for notice in figures["notices"]),
+            f"{figures['provider']}, {figures['threads']} threads; loaded in "
+            f"{figures['load_s']:.2f} s, {figures['memory_mb']:.0f} MB",
         ]
     )

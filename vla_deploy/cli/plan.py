@@ -16,6 +16,7 @@ from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.dialogue.confirmation import confirmation_of
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
@@ -59,9 +60,11 @@ def run(arguments: argparse.Namespace) -> int:
     profile = load_profile(arguments.profile or in_force)
     clock = MonotonicClock()
     planner = planner_for(robot, profile, clock, base)
-    answer = planner.plan(_request(arguments, robot))
-    away = planner.away
-    print(json.dumps(told(answer, away), indent=2) if arguments.json else as_text(answer, away))
+    request = _request(arguments, robot)
+    answer, away = planner.plan(request), planner.away
+    asks = confirmation_of(answer.plan, request, answer.proposal) if answer.plan else ""
+    document = told(answer, asks, away)
+    print(json.dumps(document, indent=2) if arguments.json else as_text(answer, asks, away))
     if isinstance(answer.error, Ambiguous):
         return EXIT_ASKED
     if answer.error is not None:
@@ -69,15 +72,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(answer: PlanningResult, away: Mapping[str, str]) -> dict[str, Any]:
-    """Return an answer as scripts read it, and who could not be asked, by why."""
+def told(answer: PlanningResult, asks: str, away: Mapping[str, str]) -> dict[str, Any]:
+    """Return an answer as scripts read it, what is asked first, and who is away, by why."""
     proposal = answer.proposal
     is_asked = isinstance(answer.error, Ambiguous)
     return {
         "plan": None if answer.plan is None else answer.plan.model_dump(mode="json"),
         "rung": None if proposal is None else proposal.back_end,
         "confidence": None if proposal is None else round(proposal.confidence, 3),
-        "read_back": None if proposal is None else proposal.read_back or None,
+        "read_back": asks or None,
         "question": str(answer.error) if is_asked else None,
         "refused": None if answer.error is None or is_asked else str(answer.error),
         "attempts": [one.document() for one in answer.attempts],
@@ -85,8 +88,8 @@ def told(answer: PlanningResult, away: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def as_text(answer: PlanningResult, away: Mapping[str, str]) -> str:
-    """Return an answer as lines for a person, and who could not be asked."""
+def as_text(answer: PlanningResult, asks: str, away: Mapping[str, str]) -> str:
+    """Return an answer as lines for a person, what is asked first, and who is away."""
     lines = [_attempt_line(one) for one in answer.attempts]
     lines += [f"{name} away: {why}" for name, why in away.items()]
     if answer.plan is not None:
@@ -94,10 +97,9 @@ def as_text(answer: PlanningResult, away: Mapping[str, str]) -> str:
             f"  {one.id:<14} {action_words(one.skill, one.parameters)}"
             for one in answer.plan.actions
         ]
-    if answer.proposal is not None and answer.proposal.read_back:
-        lines.append(f"robot would ask: {answer.proposal.read_back}")
-    if isinstance(answer.error, Ambiguous):
-        lines.append(f"robot would ask: {answer.error}")
+    question = answer.error if isinstance(answer.error, Ambiguous) else asks
+    if question:
+        lines.append(f"robot would ask: {question}")
     return "\n".join(lines)
 
 

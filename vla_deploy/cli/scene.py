@@ -10,8 +10,7 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.known_world import running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.planning.knowledge import spoken_places
-from vla_deploy.planning.references import match_place
+from vla_deploy.planning.knowledge import match_place, spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot
 from vla_deploy.world.report import report

@@ -38,10 +38,11 @@ def sentence_of(episode: Episode, now_s: float) -> str:
 
 def place_words(thing: LastSeen, now_s: float) -> str:
     """Return where a thing was in a sentence."""
-    return f"I saw the {thing} {_at(thing.place)}, {ago(now_s - thing.seen_s)}."
+    return f"I saw the {thing} {at_words(thing.place)}, {ago(now_s - thing.seen_s)}."
 
 
-def _at(place: str) -> str:
+def at_words(place: str) -> str:
+    """Return where a place is as one says it: "near the kitchen", "in my left hand"."""
     words = place.replace("_", " ")
     for start, said in (("floor near ", "on the floor near the "), ("near ", "near the ")):
         if words.startswith(start):

@@ -19,10 +19,11 @@ from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.chat_models.local import LocalModel, open_local_model
+from vla_deploy.planning.chat_models.local import LocalModel
 from vla_deploy.planning.chat_models.served import ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
+from vla_deploy.planning.language_model import open_language_model
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import RobotDescription
 
@@ -116,7 +117,11 @@ def _open(
             PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
         )
         return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
-    return shelf.load(model, choice, lambda: open_local_model(model, choice, robot, checked))
+
+    def opened() -> LocalModel:
+        return LocalModel(model.manifest.name, open_language_model(model, choice), robot)
+
+    return shelf.load(model, choice, opened)
 
 
 def _servers(

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Action, Plan, execution_order
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.symbolic.simulation import end_state
 from vla_deploy.planning.symbolic.state import subject_of
 

@@ -7,9 +7,7 @@ PlanningError
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
 ├── CannotBeDone      ask for something else: a planner has seen that this cannot be done
-│   └── NotAble       nor can any other planner: the robot lacks what it takes
-│       ├── NotThere  say it of what is there: "there are only two books"
-│       └── NothingBefore  say the whole command: nothing before it can be repeated
+│   └── NotAble       nor can any other planner: the robot lacks what it takes, or it is not there
 ├── Declined          ask the next back end: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
@@ -60,9 +58,9 @@ class UnknownObject(PlanningError):
 class DependsOnView(UnknownObject):
     """Say that where an object is depends on who looks, and changes while the robot drives."""
 
-    def __init__(self, name: str, known: Iterable[str]) -> None:
-        super().__init__(name, known)
-        self.args = (
+    def __init__(self, name: str) -> None:
+        PlanningError.__init__(
+            self,
             f'"{name}": left, right, in front and behind change while I drive; say what it is '
             "on, in or next to",
         )
@@ -73,15 +71,7 @@ class CannotBeDone(PlanningError):
 
 
 class NotAble(CannotBeDone):
-    """Say what the robot lacks for such a thing, however it is said and planned."""
-
-
-class NotThere(NotAble):
-    """Say that of the things in sight none is the one described, and what there is."""
-
-
-class NothingBefore(NotAble):
-    """Say why a command that leans on the one before it, as "again" does, has nothing there."""
+    """Say what the robot lacks for it, or that nothing such is there, whoever plans it."""
 
 
 class Declined(PlanningError):

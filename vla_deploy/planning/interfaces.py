@@ -11,9 +11,47 @@ from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prohibition import Prohibition, StandingOrder
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.world import Snapshot
+
+
+class Forbidden(StrEnum):
+    """Name what may be forbidden."""
+
+    THING = "thing"
+    PLACE = "place"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prohibition:
+    """Hold what is forbidden: the words for a thing, or the name of a place."""
+
+    what: Forbidden
+    words: str
+
+    def __str__(self) -> str:
+        """Return it as one says it."""
+        named = self.words.replace("_", " ")
+        verb = "touch the" if self.what is Forbidden.THING else "go into the"
+        return f"{verb} {named}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandingOrder:
+    """Hold a command that forbids something, or permits it again."""
+
+    forbids: bool
+    of: Prohibition
+
+    @property
+    def answer(self) -> str:
+        """Return what the robot says to it."""
+        return f"All right, I will {'not' if self.forbids else 'now'} {self.of}."
+
+    @property
+    def question(self) -> str:
+        """Return what is asked before it stands; to forbid something is safe at once."""
+        return "" if self.forbids else f"May I {self.of} again?"
 
 
 class Aid(Enum):
@@ -53,24 +91,31 @@ class Request:
 class Proposal:
     """Hold a plan that is not checked yet, and which back end made it.
 
-    `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
-    before the person agrees. With `may_be_kept` the plan took seconds and may be given again in the
-    same situation; `origin` is the back end that made it first, where it was. `covers` are the
-    words that change the scope of a command and are represented in the plan, None for all;
-    `knows_grammar` is set where the back end has read the whole sentence. An `order` stands once
-    the plan is dispatched. With `awaits_word` it is held until the person says go.
+    `confidence` is 0 to 1. Where the back end `is_unsure`, or words of the command are `left_out`,
+    nothing moves before the person agrees. With `may_be_kept` the plan took seconds and may be
+    given again in the same situation; `origin` is the back end that made it first, where it was.
+    `covers` are the words that change the scope of a command and are represented in the plan, None
+    for all; `knows_grammar` is set where the back end has read the whole sentence. An `order`
+    stands once the plan is dispatched. With `awaits_word` it is held until the person says go.
     """
 
     plan: Plan
     back_end: str
     confidence: float
-    read_back: str = ""
+    is_unsure: bool = False
+    left_out: tuple[str, ...] = ()
     may_be_kept: bool = False
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
     order: StandingOrder | None = None
     awaits_word: bool = False
+
+    @property
+    def is_read_back(self) -> bool:
+        """Return whether a person must agree to the plan first, whatever it risks."""
+        asks = self.order is not None and bool(self.order.question)
+        return self.is_unsure or bool(self.left_out) or asks
 
 
 class AttemptOutcome(StrEnum):
@@ -113,11 +158,6 @@ class PlanningResult:
     proposal: Proposal | None = None
     error: PlanningError | None = None
     is_unchecked: bool = False
-
-    @property
-    def read_back(self) -> str:
-        """Return what the back end wants to be agreed to before anything moves, "" for nothing."""
-        return "" if self.proposal is None else self.proposal.read_back
 
     @property
     def is_final(self) -> bool:

@@ -1,6 +1,8 @@
 """Run the planner: commands in words or plans in any dialect in, validated plans out."""
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
@@ -20,7 +22,6 @@ from vla_deploy.planning.dialogue.command import (
     read_command,
 )
 from vla_deploy.planning.dialogue.command_manager import CommandManager
-from vla_deploy.planning.dialogue.crash_recovery import unfinished
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import NotReady, PlanningError
@@ -73,7 +74,7 @@ class PlannerNode:
         self._utterances = self._space.ring_reader("utterance", from_start=True)
         self._events = self._space.ring_reader("task_event", from_start=True)
         plans = self._space.ring_reader("plan", from_start=True)
-        before = unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
+        before = _unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
         self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
             self._keeper = self._new_keeper(self._memory)
@@ -188,3 +189,34 @@ class PlannerNode:
         age_s = (self._clock.now_ns() - event.stamp_ns) / NS_PER_S
         if age_s > UTTERANCE_AGE_S:
             raise NotReady(f"the command is {age_s:.0f} s old, the planner was away; give it again")
+
+
+# --- what an earlier planner of this run left behind ---------------------------------------------
+
+# What the planner says of a command that only it knows of.
+_IN_WORK: Final = frozenset({"queued", "planning", "asked"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Unfinished:
+    """Hold utterances without an answer, and ids of commands that were being planned.
+
+    For those that are `set_back` the executor waits for another plan.
+    """
+
+    unheard: tuple[Event, ...]
+    in_work: tuple[str, ...]
+    set_back: tuple[str, ...]
+
+
+def _unfinished(
+    utterances: Sequence[Event], events: Sequence[Event], plans: Sequence[Event]
+) -> _Unfinished:
+    """Return what the topics hold of the time before; nothing in a run that has just begun."""
+    last = {command_id_of(event): str(event.payload.get("event", "")) for event in events}
+    answered = last.keys() | {command_id_of(event) for event in plans}
+    return _Unfinished(
+        unheard=tuple(one for one in utterances if command_id_of(one) not in answered),
+        in_work=tuple(name for name, event in last.items() if event in _IN_WORK),
+        set_back=tuple(name for name, event in last.items() if event == "setback"),
+    )

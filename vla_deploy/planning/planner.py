@@ -15,7 +15,6 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
-from vla_deploy.planning.dialogue.confirmation import question_about
 from vla_deploy.planning.errors import (
     Ambiguous,
     Declined,
@@ -37,7 +36,7 @@ from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
 from vla_deploy.planning.prohibitions import held_to
-from vla_deploy.planning.scope import doubt, guarded, moves_anything, scope_words
+from vla_deploy.planning.scope import guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
@@ -251,7 +250,7 @@ def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
 def _needs_check(answer: PlanningResult, request: Request) -> bool:
     """Return whether a plan would move something unasked that words of its command may change."""
     plan, proposal = answer.plan, answer.proposal
-    if plan is None or proposal is None or proposal.knows_grammar or proposal.read_back:
+    if plan is None or proposal is None or proposal.knows_grammar or proposal.is_read_back:
         return False
     return moves_anything(plan) and bool(scope_words(request.text))
 
@@ -266,8 +265,7 @@ def _checked_by(model_plan: Plan | None, quick: PlanningResult, request: Request
     assert proposal is not None, "a plan was proposed"
     if model_plan is not None and move_the_same(plan, model_plan, request):
         return quick
-    question = doubt(scope_words(request.text), question_about(plan, request))
-    return replace(quick, proposal=replace(proposal, read_back=question))
+    return replace(quick, proposal=replace(proposal, left_out=scope_words(request.text)))
 
 
 def _worded(answer: PlanningResult, request: Request) -> PlanningResult:

@@ -13,16 +13,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
-from vla_deploy.planning.builders.tidying import REACH_M, surfaces_of
-from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
-from vla_deploy.planning.interfaces import Proposal, Request
-from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.builders.tidying import REACH_M
+from vla_deploy.planning.errors import CannotBeDone, NotAble
+from vla_deploy.planning.interfaces import Forbidden, Prohibition, Proposal, Request, StandingOrder
+from vla_deploy.planning.knowledge import World, match_place, object_or_none
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
-from vla_deploy.planning.references import match_place, parse_object
-from vla_deploy.planning.symbolic.state import subject_of
+from vla_deploy.planning.symbolic.state import thing_of
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
@@ -122,7 +120,6 @@ def proposal_of(order: StandingOrder, request: Request, back_end: str) -> Propos
         plan=plan,
         back_end=back_end,
         confidence=1.0,
-        read_back=order.question,
         covers=None,
         order=order,
     )
@@ -141,7 +138,7 @@ def held_to(
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
     closed = [one for one in standing if one.what is Forbidden.PLACE]
-    places = frozenset[str]().union(*(surfaces_of(one.words, world) for one in closed))
+    places = frozenset[str]().union(*(world.surfaces_of(one.words) for one in closed))
     if places and _searches(plan, scene) and not _open_views(world, places):
         told = " and ".join(map(str, closed))
         raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
@@ -162,7 +159,7 @@ def is_broken(
 def _searches(plan: Plan, scene: Snapshot | None) -> bool:
     """Tell whether a plan looks for something that is not in the scene."""
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
-    return any(subject_of(str(text), scene).thing is None for text in sought)
+    return any(thing_of(text, scene) is None for text in sought)
 
 
 def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
@@ -175,11 +172,8 @@ def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None
     place = match_place(groups.get("place") or "", world.places)
     if place is not None:
         return Prohibition(what=Forbidden.PLACE, words=place)
-    try:
-        words = str(parse_object(groups.get("thing") or ""))
-    except UnknownObject:
-        return None
-    return Prohibition(what=Forbidden.THING, words=words)
+    thing = object_or_none(groups.get("thing") or "")
+    return None if thing is None else Prohibition(what=Forbidden.THING, words=str(thing))
 
 
 def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | None) -> bool:
@@ -188,7 +182,7 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
         touched = [given.get("object")] if action.skill == "pick_up" else []
         touched += [given.get("destination")] if action.skill == "place" else []
         return any(_may_be(str(text), one.words, scene) for text in touched if text)
-    inside = surfaces_of(one.words, world)
+    inside = world.surfaces_of(one.words)
     if "x_m" in given and "y_m" in given:
         return _is_near((float(given["x_m"]), float(given["y_m"])), inside, world)
     named = {str(given[name]) for name in ("place", "destination") if name in given}
@@ -203,25 +197,19 @@ def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool
 
 def _may_be(text: str, words: str, scene: Snapshot | None) -> bool:
     """Tell whether an action names a forbidden thing; one that is not seen may be, if it can."""
-    try:
-        subject, asked, query = subject_of(text, scene), parse_object(text), parse_object(words)
-    except UnknownObject:
+    thing, asked, query = thing_of(text, scene), object_or_none(text), object_or_none(words)
+    if asked is None or query is None:
         return False
-    if subject.thing is not None and scene is not None:
-        return any(one.thing_id == subject.thing.thing_id for one in query.among(scene))
+    if thing is not None and scene is not None:
+        return any(one.thing_id == thing.thing_id for one in query.among(scene))
     colours = {asked.colour, query.colour} - {""}
     return len({asked.kind, query.kind} - {ANY_CLASS}) < 2 and len(colours) < 2
 
 
 def _rests(text: object, scene: Snapshot | None) -> set[str]:
     """Return all that a thing rests on which an action names, where that is known."""
-    if not isinstance(text, str) or scene is None:
-        return set()
-    try:
-        thing = subject_of(text, scene).thing
-    except UnknownObject:
-        return set()
-    return set() if thing is None else {*scene.below(thing.thing_id)}
+    thing = thing_of(text, scene)
+    return set() if thing is None or scene is None else {*scene.below(thing.thing_id)}
 
 
 def _read(file: Path) -> tuple[Prohibition, ...]:

@@ -114,21 +114,21 @@ def negates(text: str) -> bool:
 
 
 def guarded(proposal: Proposal, request: Request) -> Proposal:
-    """Return a proposal that asks about the words that it leaves out.
+    """Return a proposal with the words that it leaves out, so that the person is asked.
 
     Raises:
         CannotBeDone: without them it may be the very thing that was not to be done.
     """
-    if not moves_anything(proposal.plan):
+    covers = proposal.covers
+    if covers is None or not moves_anything(proposal.plan):
         return proposal
-    left_out = _without(scope_words(request.text), proposal.covers)
+    left_out = tuple(word for word in scope_words(request.text) if word not in covers)
     if not left_out:
         return proposal
     denies = any(group_of(word) is ScopeGroup.NEGATION for word in left_out)
     if denies and not proposal.knows_grammar and _DENIED.match(_plain(request.text)):
-        raise CannotBeDone(f"I would leave out {_listed(left_out)}; say just what to do now")
-    question = proposal.read_back or f"Shall I {proposal.plan.summary or 'do that'}?"
-    return replace(proposal, read_back=doubt(left_out, question))
+        raise CannotBeDone(f"I would leave out {quoted(left_out)}; say just what to do now")
+    return replace(proposal, left_out=(*proposal.left_out, *left_out))
 
 
 def moves_anything(plan: Plan) -> bool:
@@ -136,14 +136,6 @@ def moves_anything(plan: Plan) -> bool:
     return any(action.skill not in {*MOTIONLESS, "look_at"} for action in plan.actions)
 
 
-def doubt(words: Iterable[str], question: str) -> str:
-    """Return a question about a plan, with the words that it may have been made without."""
-    return f"You said {_listed(words)}, which I may not have understood. {question}"
-
-
-def _listed(words: Iterable[str]) -> str:
+def quoted(words: Iterable[str]) -> str:
+    """Return words as one quotes them, each once."""
     return " and ".join(f'"{word}"' for word in dict.fromkeys(words))
-
-
-def _without(words: Iterable[str], covered: frozenset[str] | None) -> tuple[str, ...]:
-    return () if covered is None else tuple(word for word in words if word not in covered)

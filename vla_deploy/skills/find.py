@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vla_deploy.navigation.errors import NavigationError
-from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext, spoken
@@ -16,6 +16,7 @@ from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.frames import to_base, to_map
 from vla_deploy.skills.gaze import DRIVING_GAZE, gaze_at, remembered, turn_head, watch_for
 from vla_deploy.skills.simple import speak
+from vla_deploy.world import Query
 
 # A viewpoint stands this far before the middle of the furniture that it is for.
 FURNITURE_AHEAD_M = 0.5
@@ -54,7 +55,7 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         raise TryAgain(_nowhere(context, query))
 
 
-def _look_around(context: SkillContext, query: ObjectQuery, left: dict[FloorPose, None]) -> Skill:
+def _look_around(context: SkillContext, query: Query, left: dict[FloorPose, None]) -> Skill:
     """Look ahead, then at the furniture in sight; drop the viewpoints that this makes needless."""
     yield from _sweep(context, query, (GLANCE,))
     for distance_m, viewpoint in sorted(_in_sight(context, left), key=lambda one: one[0]):
@@ -66,7 +67,7 @@ def _look_around(context: SkillContext, query: ObjectQuery, left: dict[FloorPose
             del left[viewpoint]
 
 
-def _search_from(context: SkillContext, viewpoint: FloorPose, query: ObjectQuery) -> Skill:
+def _search_from(context: SkillContext, viewpoint: FloorPose, query: Query) -> Skill:
     """Drive to a viewpoint, watching on the way, and look around from there."""
     yield from carry(context)
     yield from turn_head(context, *DRIVING_GAZE)
@@ -80,7 +81,7 @@ def _search_from(context: SkillContext, viewpoint: FloorPose, query: ObjectQuery
 
 
 def _sweep(
-    context: SkillContext, query: ObjectQuery, directions: tuple[tuple[float, float], ...]
+    context: SkillContext, query: Query, directions: tuple[tuple[float, float], ...]
 ) -> Skill:
     for pan_rad, tilt_rad in directions:
         if remembered(context, query) is not None:
@@ -122,7 +123,7 @@ def _left_out(context: SkillContext) -> str:
     return " and the ".join(spoken(one) for one in sorted(context.keeps_out))
 
 
-def _nowhere(context: SkillContext, query: ObjectQuery) -> str:
+def _nowhere(context: SkillContext, query: Query) -> str:
     seen = sorted({f"{one['colour']} {one['class']}" for one in context.link.objects})
     left_out = f", and left out the {_left_out(context)}" if context.keeps_out else ""
     return f"I cannot find a {query}; I have seen: {', '.join(seen) or 'nothing'}{left_out}"

@@ -6,12 +6,12 @@ from functools import partial
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.motion import move_joints, settle, wait_until
-from vla_deploy.world import Viewpoint, read_snapshot
+from vla_deploy.world import Query, Viewpoint, read_snapshot
 
 PAN, TILT = "head_pan", "head_tilt"
 HEAD_JOINTS = (PAN, TILT)
@@ -65,7 +65,7 @@ def gaze_at(context: SkillContext, position_m: Any) -> Skill:
     yield from turn_head(context, math.atan2(y_m, x_m), tilt_rad)
 
 
-def remembered(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any] | None:
+def remembered(context: SkillContext, query: Query) -> Mapping[str, Any] | None:
     """Return the nearest object meant that was seen surely and within MEMORY_S, or None."""
     now_ns = context.link.clock.now_ns()
     objects = context.link.objects
@@ -80,7 +80,7 @@ def remembered(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any] |
     return None
 
 
-def kept_in_sight(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any]:
+def kept_in_sight(context: SkillContext, query: Query) -> Mapping[str, Any]:
     """Return the object that `remembered` finds.
 
     Raises:
@@ -92,7 +92,7 @@ def kept_in_sight(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any
     return seen
 
 
-def see(context: SkillContext, query: ObjectQuery) -> Skill:
+def see(context: SkillContext, query: Query) -> Skill:
     """Look at an object until it has been seen afresh; read it with `remembered` afterwards.
 
     Raises:
@@ -125,7 +125,7 @@ def watch(context: SkillContext) -> Skill:
     )
 
 
-def watch_for(context: SkillContext, query: ObjectQuery) -> Skill:
+def watch_for(context: SkillContext, query: Query) -> Skill:
     """Wait until an object is seen, or until enough images show that it is not in view."""
     looked = partial(_looked, context, context.link.clock.now_ns())
     yield from wait_until(

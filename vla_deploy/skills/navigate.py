@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, Final, TypeVar
 
-from vla_deploy.planning.knowledge import spoken_places
-from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
+from vla_deploy.planning.knowledge import match_place, parse_object, spoken_places
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext, spoken
@@ -14,6 +13,7 @@ from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import DRIVING_GAZE, remembered, see, turn_head
 from vla_deploy.skills.stand import standing_poses
+from vla_deploy.world import Query
 
 # Where the heading goes, left of a thing that a hand before one shoulder may hide.
 PAST_HAND_RAD: Final = {("left",): 0.15, ("right",): -0.15, ("left", "right"): 0.0}
@@ -49,7 +49,7 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 def reach(
     context: SkillContext,
-    query: ObjectQuery,
+    query: Query,
     anew: bool = False,
     speed_m_s: float | None = None,
 ) -> Skill:
@@ -80,7 +80,7 @@ def reach(
     raise NotPossible(f"I cannot get within reach of the {query}: {why}")
 
 
-def solve_near(context: SkillContext, query: ObjectQuery, solve: Callable[[], T]) -> Solving[T]:
+def solve_near(context: SkillContext, query: Query, solve: Callable[[], T]) -> Solving[T]:
     """See an object and solve for it; where it is out of reach, stand elsewhere and try again.
 
     Raises:
@@ -96,7 +96,7 @@ def solve_near(context: SkillContext, query: ObjectQuery, solve: Callable[[], T]
     return solve()
 
 
-def _see_past_hands(context: SkillContext, query: ObjectQuery) -> Skill:
+def _see_past_hands(context: SkillContext, query: Query) -> Skill:
     """See an object; where a full hand may hide it, turn that hand out of the way and look again.
 
     Raises:

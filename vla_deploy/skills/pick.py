@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
-from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.arms import (
     feel,
     feel_way,
@@ -28,6 +28,7 @@ from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.neighbours import crowding_m
 from vla_deploy.skills.swing import heights_above
+from vla_deploy.world import Query
 
 PREGRASP_M = 0.12
 FINGER_TIPS_M = 0.03
@@ -76,7 +77,7 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from carry(context)
 
 
-def _grasp(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+def _grasp(context: SkillContext, choice: Choice, query: Query) -> Skill:
     yield from _approach(context, choice)
     yield from _take(context, choice, query)
 
@@ -98,7 +99,7 @@ def _approach(context: SkillContext, choice: Choice) -> Skill:
         raise
 
 
-def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+def _take(context: SkillContext, choice: Choice, query: Query) -> Skill:
     """Close, feel, lift, feel again; open when nothing is held."""
     grasp, hand = choice.grasp, choice.hand
     goal_m = max(grasp.width_m - 2 * SQUEEZE_M, 0.004)
@@ -119,7 +120,7 @@ def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
     )
 
 
-def _already_held(context: SkillContext, query: ObjectQuery) -> bool:
+def _already_held(context: SkillContext, query: Query) -> bool:
     """Tell whether a hand holds what is meant: by the scene, or by kind where it cannot tell.
 
     An id means one thing, and no other of its kind.
@@ -130,7 +131,7 @@ def _already_held(context: SkillContext, query: ObjectQuery) -> bool:
         return True
     known = {one.held_by for one in scene.things} if scene is not None else set()
     wanted = (query.kind, query.colour)
-    return not query.track_id and any(
+    return not query.thing_id and any(
         wanted in ((held.kind, held.colour), (held.kind, ""))
         for hand, held in full.items()
         if hand not in known
@@ -147,9 +148,7 @@ def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
     return free
 
 
-def _choose(
-    context: SkillContext, query: ObjectQuery, hands: list[str], met: Sequence[float]
-) -> Choice:
+def _choose(context: SkillContext, query: Query, hands: list[str], met: Sequence[float]) -> Choice:
     """Return the plainest of the reachable grasps, of the hand on the object's side.
 
     `met` are the yaws at which fingers came down on it: others are taken if there are any.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.arms import (
     believe_fingers,
     feel_way,
@@ -29,6 +29,7 @@ from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.surfaces import Spot, free_spots, spots_beside
 from vla_deploy.skills.swing import heights_above
+from vla_deploy.world import Query
 from vla_deploy.world.relations import NEXT_TO
 
 ABOVE_M = 0.10
@@ -157,7 +158,7 @@ def _first_reached(context: SkillContext, hand: str, spots: Iterable[Spot], held
     raise reason
 
 
-def _beside(context: SkillContext, query: ObjectQuery, hand: str, held: Held) -> Release:
+def _beside(context: SkillContext, query: Query, hand: str, held: Held) -> Release:
     """Choose the first free spot around a thing that the hand reaches.
 
     Raises:
@@ -172,7 +173,7 @@ def _beside(context: SkillContext, query: ObjectQuery, hand: str, held: Held) ->
 
 
 def _over_object(
-    context: SkillContext, query: ObjectQuery, relation: str, hand: str, held: Held
+    context: SkillContext, query: Query, relation: str, hand: str, held: Held
 ) -> Release:
     seen = kept_in_sight(context, query)
     x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])

@@ -11,14 +11,14 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.knowledge import parse_object, world_of
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
 from vla_deploy.planning.symbolic.state import Pose, State, state_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
+from vla_deploy.world import Query
 from vla_deploy.world.footprint import gap_m
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.touch import is_denied
@@ -139,7 +139,7 @@ def has_arrived(now: State, setting: Setting, before: State, done_ns: int) -> An
     return MET if off_m <= ARRIVED_M else f"the robot is {off_m:.1f} m from the {place}"
 
 
-def _query(setting: Setting) -> ObjectQuery | None:
+def _query(setting: Setting) -> Query | None:
     try:
         return parse_object(str(setting.parameters["object"]))
     except UnknownObject:

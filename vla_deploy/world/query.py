@@ -72,6 +72,10 @@ class Query:
         right_form = all(word in form_words(thing) for word in self.sizes if word in FORMS)
         return right_kind and right_form and self.colour in ("", thing.colour)
 
+    def among(self, snapshot: Snapshot, view: Viewpoint | None = None) -> list[Thing]:
+        """Return the things meant, as `find` does."""
+        return find(self, snapshot, view)
+
     def __str__(self) -> str:
         own = self.thing_id or self.surface.replace("_", " ")
         words = [self.order, *self.sizes, self.colour, self.kind] if not own else [own]

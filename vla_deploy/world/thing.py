@@ -17,6 +17,12 @@ class Rest:
     relation: str
     of: str
 
+    @property
+    def words(self) -> str:
+        """Return it as one says it: "on the coffee table"."""
+        name, _, number = self.of.rpartition("_")
+        return f"{self.relation} the {(name if number.isdigit() else self.of).replace('_', ' ')}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thing:

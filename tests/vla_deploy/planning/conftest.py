@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,14 @@ from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner, checked
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Snapshot, Thing
+
+
+@cache
+def butler() -> RobotDescription:
+    """Return the robot of these tests, which is read once."""
+    return load_robot("butler")
 
 
 class StepClock:
@@ -107,8 +114,7 @@ class Desk:
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
         planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
-        robot = load_robot("butler")
-        self.planner = PlannerNode(self._context, robot, planner, self.aside, self.memory)
+        self.planner = PlannerNode(self._context, butler(), planner, self.aside, self.memory)
         self.planner.start()
         return self.planner
 
@@ -219,10 +225,9 @@ def scene(thing: Callable[..., Thing]) -> Snapshot:
 @pytest.fixture(scope="session")
 def ask(scene: Snapshot) -> Callable[..., Request]:
     """Return a request to butler about that world, some values replaced."""
-    robot = load_robot("butler")
 
     def ask(text: str, holding: dict[str, str | None] | None = None, **changes: Any) -> Request:
-        world = world_of(robot, holding or {"left": None, "right": None})
+        world = world_of(butler(), holding or {"left": None, "right": None})
         told = {"command_id": "c1", "text": text, "world": world, "scene": scene}
         return Request(**(told | {"here": (0.0, 0.0, 0.0)} | changes))
 

@@ -8,6 +8,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.dialogue.confirmation import confirmation_of
 from vla_deploy.planning.planner import Planner
 from vla_deploy.robots import load_robot
 
@@ -76,7 +77,7 @@ def test_a_server_that_has_no_plan_is_followed_by_the_parser(
 ) -> None:
     loopback.then(loopback.says(text.replace('"kitchen"', '"narnia"')))
     answer = planner().plan(ask(NICE))
-    assert (answer.proposal.back_end, answer.read_back) == ("parser", "")
+    assert (answer.proposal.back_end, answer.proposal.is_read_back) == ("parser", False)
     assert [name for name, _ in outcomes(answer)[2:]] == ["server bench", "parser"]
 
 
@@ -108,7 +109,7 @@ def test_what_a_server_finds_impossible_is_asked_about_where_words_change_the_sc
     loopback.then(loopback.says(says(**NO_WAY)))
     answer = planner().plan(ask(text))
     assert answer.proposal.back_end == "parser"
-    assert bool(answer.read_back) is asks
+    assert answer.proposal.is_read_back is asks
 
 
 @pytest.mark.parametrize(
@@ -118,7 +119,7 @@ def test_a_plan_that_a_server_shares_runs_unasked(planner, loopback, ask, steps)
     loopback.then(loopback.says(says(*[_fit(one) for one in steps])))
     answer = planner().plan(ask(BOTH))
     assert outcomes(answer) == [("patterns", "planned"), ("server bench", "planned")]
-    assert (answer.proposal.back_end, answer.read_back) == ("patterns", "")
+    assert (answer.proposal.back_end, answer.proposal.is_read_back) == ("patterns", False)
 
 
 def _fit(step: dict[str, Any]) -> dict[str, Any]:
@@ -138,8 +139,9 @@ def _fit(step: dict[str, Any]) -> dict[str, Any]:
 )
 def test_a_plan_that_a_server_does_not_share_is_read_back(planner, loopback, ask, text) -> None:
     loopback.then(loopback.says(text))
-    answer = planner().plan(ask(BOTH))
-    assert answer.read_back.startswith(DOUBT)
+    request = ask(BOTH)
+    answer = planner().plan(request)
+    assert confirmation_of(answer.plan, request, answer.proposal).startswith(DOUBT)
     assert answer.proposal.back_end == "patterns"
     assert [one.skill for one in answer.plan.actions].count("pick_up") == 2
 
@@ -147,7 +149,7 @@ def test_a_plan_that_a_server_does_not_share_is_read_back(planner, loopback, ask
 def test_a_plan_stands_where_no_server_can_check_it(planner, ask) -> None:
     answer = planner("http://127.0.0.1:9").plan(ask(BOTH))
     assert outcomes(answer) == [("patterns", "planned"), ("server bench", "declined")]
-    assert answer.read_back == ""
+    assert not answer.proposal.is_read_back
 
 
 def test_what_moves_nothing_is_not_checked(planner, loopback, ask) -> None:

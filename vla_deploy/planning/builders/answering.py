@@ -1,20 +1,22 @@
 """Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.memory.episode import unix_s
-from vla_deploy.memory.wording import place_words
+from vla_deploy.memory.wording import at_words, place_words
+from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.references import match_place
+from vla_deploy.planning.symbolic.state import Point
 from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.planning.understanding.questions import did_you_mean
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
+from vla_deploy.world.thing import FLOOR
 
 Fields = Mapping[str, str]
 MOST_TOLD = 6
@@ -35,7 +37,7 @@ def _tell_sight(fields: Fields, request: Request) -> list[Skill]:
         where = f" on the {place.replace('_', ' ')}"
     if not things:
         return _say(f"I see nothing{where}.")
-    return _say(f"I see {listed(things)}{where}.")
+    return _say(f"I see {_things(things)}{where}.")
 
 
 def _tell_hands(_: Fields, request: Request) -> list[Skill]:
@@ -46,7 +48,7 @@ def _tell_hands(_: Fields, request: Request) -> list[Skill]:
         for hand, kind in request.world.holding.items()
         if kind
     ]
-    return _say(f"I hold {_and(full)}." if full else "My hands are empty.")
+    return _say(f"I hold {listed(full)}." if full else "My hands are empty.")
 
 
 def _tell_place(_: Fields, request: Request) -> list[Skill]:
@@ -71,21 +73,21 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
 def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
     """Say whether a thing is in sight."""
     found = _known(fields["what"], request)
-    return _say(f"Yes, I see {listed(found)}." if found else "No, I do not see that.")
+    return _say(f"Yes, I see {_things(found)}." if found else "No, I do not see that.")
 
 
-def listed(things: Sequence[Thing]) -> str:
+def _things(things: Sequence[Thing]) -> str:
     """Return things as one says them: "a red cup, a blue ball and 3 more"."""
     words = [_a(str(one)) for one in things[:MOST_TOLD]]
     more = len(things) - len(words)
-    return _and([*words, f"{more} more"] if more > 0 else words)
+    return listed([*words, f"{more} more"] if more > 0 else words)
 
 
 def _places_of(things: Sequence[Thing], request: Request) -> str:
     """Return where things are, a sentence each."""
     sites = request.world.sites.values()
     places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
-    return " ".join(_where(one, place_of(one, places), request) for one in things[:MOST_TOLD])
+    return " ".join(_where(one, places, request) for one in things[:MOST_TOLD])
 
 
 def _known(text: str, request: Request) -> list[Thing]:
@@ -108,30 +110,18 @@ def _remembered(text: str, request: Request) -> list[Skill]:
     return []
 
 
-def _where(thing: Thing, place: str, request: Request) -> str:
+def _where(thing: Thing, places: Mapping[str, Point], request: Request) -> str:
     unseen_s = request.scene.unseen_s(thing) if request.scene is not None else 0.0
-    seen = seen_words(unseen_s)
-    where = place.replace("_", " ")
-    where = f"in my {where}" if thing.held_by else f"on the {where}"
-    if thing.rests is not None and thing.rests.relation == "in":
-        where = f"in the {place.rpartition('_')[0] or place}"
-    elif where.startswith("on the near"):
-        where = where.removeprefix("on the ").replace("near ", "near the ")
-    elif where.startswith("on the floor near"):
-        where = where.replace("near ", "near the ")
-    return f"The {thing} is {where}, {seen}."
+    rests = None if thing.held_by else thing.rests
+    on_something = rests is not None and rests.of != FLOOR
+    where = rests.words if rests and on_something else at_words(place_of(thing, places))
+    return f"The {thing} is {where}, {seen_words(unseen_s)}."
 
 
 def _a(words: str) -> str:
     if words.split()[-1:] == ["keys"]:
         return words
     return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
-
-
-def _and(words: Iterable[str]) -> str:
-    listed_words = list(words)
-    start = ", ".join(listed_words[:-1])
-    return " and ".join(part for part in (start, *listed_words[-1:]) if part)
 
 
 def _say(text: str) -> list[Skill]:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.builders import answering
-from vla_deploy.planning.builders.putting_back import put_back
-from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
+from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, put_back, tidy
 from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
@@ -24,12 +23,12 @@ from vla_deploy.planning.errors import (
     UnknownPlace,
 )
 from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.furniture import is_surface
+from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
 from vla_deploy.planning.understanding.normaliser import RELATIONS
+from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import (
     UNITS,
     amount_of,
@@ -37,8 +36,6 @@ from vla_deploy.planning.understanding.quantities import (
     is_silent,
     quantity_words,
 )
-from vla_deploy.planning.understanding.referring import pose_parameters
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 DEFAULT_MOVE_M: Final = 0.5
@@ -108,7 +105,7 @@ class Steps:
             return [], ""
         world = self.request.world
         place = match_place(where, world.places)
-        if place is not None and not is_surface(place, world):
+        if place is not None and not world.is_surface(place):
             there = f" in {where}"
             if all(is_seen(one + there, self.request) for one in self.parts(step)):
                 return [], there

@@ -5,22 +5,19 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from platforms import ModelChoice
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.memory_claims import MemoryClaim
-from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.chat_back_end import ChatBackEnd
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.interfaces import Check, Proposal, Request
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.language_model import (
     AnswerBounds,
     LanguageModel,
     Message,
     ModelAnswer,
-    open_language_model,
 )
 from vla_deploy.planning.prompts.composing import chat_for
 from vla_deploy.robots import RobotDescription
@@ -33,10 +30,8 @@ _MOST_ROOM: Final = 12_000
 class LocalModel(ChatBackEnd):
     """Ask one model on board for plans."""
 
-    def __init__(
-        self, name: str, model: LanguageModel, robot: RobotDescription, check: Check
-    ) -> None:
-        super().__init__(name, robot.name, sorted(robot.places), check)
+    def __init__(self, name: str, model: LanguageModel, robot: RobotDescription) -> None:
+        super().__init__(name, robot.name, sorted(robot.places))
         self.model = model
         self.claim = MemoryClaim()
         self._schema = self.shape.model_json_schema()
@@ -49,8 +44,7 @@ class LocalModel(ChatBackEnd):
         Raises:
             Declined: it gives no whole answer in time, or none that can be read.
             CannotBeDone: the model sees no way, and says why.
-            Ambiguous: the model asks something, or what it names is not clear.
-            PlanInvalid: what it plans may not run.
+            Ambiguous: the model asks something.
         """
         chat = chat_for(request, self.robot, "structured", self._room)
         bounds = AnswerBounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
@@ -61,8 +55,8 @@ class LocalModel(ChatBackEnd):
             raise Declined(one_line(error)) from error
         except ValidationError as error:
             raise Declined(f"its answer cannot be read: {one_line(error)}") from error
-        candidate = self.candidate(found, request)
-        return self.proposal(candidate, min(candidate.confidence, certainty_of(answer)))
+        plan = self.planned(found, request)
+        return self.proposal(plan, min(found.confidence, certainty_of(answer)))
 
     def close(self) -> None:
         """Release the memory."""
@@ -80,14 +74,3 @@ def messages_of(chat: Chat) -> list[Message]:
     """Return a question as chat templates take it; images are left out."""
     turns: list[Message] = [{"role": one.role.value, "content": one.text} for one in chat.messages]
     return [{"role": "system", "content": chat.system}, *turns] if chat.system else turns
-
-
-def open_local_model(
-    model: Model, choice: ModelChoice, robot: RobotDescription, check: Check
-) -> LocalModel:
-    """Open a model of the store.
-
-    Raises:
-        InferenceError: it cannot be opened; each kind says why.
-    """
-    return LocalModel(model.manifest.name, open_language_model(model, choice), robot, check)

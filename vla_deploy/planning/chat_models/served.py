@@ -1,7 +1,7 @@
 """Plan with one model behind a server; where it is unsure, ask it in several ways and count."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -12,11 +12,11 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd, PlanCandidate
-from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd, PlanAnswer
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, Check, Proposal, Request
+from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, chat_for, filled
 
 # A plan of which the model is not sure is asked for in the other ways, too.
@@ -24,6 +24,15 @@ _WAYS: Final = ("few_shot", "chain_of_thought", "structured")
 _FAULT_CHARACTERS: Final = 400
 # Another question takes about as long as the longest before it.
 _TIME_MARGIN: Final = 1.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanCandidate:
+    """Hold a plan that may run, as it was proposed and as it would, and how sure its model is."""
+
+    plan: Plan
+    checked: Plan
+    confidence: float
 
 
 class ServedModel(ChatBackEnd):
@@ -42,8 +51,9 @@ class ServedModel(ChatBackEnd):
         candidates: int = 3,
         prompt_characters: int = DEFAULT_ROOM,
     ) -> None:
-        super().__init__(f"server {server.name}", robot, places, check)
+        super().__init__(f"server {server.name}", robot, places)
         self._server = server
+        self._check = check
         self._ways = _WAYS[:candidates]
         self._asker = StructuredAsker(server, self.shape)
         # The schema is a part of the prompt, too.
@@ -89,7 +99,7 @@ class ServedModel(ChatBackEnd):
             raise failure
         candidate, confidence = elected(found, asked, request)
         # What was made of an image cannot be compared with later.
-        return self.proposal(candidate, confidence, may_be_kept=self._image(request) is None)
+        return self.proposal(candidate.plan, confidence, may_be_kept=self._image(request) is None)
 
     def _planned(self, request: Request, way: str, deadline: Deadline) -> PlanCandidate:
         """Return one plan that may run; a model whose plan is refused is sent the reason, once."""
@@ -98,13 +108,19 @@ class ServedModel(ChatBackEnd):
         chat = chat_for(request, self.robot, way, self._room, jpeg)
         answer = self._ask(chat, deadline)
         try:
-            return self.candidate(answer, request)
+            return self._candidate(answer, request)
         except (Ambiguous, CannotBeDone):
             raise
         except PlanningError as error:
             if deadline.left_s <= 0.0:
                 raise
-            return self.candidate(self._ask(_refused(chat, answer, error), deadline), request)
+            return self._candidate(self._ask(_refused(chat, answer, error), deadline), request)
+
+    def _candidate(self, answer: PlanAnswer, request: Request) -> PlanCandidate:
+        plan = self.planned(answer, request)
+        return PlanCandidate(
+            plan=plan, checked=self._check(plan, request), confidence=answer.confidence
+        )
 
     def _ask(self, chat: Chat, deadline: Deadline) -> PlanAnswer:
         try:

@@ -60,7 +60,7 @@ class Oddities:
     strange: int = 0
     left_out: int = 0
     jumps: int = 0
-    uncovered: int = 0
+    uncovered: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -86,7 +86,7 @@ def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection
         if is_corrected
         else sum(word in _TELLING and word not in copied for word in rest),
         jumps=0 if is_corrected else jumps,
-        uncovered=sum(word not in FILLERS and word not in copied for word in rest),
+        uncovered=tuple(word for word in rest if word not in FILLERS | copied),
     )
 
 

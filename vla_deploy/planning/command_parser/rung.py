@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from platforms import ModelChoice
+from vla_deploy.action_words import skill_words
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
 from vla_deploy.inference.manifest import Certainty, Use
 from vla_deploy.inference.memory_claims import MemoryClaim
@@ -25,7 +26,6 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
     asks_about_speaker,
@@ -43,7 +43,6 @@ from vla_deploy.planning.scope import WORDS, ScopeGroup
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
 MOST_FOREIGN: Final = 0.2
-_DOUBT: Final = 0.01
 # What standing orders call the fields of a step.
 _ORDER_GROUPS: Final = {"what": "thing", "where": "place"}
 # A model that nobody has measured is asked back about everything.
@@ -82,7 +81,7 @@ class CommandParser(BackEnd):
         self._weights = model.language.certainty or UNMEASURED
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
-        """Return the plan that a command means, with what to read back where that is unsure.
+        """Return the plan that a command means, which is read back where that is unsure.
 
         Raises:
             Declined: it is no command, none that can be planned, or too unsure.
@@ -109,13 +108,8 @@ class CommandParser(BackEnd):
             raise CannotBeDone(
                 "I wait for a word only before I begin; say the rest when it is time"
             )
-        asked = question(parsed.steps[awaits_word:])
-        plan = Plan(
-            goal=request.text.strip(),
-            summary=asked.removeprefix("Shall I ").removesuffix("?"),
-            actions=chained(skills),
-        )
-        sure = self._confidence(parsed)
+        plan = Plan(goal=request.text.strip(), summary=skill_words(skills), actions=chained(skills))
+        sure, uncovered, covers = parsed.confidence, parsed.oddities.uncovered, _covered(parsed)
         if request.heard_confidence is not None:
             sure = min(sure, request.heard_confidence)
         if sure < self._weights.decline_below:
@@ -124,16 +118,11 @@ class CommandParser(BackEnd):
             plan=plan,
             back_end=self.name,
             confidence=round(sure, 3),
-            read_back=asked if sure < self._weights.read_back_below else "",
-            covers=_covered(parsed),
+            is_unsure=sure < self._weights.read_back_below or bool(uncovered),
+            left_out=tuple(word for word in uncovered if word not in covers),
+            covers=covers,
             awaits_word=awaits_word,
         )
-
-    def _confidence(self, parsed: Parsed) -> float:
-        """Return how sure an answer is: too little to go unasked where it leaves words out."""
-        if not (parsed.oddities.uncovered or parsed.oddities.left_out):
-            return parsed.confidence
-        return min(parsed.confidence, self._weights.read_back_below - _DOUBT)
 
     def parse(self, text: str, deadline: Deadline) -> Parsed:
         """Return the steps that a text means, and how sure that is.

@@ -1,13 +1,15 @@
-"""Remember the plans that the executor carries out, for when one of them fails."""
+"""Remember what is under way: the command that is being planned, the plans that are carried out."""
 
 from collections import OrderedDict
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import PlanningResult
+from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import Carried, read_setback
 from vla_deploy.planning.recovery.strategies import RECOVERY
@@ -84,10 +86,85 @@ class ActivePlans:
         """Return the plans that are carried out."""
         return tuple(carried.plan for _, carried in self._active.values())
 
-    def end(self, command_id: str) -> None:
-        """Forget a command: it has come to its end."""
-        self._active.pop(command_id, None)
+    def end(self, command_id: str) -> tuple[UserCommand, Plan] | None:
+        """Forget a command that has come to its end; return it with its plan, if it is known."""
+        command, carried = self._active.pop(command_id, (None, None))
+        return (command, carried.plan) if command and carried else None
 
     def end_all(self) -> None:
         """Forget all: they are cancelled, so a setback that is still under way starts nothing."""
         self._active.clear()
+
+
+# --- the command that is being planned ------------------------------------------------------------
+
+# A person who speaks to the robot hears by then that it has heard.
+PATIENCE_S: Final = 1.5
+
+
+@dataclass(slots=True, kw_only=True)
+class PlanningJob:
+    """Hold a command whose planning takes time."""
+
+    command: UserCommand
+    request: Request
+    deadline: Deadline
+    future: "Future[PlanningResult]"
+    patience: Deadline | None
+
+    def result(self) -> PlannedCommand:
+        """Return the command with what came of it, once the job is done."""
+        return PlannedCommand(self.command, self.request, self.future.result())
+
+
+class AsyncPlanner:
+    """Plan one command at a time in an executor; a step never waits for it."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._job: PlanningJob | None = None
+
+    @property
+    def command(self) -> UserCommand | None:
+        """Return the command that is being planned."""
+        return None if self._job is None else self._job.command
+
+    def begin(
+        self,
+        command: UserCommand,
+        request: Request,
+        deadline: Deadline,
+        plan: Callable[[], PlanningResult],
+    ) -> None:
+        """Begin to plan; no other command may be in work."""
+        self._job = PlanningJob(
+            command=command,
+            request=request,
+            deadline=deadline,
+            future=self._executor.submit(plan),
+            patience=Deadline.within(deadline.clock, PATIENCE_S),
+        )
+
+    def take_done(self) -> PlanningJob | None:
+        """Return the job that is done, once."""
+        job = self._job
+        if job is None or not job.future.done():
+            return None
+        self._job = None
+        return job
+
+    def take_tedious(self) -> UserCommand | None:
+        """Return the command that takes longer than people like to wait in silence, once."""
+        job = self._job
+        if job is None or job.patience is None or job.patience.left_s > 0.0:
+            return None
+        job.patience = None
+        return job.command
+
+    def call_off(self) -> UserCommand | None:
+        """Give up what is being planned, and return the command that it was."""
+        job, self._job = self._job, None
+        if job is None:
+            return None
+        job.deadline.call_in()
+        return job.command

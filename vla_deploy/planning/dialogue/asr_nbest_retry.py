@@ -16,8 +16,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.interfaces import Proposal
-from vla_deploy.planning.patterns.awaiting import awaiting
+from vla_deploy.planning.patterns.steering import awaiting
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to back ends that take time, too."""
@@ -69,7 +68,8 @@ class NBestRetry:
         if not command.is_spoken or command.recovers:
             return None
         makes_sense = done.answer.is_final if first is None else done.answer.plan is not None
-        if makes_sense and not (gives_way and _is_unsure(command)):
+        sure = command.heard_confidence
+        if makes_sense and not (gives_way and sure is not None and sure < WELL_HEARD):
             return None
         if first is None:
             first = self._first = done
@@ -91,21 +91,15 @@ def _gives_way(done: PlannedCommand) -> bool:
     The command parser and language models make something of misheard words, too.
     """
     proposal, plan, scene = done.answer.proposal, done.answer.plan, done.request.scene
-    if proposal is not None and not proposal.origin and _is_of_a_model(proposal):
+    is_of_a_model = proposal is not None and (
+        proposal.knows_grammar or proposal.back_end == COMMAND_PARSER
+    )
+    if proposal is not None and not proposal.origin and is_of_a_model:
         return True
     if plan is None or scene is None or not scene.things:
         return False
     sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
     return not all(is_seen(str(text), done.request) for text in sought)
-
-
-def _is_of_a_model(proposal: Proposal) -> bool:
-    return proposal.knows_grammar or proposal.back_end == COMMAND_PARSER
-
-
-def _is_unsure(command: UserCommand) -> bool:
-    sure = command.heard_confidence
-    return sure is not None and sure < WELL_HEARD
 
 
 def _readings(command: UserCommand) -> Iterator[tuple[str, float]]:

@@ -9,8 +9,7 @@ from vla_deploy.ipc import Event
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.interfaces import PlanningResult, Request
-from vla_deploy.planning.patterns.awaiting import awaiting
-from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.patterns.steering import awaiting, is_stop
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import negates
 from vla_deploy.planning.understanding.quantities import numbers_in

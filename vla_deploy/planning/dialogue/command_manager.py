@@ -12,30 +12,39 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
-from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.dialogue.confirmation import agreement_to, question_about
-from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by, corrected_text, rejects
-from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
-from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
+from vla_deploy.planning.dialogue.confirmation import agreement_to
+from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
-from vla_deploy.planning.metrics import PlannerMetrics
-from vla_deploy.planning.patterns.awaiting import is_word
-from vla_deploy.planning.patterns.follow_up import asked_for, last_done
-from vla_deploy.planning.patterns.stopping import denies, objects, only_objects
+from vla_deploy.planning.patterns.follow_up import (
+    CORRECTED,
+    asked_for,
+    corrected_by,
+    corrected_text,
+    last_done,
+    rejects,
+)
+from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
 from vla_deploy.planning.recovery.strategies import recover
-from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
-from vla_deploy.planning.understanding.answers import judge_answer
-from vla_deploy.planning.understanding.mentioned import mentions_of
+from vla_deploy.planning.understanding import (
+    Candidate,
+    Outcome,
+    Turn,
+    Verdict,
+    described,
+    guess,
+    judge_answer,
+)
+from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 MOST_WAITING: Final = 8
@@ -57,7 +66,6 @@ class CommandManager:
         prohibitions: Prohibitions | None = None,
     ) -> None:
         self.planner = planner
-        self.dialogue = DialogueState(clock)
         self._situation = situation
         self._events = events
         self._async = AsyncPlanner(executor)
@@ -66,14 +74,8 @@ class CommandManager:
         self._active = ActivePlans(further_plans)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
-        self._dispatcher = CommandDispatcher(
-            self._accept, situation, events, self.dialogue, self._active
-        )
-
-    @property
-    def metrics(self) -> PlannerMetrics:
-        """Return the counts of commands."""
-        return self._dispatcher.metrics
+        self.dialogue = Dialogue(self._accept, situation, events, self._active, clock)
+        self.metrics = self.dialogue.metrics
 
     # --- what comes in --------------------------------------------------------------------------
 
@@ -86,7 +88,7 @@ class CommandManager:
         command = self._doubted_yes(command)
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
-            self._dispatcher.refuse(command, reason)
+            self.dialogue.refuse(command, reason)
             return
         is_taken = (
             self._takes_as_word(command)
@@ -96,7 +98,7 @@ class CommandManager:
         if is_taken:
             return
         if command.is_answer:
-            self._dispatcher.refuse(command, Says.NOTHING_ASKED)
+            self.dialogue.refuse(command, Says.NOTHING_ASKED)
         else:
             self._take_anew(command)
 
@@ -109,7 +111,7 @@ class CommandManager:
         elif self._async.command is not None and self._forbids(command):
             self._begin(command)  # it holds for what is being planned, too
         elif len(self._queue) >= MOST_WAITING:
-            self._dispatcher.refuse(command, Says.MANY_WAIT)
+            self.dialogue.refuse(command, Says.MANY_WAIT)
         else:
             if is_objection:  # "don't take that, take the blue one"
                 self.stop_all(f"{command.command_id}-objects")
@@ -151,23 +153,23 @@ class CommandManager:
         self._retry.forget()
         for command in dropped:
             if command is not None:
-                self._dispatcher.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+                self.dialogue.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
         # "Again" after a stop cannot mean what was done before it.
         stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
         self.dialogue.remember(stop)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
-        self._active.end(command_id)
+        ended = self._active.end(command_id)
         turn = self.dialogue.ended(command_id, success, error)
-        self._events.ended(command_id, success, error)
+        if ended is not None:
+            self._events.ended(*ended, success, error)
         if turn is not None and not success:
             self.planner.cache.forget(turn.said)
 
     def turned_away(self, command_id: str, error: str) -> None:
         """Note that the executor does not carry out a plan that it was given."""
-        if self._active.of(command_id) is not None:
-            self._active.end(command_id)
+        if self._active.end(command_id) is not None:
             self.dialogue.ended(command_id, False, error)
 
     def set_back(self, command_id: str, setback: Mapping[str, Any]) -> None:
@@ -181,10 +183,7 @@ class CommandManager:
 
     def advance(self) -> None:
         """Go on with what has become possible."""
-        if self.dialogue.is_overdue:
-            self._leave(Says.NO_ANSWER)
-        if self.dialogue.is_held_too_long:
-            self._dispatcher.drop(self.dialogue.take_held(), Says.NO_ANSWER)
+        self.dialogue.drop_overdue()
         self._look_after_job()
         while self._queue and self._async.command is None and self.dialogue.pending is None:
             command = self._queue.popleft()
@@ -209,7 +208,7 @@ class CommandManager:
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
-            self._dispatcher.conclude(PlannedCommand(command, request, answer))
+            self.dialogue.conclude(PlannedCommand(command, request, answer))
             return
         if command.recovers:
             carried = self._active.of(command.command_id)
@@ -264,7 +263,7 @@ class CommandManager:
         if _stands_still(found) and self._is_moving:
             # A plan is turned away while another runs, and nobody needs to be asked about a halt.
             self._cancel_all(f"{found.command.command_id}-stops")
-        self._dispatcher.conclude(found)
+        self.dialogue.conclude(found)
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -272,10 +271,13 @@ class CommandManager:
         if error is not None:
             _log.error("planning %r failed", command.text, exc_info=error)
             self.metrics.failed += 1
-            self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
+            self.dialogue.refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _cancel_all(self, command_id: str) -> None:
-        """Let the executor end what it does; no setback that it tells of by then is mended."""
+        """Let the executor end what it does; no setback that it tells of by then is mended.
+
+        The person who wanted that needs no answer aloud.
+        """
         self._events.cancelled_all(command_id)
         self._active.end_all()
 
@@ -329,13 +331,13 @@ class CommandManager:
         if verdict is Verdict.NO and not command.is_doubted and not self._goes_on:
             self.dialogue.take_held()
             self._events.answered(command, held.command)
-            self._dispatcher.drop(held, Says.LEFT)
+            self.dialogue.drop(held, Says.LEFT)
         elif begins and not command.is_doubted and not command.awaits_word:
             self.dialogue.take_held()
             self._events.answered(command, held.command)
             self._run_confirmed(held, held.plan)
         elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
-            self._dispatcher.refuse(command, Says.STILL_HELD)
+            self.dialogue.refuse(command, Says.STILL_HELD)
         else:
             return False
         return True
@@ -362,7 +364,7 @@ class CommandManager:
             self._events.answered(command, pending.command)
             go_on()
         elif command.is_answer:
-            self._dispatcher.refuse(command, f"that does not answer: {pending.question.text}")
+            self.dialogue.refuse(command, f"that does not answer: {pending.question.text}")
         else:
             self._leave(Says.REPLACED)
             return False
@@ -374,20 +376,21 @@ class CommandManager:
         """Return how an utterance lets the pending command go on, None where it is no answer."""
         if command.plan is not None:
             return None
-        said = self.dialogue.read(command.text)
+        verdict, chosen = self.dialogue.judge(command.text)
         full = described(pending.question, command.text)
-        if said.verdict is not Verdict.ANEW and not (full and said.verdict is Verdict.UNCLEAR):
-            return partial(self._go_on, pending, said)
+        if verdict is not Verdict.ANEW and not (full and verdict is Verdict.UNCLEAR):
+            return partial(self._go_on, pending, verdict, chosen)
         if pending.is_open and not self._at_once(command).is_final:
-            return partial(self._replan, pending, f"{pending.command.text}: {command.text}")
+            text = f"{pending.command.text}: {command.text}"
+            return partial(self._replace, replace(pending.command, text=text))
         if corrected := self._corrected(pending, command.text):
             return partial(self._replace, corrected)
         if full:
-            return partial(self._replan, pending, full)
-        guessed = guess(self.dialogue.conversation, command.text)
+            return partial(self._replace, replace(pending.command, text=full))
+        guessed = guess(pending.question, command.text)
         if guessed and self._at_once(command).plan is None:
             doubted = replace(pending.command, heard_confidence=READ_BACK)
-            return partial(self._go_on, replace(pending, command=doubted), guessed)
+            return partial(self._go_on, replace(pending, command=doubted), Verdict.CHOSEN, guessed)
         return None
 
     def _at_once(self, command: UserCommand) -> PlanningResult:
@@ -395,30 +398,21 @@ class CommandManager:
         deadline = self._deadline(self.planner.within_s)
         return self.planner.plan_at_once(self._request(command), deadline)
 
-    def _go_on(self, pending: PendingQuestion, said: Reply) -> None:
-        if said.verdict is Verdict.NO:
+    def _go_on(self, pending: PendingQuestion, verdict: Verdict, chosen: Candidate | None) -> None:
+        if verdict is Verdict.NO:
             self._leave(Says.LEFT)
-        elif said.verdict is Verdict.UNCLEAR:
-            question = said.conversation.question or pending.question
-            asked = self.dialogue.ask_again(pending, question)
-            if asked is None:
-                self._leave(Says.STILL_UNCLEAR)
-            else:
-                self._events.asked(pending.command, asked, pending.plan)
+        elif verdict is Verdict.UNCLEAR:
+            self.dialogue.ask_again(pending)
         else:
-            self.dialogue.settle(said)
+            self.dialogue.choose(pending.question, chosen)
             if pending.plan is None:
                 self._queue.appendleft(pending.command)
             elif pending.command.awaits_word:
                 request = self._request(pending.command)
                 done = PlannedCommand(pending.command, request, pending.answer)
-                self._dispatcher.hold(done, pending.plan)
+                self.dialogue.hold(done, pending.plan)
             else:
                 self._run_confirmed(pending, pending.plan)
-
-    def _replan(self, pending: PendingQuestion, text: str) -> None:
-        """Plan a command anew in the words that an answer makes of it."""
-        self._replace(replace(pending.command, text=text))
 
     def _replace(self, command: UserCommand) -> None:
         """Begin anew with the command that an answer has made of the one that waited."""
@@ -455,16 +449,13 @@ class CommandManager:
 
     def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:
         """Read a plan back that takes the place of the one that was asked about or has begun."""
-        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0)
+        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0, is_unsure=True)
         try:
-            checked = self.planner.check(plan, request)
+            answer = PlanningResult(plan=self.planner.check(plan, request), proposal=proposal)
         except PlanningError as error:
             answer = PlanningResult(error=error)
-        else:
-            proposal = replace(proposal, read_back=question_about(checked, request))
-            answer = PlanningResult(plan=checked, proposal=proposal)
         corrected = replace(command, corrected=plan)
-        self._dispatcher.conclude(PlannedCommand(corrected, request, answer))
+        self.dialogue.conclude(PlannedCommand(corrected, request, answer))
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought.
@@ -477,17 +468,18 @@ class CommandManager:
             self._situation.check_ready()
             checked = self.planner.check(plan, request)
         except PlanningError as error:
-            self._dispatcher.refuse(pending.command, error, pending.answer)
+            self.dialogue.refuse(pending.command, error, pending.answer)
             return
         proposal = pending.answer.proposal
         if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):
-            self._dispatcher.dispatch(done, checked)
+            self.dialogue.dispatch(done, checked)
             return
-        asks = replace(pending.answer, plan=checked, proposal=replace(proposal, read_back=""))
-        self._dispatcher.conclude(PlannedCommand(pending.command, request, asks))
+        agreed = replace(proposal, is_unsure=False, left_out=())
+        asks = replace(pending.answer, plan=checked, proposal=agreed)
+        self.dialogue.conclude(PlannedCommand(pending.command, request, asks))
 
     def _leave(self, why: Says) -> None:
-        self._dispatcher.drop(self.dialogue.settle(), why)
+        self.dialogue.drop(self.dialogue.settle(), why)
 
 
 def _stands_still(done: PlannedCommand) -> bool:

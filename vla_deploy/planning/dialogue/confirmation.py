@@ -4,15 +4,15 @@ The robot file sets how far it goes (`[planning] require_confirmation`): never, 
 is unsure is always asked, since it may not be what was asked for.
 """
 
-import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Set
 from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
-from vla_deploy.planning.dialogue.phrasing import Says, listed, steps_in_words
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
+from vla_deploy.planning.scope import quoted
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s
 from vla_deploy.planning.symbolic.state import Subject, subject_of
@@ -31,24 +31,38 @@ HEAVY_RATIO: Final = 0.8
 FAR_BACK_M: Final = -1.0
 
 
-def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()) -> str:
+def confirmation_of(
+    plan: Plan,
+    request: Request,
+    proposal: Proposal | None = None,
+    agreed: Set[str] = frozenset(),
+) -> str:
     """Return the question to ask before a plan runs, or "" where it may run at once.
 
-    What was `agreed` to before is not asked about again.
+    What was `agreed` to before is not asked about again; what its back end doubts is.
     """
-    reasons = _reasons(plan, request)
-    if reasons.keys() <= agreed:
+    is_read_back = proposal is not None and proposal.is_read_back
+    if not is_read_back and _reasons(plan, request).keys() <= agreed:
         return ""
-    told = [f"{reason}." for reason in reasons.values() if reason]
-    return " ".join([question_about(plan, request), *told])
+    return question_about(plan, request, proposal)
 
 
-def question_about(plan: Plan, request: Request) -> str:
-    """Return the question whether a plan is wanted."""
-    return Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
+def question_about(plan: Plan, request: Request, proposal: Proposal | None = None) -> str:
+    """Return the question whether a plan is wanted: what may be wrong with it, what it takes."""
+    if proposal is not None and proposal.order is not None and proposal.order.question:
+        return proposal.order.question
+    left_out = () if proposal is None else proposal.left_out
+    steps = steps_in_words(_called_by_words(plan, request))
+    parts = (
+        Says.LEFT_OUT.format(words=first_part(quoted(left_out))) if left_out else "",
+        Says.CONFIRM.format(steps=steps),
+        *(f"{reason}." for reason in _reasons(plan, request).values() if reason),
+        _things_named(plan, request),
+    )
+    return " ".join(filter(None, parts))
 
 
-def things_named(plan: Plan, request: Request) -> str:
+def _things_named(plan: Plan, request: Request) -> str:
     """Return the sentence that names what a plan takes, "" for fewer than two things.
 
     So a yes can catch an error; of many things it tells the kinds.
@@ -71,8 +85,7 @@ def _where_it_is(subject: Subject) -> str:
     thing = subject.thing
     if thing is None or thing.rests is None:
         return f"the {thing or subject.words}"
-    of = re.sub(r"_\d+$", "", thing.rests.of).replace("_", " ")
-    return f"the {thing} {thing.rests.relation} the {of}"
+    return f"the {thing} {thing.rests.words}"
 
 
 def agreement_to(plan: Plan, request: Request) -> frozenset[str]:

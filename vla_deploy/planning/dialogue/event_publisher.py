@@ -1,6 +1,5 @@
 """Publish what becomes of commands: as events, as plans for the executor, and aloud."""
 
-from collections import OrderedDict
 from typing import Any, Final
 
 from drivers.clock import Clock
@@ -16,7 +15,6 @@ from vla_deploy.planning.understanding import Question
 # What a slot of the topic holds, less what stands next to the plan.
 MOST_PLAN_BYTES: Final = 28_000
 _MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
-_MOST_SPOKEN: Final = 16
 
 
 class PlannerEvents:
@@ -26,27 +24,21 @@ class PlannerEvents:
         self._plans: RingWriter = space.ring_writer("plan")
         self._events: RingWriter = space.ring_writer("task_event")
         self._voice = Announcer(space, "planner", clock)
-        # Commands that came by voice and are carried out now, and whether their plan ends aloud.
-        self._spoken: OrderedDict[str, tuple[UserCommand, bool]] = OrderedDict()
 
     def say(self, command: UserCommand, text: str) -> None:
         """Say something to a person who gave a command by voice; others read it."""
         if command.is_spoken:
             self._voice.say(text)
 
-    def ended(self, command_id: str, success: bool, error: str) -> None:
-        """Say how a command ended that was given by voice."""
-        if command_id not in self._spoken:
-            return
-        command, says_so = self._spoken.pop(command_id)
+    def ended(self, command: UserCommand, plan: Plan, success: bool, error: str) -> None:
+        """Say how a command ended that was given by voice, unless its plan has said so."""
         if not success:
             self.say(command, Says.FAILED.format(reason=first_part(error) or "I cannot say why"))
-        elif not says_so:
+        elif plan.actions[-1].skill != "speak":
             self.say(command, Says.DONE)
 
     def cancelled_all(self, command_id: str) -> None:
-        """Let the executor end what it does; the person who wanted that needs no answer aloud."""
-        self._spoken.clear()
+        """Let the executor end what it does."""
         self._plans.publish({"command_id": command_id, "cancel": True})
 
     def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
@@ -106,10 +98,6 @@ class PlannerEvents:
             self._publish(command, "accepted")
         self._publish(command, "plan", plan=document, **_maker(answer), **_attempts(answer))
         self._plans.publish({"command_id": command.command_id, "plan": document})
-        if command.is_spoken:
-            self._spoken[command.command_id] = command, plan.actions[-1].skill == "speak"
-            while len(self._spoken) > _MOST_SPOKEN:
-                self._spoken.popitem(last=False)
 
     def _publish(self, command: UserCommand, event: str, **details: Any) -> None:
         self._events.publish({"command_id": command.command_id, "event": event} | details)

@@ -24,6 +24,7 @@ class Says(StrEnum):
 
     WORKING = "One moment."
     CONFIRM = "Shall I {steps}?"
+    LEFT_OUT = "You said {words}, which I may not have understood."
     HELD = "{question} I wait for you to say go."
     STILL_HELD = "I wait for you to say go."
     NOT_CLEAR = "Sorry, I did not get that. {question}"
@@ -52,7 +53,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "navigate_to": lambda given: _going(given),
     "move": lambda given: _driving(float(given["distance_m"])),
     "turn": lambda given: "turn right" if float(given["angle_rad"]) < 0 else "turn left",
-    "look_at": lambda given: f"look {given.get('direction') or _at(given['object'])}",
+    "look_at": lambda given: f"look {given.get('direction') or 'at ' + _the(given['object'])}",
     "find_object": lambda given: f"look for {_the(given['object'])}",
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
     "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
@@ -133,10 +134,6 @@ def _driving(distance_m: float) -> str:
 
 def _the(name: object) -> str:
     return f"the {str(name).replace('_', ' ')}"
-
-
-def _at(name: object) -> str:
-    return f"at {_the(name)}"
 
 
 def _hand(given: Parameters) -> str:

@@ -1,6 +1,6 @@
 """Run language models on board: one path for the embedded one and those that a person adds."""
 
-from vla_deploy.planning.language_model.decoding import AnswerBounds, GeneratedToken
+from vla_deploy.planning.language_model.decoding import AnswerBounds
 from vla_deploy.planning.language_model.errors import (
     AnswerCut,
     AnswerLate,
@@ -16,7 +16,6 @@ __all__ = [
     "AnswerBounds",
     "AnswerCut",
     "AnswerLate",
-    "GeneratedToken",
     "LanguageModel",
     "LanguageModelError",
     "Message",

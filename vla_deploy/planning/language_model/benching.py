@@ -1,8 +1,6 @@
 """Measure what a language model costs: reading a prompt, each token of an answer, memory."""
 
-import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,34 +15,12 @@ from vla_deploy.planning.language_model.model import open_language_model
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LanguageModelBench:
-    """Hold the figures of one model: answers to the same small command, and of its parts.
+def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> dict[str, Any]:
+    """Return the figures of a model, as JSON takes them.
 
-    `read_tokens_per_s` is of a prompt of `prompt_tokens`, `told_tokens_per_s` of single tokens
-    behind it. `memory_mb` is by how much the process grew.
-    """
-
-    model: str
-    provider: str
-    threads: int
-    rounds: int
-    answer_median_s: float
-    answer_p95_s: float
-    prompt_tokens: int
-    read_tokens_per_s: float
-    told_tokens_per_s: float
-    load_s: float
-    memory_mb: float
-    notices: tuple[str, ...]
-
-    def document(self) -> dict[str, Any]:
-        """Return the figures, as JSON takes them."""
-        return {**dataclasses.asdict(self), "notices": list(self.notices)}
-
-
-def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> LanguageModelBench:
-    """Measure a model.
+    `answer_*_s` are of answers to the same small command, `read_tokens_per_s` of a prompt of
+    `prompt_tokens`, `told_tokens_per_s` of single tokens behind it; `memory_mb` is by how much the
+    process grew.
 
     Raises:
         InferenceError: it cannot be run as the choice asks.
@@ -61,20 +37,20 @@ def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> La
             opened.decoder.keep([])
             reads_s.append(_timed(clock, lambda: opened.decoder.feed(prompt))[1])
             tokens_s.append(_timed(clock, lambda: opened.decoder.feed(prompt[-1:]))[1])
-        return LanguageModelBench(
-            model=model.manifest.name,
-            provider=opened.provider,
-            threads=choice.threads,
-            rounds=rounds,
-            answer_median_s=float(np.median(answers_s)),
-            answer_p95_s=float(np.percentile(answers_s, 95)),
-            prompt_tokens=prompt_tokens,
-            read_tokens_per_s=prompt_tokens / float(np.median(reads_s)),
-            told_tokens_per_s=1.0 / float(np.median(tokens_s)),
-            load_s=load_s,
-            memory_mb=max(0.0, resident_mb() - before_mb),
-            notices=opened.notices,
-        )
+        return {
+            "model": model.manifest.name,
+            "provider": opened.provider,
+            "threads": choice.threads,
+            "rounds": rounds,
+            "answer_median_s": float(np.median(answers_s)),
+            "answer_p95_s": float(np.percentile(answers_s, 95)),
+            "prompt_tokens": prompt_tokens,
+            "read_tokens_per_s": prompt_tokens / float(np.median(reads_s)),
+            "told_tokens_per_s": 1.0 / float(np.median(tokens_s)),
+            "load_s": load_s,
+            "memory_mb": max(0.0, resident_mb() - before_mb),
+            "notices": list(opened.notices),
+        }
     finally:
         opened.close()
 

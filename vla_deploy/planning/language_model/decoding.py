@@ -32,19 +32,6 @@ Scores = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GeneratedToken:
-    """Hold one token of an answer.
-
-    `log_probability` is among all tokens, also those that the schema forbids: it is low where the
-    model would have said something else. A forced token was not asked of the model, and has 0.
-    """
-
-    number: int
-    log_probability: float
-    is_forced: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerBounds:
     """Bound an answer: it ends by the deadline, which also a recall ends, and by its length."""
 
@@ -54,26 +41,26 @@ class AnswerBounds:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Generated:
-    """Hold the tokens of a whole answer, and what they cost."""
+    """Hold the tokens of a whole answer, and what they cost.
 
-    tokens: tuple[GeneratedToken, ...]
+    `chosen` is the log-probability of each token that the model was asked for, among all tokens,
+    also those that the schema forbids: it is low where the model would have said something else.
+    """
+
+    tokens: tuple[int, ...]
+    chosen: tuple[float, ...]
     reused_tokens: int
     runs: int
-
-    @property
-    def chosen(self) -> tuple[float, ...]:
-        """Return the log-probability of each token that the model chose."""
-        return tuple(one.log_probability for one in self.tokens if not one.is_forced)
 
 
 def generate(
     decoder: "Decoder",
     prompt: Sequence[int],
-    constraint: "Constraint | None",
+    constraint: "Constraint",
     end_ids: Sequence[int],
     bounds: AnswerBounds,
 ) -> Generated:
-    """Answer a prompt; without a constraint, until the model ends by itself.
+    """Answer a prompt.
 
     Forced tokens go in with the next token that the model is asked for, in one run. A long prompt
     is read piece by piece.
@@ -86,41 +73,38 @@ def generate(
     """
     reused = decoder.keep(prompt)
     waiting = list(prompt[reused:])
-    tokens: list[GeneratedToken] = []
+    tokens: list[int] = []
+    chosen: list[float] = []
     runs = 0
     while True:
-        forced = [] if constraint is None else constraint.forced()
-        if constraint is not None and forced:
+        if forced := constraint.forced():
             constraint.take(forced)
-            tokens += [
-                GeneratedToken(number=one, log_probability=0.0, is_forced=True) for one in forced
-            ]
+            tokens += forced
             waiting += forced
-        if constraint is not None and constraint.is_done:
+        if constraint.is_done:
             break
         decoder.check_room(len(waiting))
         for begin in range(0, len(waiting), PIECE_TOKENS):
             _check_bounds(len(tokens), bounds)
             scores = decoder.feed(waiting[begin : begin + PIECE_TOKENS])
             runs += 1
-        token = _likeliest(scores, constraint)
-        if token.number in end_ids:
+        token, log_probability = _likeliest(scores, constraint)
+        if token in end_ids:
             break
         tokens.append(token)
-        waiting = [token.number]
-        if constraint is not None:
-            constraint.take(waiting)
-    return Generated(tokens=tuple(tokens), reused_tokens=reused, runs=runs)
+        chosen.append(log_probability)
+        waiting = [token]
+        constraint.take(waiting)
+    return Generated(tokens=tuple(tokens), chosen=tuple(chosen), reused_tokens=reused, runs=runs)
 
 
-def _likeliest(scores: Scores, constraint: "Constraint | None") -> GeneratedToken:
-    allowed = scores
-    if constraint is not None:
-        allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
+def _likeliest(scores: Scores, constraint: "Constraint") -> tuple[int, float]:
+    """Return the likeliest token of those allowed, and its log-probability among all."""
+    allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
     number = int(np.argmax(allowed))
     highest = float(scores.max())
     total = highest + float(np.log(np.exp(scores - highest).sum()))
-    return GeneratedToken(number=number, log_probability=float(scores[number]) - total)
+    return number, float(scores[number]) - total
 
 
 def _check_bounds(count: int, bounds: AnswerBounds) -> None:

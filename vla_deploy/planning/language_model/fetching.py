@@ -128,22 +128,14 @@ def fetch(
             endpoint=endpoint,
         )
     )
-    wanted = [path for path in commit.paths if _is_wanted(path, published.folder)]
+    folder_there = PurePosixPath(published.folder)
+    files = [PurePosixPath(path) for path in commit.paths]
+    wanted = [str(file) for file in files if file.parent == folder_there and is_part(file.name)]
     if GENAI_CONFIG not in {PurePosixPath(path).name for path in wanted}:
+        models = ", ".join(str(file.parent) for file in files if file.name == GENAI_CONFIG)
         raise FetchFailed(
             f"{published}: no {GENAI_CONFIG} lies there; expected the layout of "
-            f"onnxruntime-genai, which is in: {_folders(commit.paths) or 'no folder of it'}"
+            f"onnxruntime-genai, which is in: {models or 'no folder of it'}"
         )
     commit.fetch(wanted, folder, tell)
     return folder / published.folder, published.licence or commit.licence or "not stated"
-
-
-def _is_wanted(path: str, folder: str) -> bool:
-    file = PurePosixPath(path)
-    return file.parent == PurePosixPath(folder) and is_part(file.name)
-
-
-def _folders(paths: tuple[str, ...]) -> str:
-    """Return the folders that hold a model in this form."""
-    files = (PurePosixPath(path) for path in paths)
-    return ", ".join(str(file.parent) for file in files if file.name == GENAI_CONFIG)

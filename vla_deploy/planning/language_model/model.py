@@ -67,21 +67,22 @@ class LanguageModel:
         self._one_at_a_time = Lock()
 
     def answer(
-        self, messages: Sequence[Message], bounds: AnswerBounds, schema: JsonSchema | None = None
+        self, messages: Sequence[Message], bounds: AnswerBounds, schema: JsonSchema
     ) -> ModelAnswer:
-        """Return the likeliest answer, which is JSON of the schema where one is given.
+        """Return the likeliest answer that is JSON of the schema.
 
         Raises:
             LanguageModelError: there is no whole answer; each kind says why.
             RunFailed: a run failed.
         """
         prompt = self.tokenizer.encode(self.prompt(messages), add_special_tokens=False).ids
-        constraint = None if schema is None else Constraint(self.guide, grammar_of(schema))
+        constraint = Constraint(self.guide, grammar_of(schema))
         with self._one_at_a_time:
             done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
         return ModelAnswer(
-            text=self.tokenizer.decode([token.number for token in done.tokens]),
+            text=self.tokenizer.decode(list(done.tokens)),
             tokens=done.tokens,
+            chosen=done.chosen,
             prompt_tokens=len(prompt),
             reused_tokens=done.reused_tokens,
             runs=done.runs,

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.action_words import action_words
+from vla_deploy.action_words import skill_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
@@ -64,10 +64,9 @@ def pattern_plan(request: Request) -> Plan:
         built = Steps(clause.split(), request).skills(step)
         skills += built
         intents += [intent_of(step)] * len(built)
-    words = ", ".join(action_words(skill, parameters) for skill, parameters in skills)
     return Plan(
         goal=request.text.strip(),
-        summary=f"{', '.join(dict.fromkeys(intents))}: {words}",
+        summary=f"{', '.join(dict.fromkeys(intents))}: {skill_words(skills)}",
         actions=chained(skills, [PRIORITIES.get(one, Priority.MEDIUM) for one in intents]),
     )
 
@@ -90,11 +89,11 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
 
 def _fitting(clause: str, request: Request) -> Step:
     unknown: Step = {}
-    for pattern in PATTERNS:
-        found = pattern.pattern.fullmatch(clause)
+    for pattern, given in PATTERNS:
+        found = pattern.fullmatch(clause)
         if found is not None:
             said = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
-            step = {"do": pattern.do, **pattern.given, **said}
+            step = {**given, **said}
             if _are_known(said, request):
                 return step
             unknown = unknown or step

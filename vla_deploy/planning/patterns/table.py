@@ -6,11 +6,10 @@ changes what a sentence means can hide in one.
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
+from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Priority
-from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.quantities import NUMBER
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
@@ -85,18 +84,7 @@ def intent_of(step: Mapping[str, str]) -> str:
     return _INTENTS.get(step.get("about", step["do"]), "question")
 
 
-@dataclass(frozen=True, slots=True)
-class Pattern:
-    """Hold one row; a clause that fits `pattern` whole is a step to `do`, with `given` fields.
-
-    The named groups of `pattern` are the other fields.
-    """
-
-    pattern: re.Pattern[str]
-    do: str
-    given: Mapping[str, str]
-
-
+# A clause that fits a row whole is a step to do; its named groups are fields, beside those given.
 _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     ("stop|halt|freeze|stand still", "stop", {}),
     # --- go
@@ -184,7 +172,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(re.sub(r"\(\?P<([a-z]+)>", numbered, pattern))
 
 
-PATTERNS: Final = tuple(Pattern(_compiled(pattern), do, given) for pattern, do, given in _ROWS)
+PATTERNS: Final = tuple((_compiled(pattern), {"do": do, **given}) for pattern, do, given in _ROWS)
 
 
 def is_place(text: str, places: Mapping[str, str]) -> bool:

@@ -94,7 +94,9 @@ class Carried:
         """Return whether a strategy has answered the same action's failure before."""
         failed = self.setbacks[-1].action
         return any(
-            used == strategy and _same(setback.rest_of(setback.action), failed)
+            used == strategy
+            and (rest := setback.rest_of(setback.action)).skill == failed.skill
+            and rest.parameters == failed.parameters
             for setback, used in zip(self.setbacks, self.used, strict=False)
         )
 
@@ -146,7 +148,3 @@ def _rest(action: Action, left: Mapping[str, float]) -> Action:
 def _words(action: Action) -> str:
     given = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
     return f"{action.skill}({given})"
-
-
-def _same(one: Action, other: Action) -> bool:
-    return (one.skill, one.parameters) == (other.skill, other.parameters)

@@ -8,11 +8,11 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from vla_deploy.planning.errors import CannotBeDone, PlanningError, UnknownObject
+from vla_deploy.planning.errors import CannotBeDone, PlanningError
 from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Request
+from vla_deploy.planning.knowledge import object_or_none
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.recovery.setback import Carried, FailureCause
-from vla_deploy.planning.references import parse_object
 from vla_deploy.planning.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
@@ -137,12 +137,9 @@ STRATEGIES: Final[Mapping[str, Strategy]] = {
 def _object_of(action: Action) -> str | None:
     """Return the thing that an action is about; None where it is about a place, or nothing."""
     for key in OBJECT_PARAMETERS:
-        name = str(action.parameters.get(key))
-        try:
-            parse_object(name)
-        except UnknownObject:
-            continue
-        return name
+        name = action.parameters.get(key)
+        if object_or_none(name) is not None:
+            return str(name)
     return None
 
 

@@ -10,10 +10,8 @@ from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
-from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.references import match_place
-from vla_deploy.planning.symbolic.state import Point, State, Subject, subject_of
+from vla_deploy.planning.knowledge import World, match_place
+from vla_deploy.planning.symbolic.state import Point, State, Subject, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.footprint import polygon_depth_m
@@ -43,12 +41,7 @@ class Setting:
 
     def subject(self, name: str) -> Subject | None:
         """Return the thing that a parameter names; None where it is a place, or not given."""
-        if name not in self.parameters:
-            return None
-        try:
-            return subject_of(str(self.parameters[name]), self.scene)
-        except UnknownObject:
-            return None
+        return subject_or_none(self.parameters.get(name), self.scene)
 
     def place(self, name: str) -> str | None:
         """Return the place that a parameter names, or None."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.references import parse_object
+from vla_deploy.planning.knowledge import World, object_or_none, parse_object
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.thing import Rest
 
@@ -124,6 +123,17 @@ class Subject:
         return density * length_m * width_m * height_m
 
 
+def subject_or_none(text: object, scene: Snapshot | None) -> Subject | None:
+    """Return what a parameter names, None where that is a place, or nothing known."""
+    return None if object_or_none(text) is None else subject_of(str(text), scene)
+
+
+def thing_of(text: object, scene: Snapshot | None) -> Thing | None:
+    """Return the one thing in the scene that a parameter names, None where it names none there."""
+    subject = subject_or_none(text, scene)
+    return None if subject is None else subject.thing
+
+
 def subject_of(text: str, scene: Snapshot | None) -> Subject:
     """Read a parameter that names a thing.
 
@@ -133,7 +143,7 @@ def subject_of(text: str, scene: Snapshot | None) -> Subject:
     query = parse_object(text)
     found = query.among(scene) if scene is not None else []
     words = str(query)
-    if len(found) == 1 or (found and query.asked.order):
+    if len(found) == 1 or (found and query.order):
         thing = found[0]
         return Subject(key=thing.thing_id, kind=thing.kind, words=words, thing=thing)
     return Subject(key=words, kind=query.kind, words=words, others=len(found))

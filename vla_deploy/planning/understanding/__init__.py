@@ -1,6 +1,6 @@
 """Understand what a command refers to: by the conversation, the scene and the robot's places."""
 
-from vla_deploy.planning.understanding.answers import Reply, Verdict, described, guess, reply
+from vla_deploy.planning.understanding.answers import Verdict, described, guess, judge_answer
 from vla_deploy.planning.understanding.conversation import (
     Candidate,
     Conversation,
@@ -17,11 +17,10 @@ __all__ = [
     "Mention",
     "Outcome",
     "Question",
-    "Reply",
     "Role",
     "Turn",
     "Verdict",
     "described",
     "guess",
-    "reply",
+    "judge_answer",
 ]

@@ -1,6 +1,6 @@
 """Take what is said next as the answer to a question: "the red one", "left", "the second", "no".
 
-expired, or words of something else   -> a command of its own
+words of something else               -> a command of its own
 never mind, neither                   -> the waiting command is dropped
 yes, for a question of yes or no      -> it goes on
 words that one candidate alone has    -> that one
@@ -11,11 +11,10 @@ A word that no candidate has, and that is not listed as saying nothing, makes it
 """
 
 import re
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.planning.understanding.conversation import Candidate, Conversation, Question
+from vla_deploy.planning.understanding.conversation import Candidate, Question
 from vla_deploy.planning.understanding.expressions import known_words
 from vla_deploy.planning.understanding.phrases import (
     EXTREMES,
@@ -89,43 +88,14 @@ class Verdict(StrEnum):
     ANEW = "anew"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
-    """Say how an utterance goes on: `text` is what to plan, by `conversation`.
+def guess(question: Question, text: str) -> Candidate | None:
+    """Return the one candidate that an answer calls, whatever else it says: "the green, my oil".
 
-    `chosen` is the candidate that was picked. With the verdicts NO and UNCLEAR nothing is planned.
+    None where a word of it could mean another thing. Ask first whether it is a command, and read it
+    back.
     """
-
-    verdict: Verdict
-    text: str
-    conversation: Conversation
-    chosen: Candidate | None = None
-
-
-def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
-    """Read an utterance in the light of the question that waits, if one does."""
-    question = conversation.question
-    free = conversation.settled()
-    if question is None or not question.is_open(now_ns):
-        return Reply(verdict=Verdict.ANEW, text=text, conversation=free)
-    verdict, chosen = judge_answer(question, text)
-    if verdict is Verdict.ANEW:
-        return Reply(verdict=verdict, text=text, conversation=free)
-    if verdict is Verdict.UNCLEAR:
-        again = replace(conversation, question=replace(question, asked_ns=now_ns))
-        return Reply(verdict=verdict, text=question.command_text, conversation=again)
-    return _going_on(conversation, question, verdict, chosen)
-
-
-def guess(conversation: Conversation, text: str) -> Reply | None:
-    """Return the reply that picks the one candidate which an answer calls, whatever else it says.
-
-    "The green, my oil". None where a word of it could mean another thing. Ask first whether it is a
-    command, and read it back.
-    """
-    question = conversation.question
     said = " ".join(_WORD.findall(_plain(text)))
-    if question is None or _DENIES.search(said) or text.strip().endswith("?"):
+    if _DENIES.search(said) or text.strip().endswith("?"):
         return None
     words = _telling(question.candidates, said)
     known = _known(question.candidates) | _COMPARING
@@ -133,24 +103,7 @@ def guess(conversation: Conversation, text: str) -> Reply | None:
     if not told or not (known_words() - ARTICLES).isdisjoint({*words} - known):
         return None
     fitting = [one for one in question.candidates if one.features.issuperset(told)]
-    if len(fitting) != 1:
-        return None
-    return _going_on(conversation, question, Verdict.CHOSEN, fitting[0])
-
-
-def _going_on(
-    conversation: Conversation, question: Question, verdict: Verdict, chosen: Candidate | None
-) -> Reply:
-    """Return the reply by which the waiting command goes on, with what it settles."""
-    choices = dict(question.choices)
-    if chosen is not None:
-        choices[question.expression] = chosen.name
-    return Reply(
-        verdict=verdict,
-        text=question.command_text,
-        conversation=conversation.settled(choices),
-        chosen=chosen,
-    )
+    return fitting[0] if len(fitting) == 1 else None
 
 
 def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:

@@ -194,7 +194,7 @@ def _read(text: str, named: tuple[tuple[str, str], ...], is_part: bool = False) 
     if pronoun:
         return Expression(said=key, pronoun=pronoun)
     if _MINE.search(said):
-        raise DependsOnView(text, OBJECT_CLASSES)
+        raise DependsOnView(text)
     held = _HELD.fullmatch(said)
     if held and held["own"].removeprefix("the ").removeprefix("that ") in _HELD_ALONE:
         hand = held["hand"] or held["hand2"] or held["hand3"] or ""

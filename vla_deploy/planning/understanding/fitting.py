@@ -1,21 +1,75 @@
 """Find the things of a scene that an expression fits, and that can play the part asked of them."""
 
 import math
-from collections.abc import Collection
-from dataclasses import replace
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
-from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope
-from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
-from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world import Query, Thing, find
+from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.resting import IN
-from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
+from vla_deploy.world.vocabulary import ANY_CLASS
+
+
+@dataclass(slots=True)
+class Setting:
+    """Remember, over one command, what has been mentioned; everything else is the request's."""
+
+    request: Request
+    mentions: list[Mention] = field(default_factory=list)
+    furniture: dict[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Gather what furniture may be called."""
+        world = self.request.world
+        named = world.furniture or frozenset(world.places.values())
+        self.furniture = {name: one for name, one in world.places.items() if one in named}
+
+    @property
+    def scene(self) -> Snapshot:
+        """Return the scene, an empty one where none is told."""
+        return self.request.scene or Snapshot(stamp_ns=0, things=())
+
+    @property
+    def view(self) -> Viewpoint | None:
+        """Return from where the robot looks, None where its pose is not known."""
+        here = self.request.here
+        if here is not None:
+            return Viewpoint(x_m=here[0], y_m=here[1], yaw_rad=here[2])
+        return self.scene.robot
+
+    def spoken_of(self) -> tuple[Mention, ...]:
+        """Return what was mentioned, in this command first, the newest first."""
+        return (*reversed(self.mentions), *self.request.conversation.mentions())
+
+    def latest_group(self) -> tuple[Mention, ...]:
+        """Return the objects of the newest turn that mentioned any."""
+        turns = reversed(self.request.conversation.turns)
+        for mentioned in (tuple(self.mentions), *(turn.mentioned for turn in turns)):
+            objects = tuple(one for one in mentioned if one.role is Role.OBJECT)
+            if objects:
+                return tuple(dict.fromkeys(objects))
+        return ()
+
+    def held(self) -> Mention | None:
+        """Return what a hand holds, None where that is nothing or more than one thing."""
+        found = list(self.holding())
+        return found[0][1] if len(found) == 1 else None
+
+    def holding(self) -> Iterator[tuple[str, Mention]]:
+        """Yield each hand that holds something, with what it holds."""
+        seen = [one for one in self.scene.things if one.held_by]
+        for thing in seen:
+            yield thing.held_by, Mention.of(thing)
+        for hand, kind in self.request.world.holding.items():
+            if kind and not any(one.held_by == hand for one in seen):
+                yield hand, Mention(said=kind, means=kind, kind=kind)
 
 
 class Use(StrEnum):
@@ -46,7 +100,7 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     """
     query, view = _query(read, use, setting), setting.view
     if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
-        raise DependsOnView(read.said, OBJECT_CLASSES)
+        raise DependsOnView(read.said)
     found = find(replace(query, order=""), setting.scene, view)
     found = found or _in_room(query, setting)
     if read.is_other and use is Use.PUT and not read.query.is_named:
@@ -104,7 +158,7 @@ def _in_room(query: Query, setting: Setting) -> list[Thing]:
     """Return what stands on the furniture of a room, where "in the kitchen" names no furniture."""
     world = setting.request.world
     room = query.anchor.surface if query.anchor is not None and query.relation == IN else ""
-    table = surface_of(room, world) if room else ""
+    table = world.surface_of(room) if room else ""
     if table in ("", room):
         return []
     there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}

@@ -5,11 +5,12 @@ Each may say "pick up it" and leave the way there out; what they say too much is
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import (
@@ -21,14 +22,22 @@ from vla_deploy.planning.plan import (
     execution_order,
 )
 from vla_deploy.planning.symbolic.conditions import MET, Setting, has_free_hand, is_before, is_known
-from vla_deploy.planning.symbolic.sharing import in_turn
-from vla_deploy.planning.symbolic.simulation import after
-from vla_deploy.planning.symbolic.state import State, state_of
+from vla_deploy.planning.symbolic.simulation import after, in_turn
+from vla_deploy.planning.symbolic.state import Held, State, state_of, subject_of
 from vla_deploy.planning.symbolic.table import LOGIC
-from vla_deploy.planning.understanding.furniture import nearest_furniture
+from vla_deploy.planning.understanding import phrases
+from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.normaliser import normalised
-from vla_deploy.planning.understanding.referring import Step, grounded_steps
-from vla_deploy.planning.understanding.resolver import Resolver
+from vla_deploy.planning.understanding.places import (
+    Parameters,
+    check_readable,
+    destination_of,
+    pose_parameters,
+    pronoun_of,
+    resolve_place,
+    thing_unless_place,
+)
+from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.planning.validator import action_faults
 
 # A free hand takes two steps, then the thing is looked for and driven to.
@@ -41,6 +50,8 @@ IDEMPOTENT: Final = frozenset(
 # These skills want the robot before the thing, those only want it known.
 FROM_CLOSE: Final = frozenset({"pick_up", "place"})
 OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
+
+Step = tuple[str, Parameters]
 
 
 def ground_plan(plan: Plan, request: Request) -> Plan:
@@ -86,7 +97,7 @@ class _Grounder:
         needed = tuple(
             dict.fromkeys(name for one in action.depends_on for name in self._last.get(one, (one,)))
         )
-        for skill, parameters in grounded_steps(action, self.resolver, lambda: self._state):
+        for skill, parameters in self._steps(action):
             step = _made(action, skill, parameters, "")
             if skill == action.skill:
                 step = action.model_copy(update={"parameters": dict(parameters)})
@@ -145,6 +156,151 @@ class _Grounder:
         before = self.done[-1]
         return (before.skill, before.parameters) == (action.skill, action.parameters)
 
+    # --- what the parameters of each skill refer to ---------------------------------------------
+
+    def _steps(self, action: Action) -> Iterator[Step]:
+        """Yield an action with what it refers to resolved: several for "both cups", none if done.
+
+        Each step is carried out in the state before the next one is asked for.
+
+        Raises:
+            PlanningError: what it refers to is not known, or must be asked.
+        """
+        given = action.parameters
+        match action.skill:
+            case "navigate_to":
+                yield from self._navigate(given)
+            case "place":
+                yield from self._place(given)
+            case "find_object" | "look_at" if isinstance(given.get("object"), str):
+                thing = self.resolver.things(given["object"], Use.SEE)[0]
+                yield from _on_furniture(thing)
+                yield action.skill, {**given, "object": thing.name}
+            case "pick_up" if isinstance(given.get("object"), str):
+                yield from self._pick(given)
+            case "hand_over" if isinstance(given.get("object"), str):
+                yield from self._hand_over(given)
+            case _:
+                yield action.skill, given
+
+    def _navigate(self, given: Parameters) -> Iterator[Step]:
+        rest = {name: value for name, value in given.items() if name not in ("place", "object")}
+        goal = given.get("place", given.get("object"))
+        if not isinstance(goal, str) or ("place" in given and "object" in given):
+            yield "navigate_to", given
+            return
+        if pronoun_of(goal) == phrases.HERE:
+            yield "navigate_to", {**self._here(goal), **rest}
+            return
+        thing = thing_unless_place(goal, self.resolver, Use.REACH)
+        if thing is None:
+            yield "navigate_to", {"place": resolve_place(goal, self.resolver), **rest}
+            return
+        yield from _on_furniture(thing)
+        yield "navigate_to", {"object": thing.name, **rest}
+
+    def _here(self, text: str) -> Parameters:
+        here = self._request.here
+        if here is None:
+            raise UnknownPlace(text, set(self._request.world.places.values()))
+        why = "where the command was given"
+        self.resolver.note(text, f"{here[0]:.2f}, {here[1]:.2f}", why)
+        return pose_parameters(here)
+
+    def _pick(self, given: Parameters) -> Iterator[Step]:
+        things = self.resolver.things(given["object"], Use.TAKE)
+        if pronoun_of(given["object"]) == phrases.THEM:
+            # "Put the cups down, get the keys": what the plan has put somewhere is not meant.
+            others = [one for one in things if self._key(one) not in self._state.rests]
+            things = tuple(others) or things
+        for thing in things:
+            if self._held(thing) is None:
+                yield from _on_furniture(thing)
+                yield "pick_up", {**given, "object": thing.name}
+
+    def _place(self, given: Parameters) -> Iterator[Step]:
+        put = {name: value for name, value in given.items() if name != "object"}
+        things: tuple[Referent | None, ...] = (None,)
+        check_readable(given.get("destination"), self.resolver)
+        if isinstance(given.get("object"), str):
+            things = self.resolver.things(given["object"], Use.PUT)
+        destination = destination_of(given, self.resolver, self._state)
+        if given.get("destination") is None:
+            things = self._to_put_down(things)
+        for thing in things:
+            if thing is not None and self._held(thing) is None:
+                if self._has_put(thing, destination):
+                    continue
+                yield from _on_furniture(thing)
+                yield "pick_up", {"object": thing.name, **_arm(given)}
+            held = None if thing is None else self._held(thing)
+            yield "place", {**put, **destination, **self._hand_of(held)}
+
+    def _hand_over(self, given: Parameters) -> Iterator[Step]:
+        """Give what is held; what is not is fetched before, to where it was asked for."""
+        things = list(self.resolver.things(given["object"], Use.PUT))
+        while things:
+            missing = [one for one in things if self._held(one) is None]
+            fetched = missing[: max(1, self._state.free_hands())]
+            for thing in fetched:
+                yield from _on_furniture(thing)
+                yield "pick_up", {"object": thing.name, **_arm(given)}
+            if fetched and self._request.here is not None:
+                yield "navigate_to", self._here("here")
+            in_hand = [one for one in things if self._held(one) is not None]
+            for thing in in_hand or fetched:
+                yield "hand_over", self._hand_of(self._held(thing)) or _arm(given)
+                things.remove(thing)
+
+    def _has_put(self, thing: Referent, destination: Parameters) -> bool:
+        """Tell whether the plan has put a thing there: "take it to the box, drop it in"."""
+        rest = self._state.rests.get(self._key(thing))
+        where = str(destination.get("destination", ""))
+        if rest is None or rest.of == where:
+            return rest is not None
+        with suppress(UnknownObject):  # a place by another name
+            return rest.of == subject_of(where, self._request.scene).key
+        return False
+
+    def _to_put_down(self, things: tuple[Referent | None, ...]) -> tuple[Referent | None, ...]:
+        """Return what of things is in a hand; nothing where the plan has put them down already.
+
+        Raises:
+            PlanInvalid: none of them is, and the plan has not had it.
+        """
+        state = self._state
+        in_hand = {self._held(one) if one else None: one for one in things}
+        held = tuple(one for where, one in in_hand.items() if one is None or where is not None)
+        if things == (None,) and state.hands and not state.held and state.rests:
+            return ()
+        if not held and not any(self._key(one) in state.rests for one in things if one):
+            raise PlanInvalid([f"no hand holds the {things[0].words}" if things[0] else "nothing"])
+        return held
+
+    def _hand_of(self, held: Held | None) -> Parameters:
+        """Name the hand that holds a thing where another holds something, too."""
+        is_named = held is not None and held.hand and len(self._state.held) > 1
+        return {"arm": held.hand} if held is not None and is_named else {}
+
+    def _held(self, thing: Referent) -> Held | None:
+        """Return the holding of a thing, which without a scene goes by its kind, or its hand."""
+        keys = (self._key(thing), thing.kind)
+        called = (one for one in self._state.held if one.key in keys)
+        return next((one for one in called if thing.hand in ("", one.hand)), None)
+
+    def _key(self, thing: Referent) -> str:
+        return subject_of(thing.name, self._request.scene).key
+
+
+def _arm(given: Parameters) -> Parameters:
+    return {"arm": given["arm"]} if "arm" in given else {}
+
+
+def _on_furniture(thing: Referent) -> Iterator[Step]:
+    """Go first to the furniture on which an unseen thing was said to be."""
+    if thing.look_at:
+        yield "navigate_to", {"place": thing.look_at}
+
 
 def _missing(action: Action, state: State, request: Request) -> Step | None:
     """Return the first step that a plan leaves out before an action: a look, a way, a free hand."""
@@ -164,7 +320,7 @@ def _missing(action: Action, state: State, request: Request) -> Step | None:
 
 def _towards_free_hand(action: Action, state: State, world: World) -> Step | None:
     """Put down what a hand holds, on the nearest furniture; None where there is none."""
-    table = nearest_furniture(state.spot, world)
+    table = world.nearest_surface(state.spot)
     arm = action.parameters.get("arm")
     held = next((one for one in state.held if arm in (None, one.hand)), None)
     if table is None or held is None:

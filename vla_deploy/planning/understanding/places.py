@@ -2,18 +2,17 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from vla_deploy.planning.errors import NotAble, UnknownObject, UnknownPlace
-from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
-from vla_deploy.planning.symbolic.state import State, subject_of
+from vla_deploy.planning.symbolic.state import Pose, State, subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use
-from vla_deploy.planning.understanding.furniture import is_surface, nearest_furniture, surface_of
 from vla_deploy.planning.understanding.names import closest
 from vla_deploy.planning.understanding.questions import did_you_mean, where, which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
@@ -21,7 +20,6 @@ from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 
 Parameters = Mapping[str, Any]
-GetState = Callable[[], State]
 # That near to where one stands for a place, one is there.
 AT_PLACE_M: Final = 0.8
 MOST_LETTERS: Final = 60
@@ -96,7 +94,7 @@ def _one_of(key: str, named: tuple[str, ...], resolver: Resolver) -> tuple[str, 
     if len(named) == 1:
         return named[0], "part of its name"
     for one in reversed(setting.mentions):
-        if (table := surface_of(one.means, world)) in named:
+        if (table := world.surface_of(one.means)) in named:
             return table, f"at the {one.means}"
     for name in named:
         site = world.sites.get(name)
@@ -113,7 +111,7 @@ def _one_of(key: str, named: tuple[str, ...], resolver: Resolver) -> tuple[str, 
 # --- where something shall go -------------------------------------------------------------------
 
 
-def destination_of(given: Parameters, resolver: Resolver, state: GetState) -> Parameters:
+def destination_of(given: Parameters, resolver: Resolver, state: State) -> Parameters:
     """Return where to put it and how; without a word about it, on the nearest furniture.
 
     Raises:
@@ -125,8 +123,7 @@ def destination_of(given: Parameters, resolver: Resolver, state: GetState) -> Pa
     world = resolver.setting.request.world
     relation = given.get("relation")
     if text is None or pronoun_of(text) == phrases.HERE:
-        at, spot = state().at, state().spot
-        table = at if is_surface(at, world) else nearest_furniture(spot, world)
+        table = state.at if world.is_surface(state.at) else world.nearest_surface(state.spot)
         if table is None:
             raise UnknownPlace(text or "down", set(world.places.values()))
         resolver.note(text or "down", table, "the nearest furniture")
@@ -140,8 +137,16 @@ def destination_of(given: Parameters, resolver: Resolver, state: GetState) -> Pa
         return {"destination": thing.name, "relation": relation or default}
     if relation == NEXT_TO:
         raise NotAble(f"I put things next to things and on furniture, not next to {text}")
-    surface = surface_of(resolve_place(text, resolver), world)
+    surface = world.surface_of(resolve_place(text, resolver))
     return {"destination": surface, "relation": "on"}
+
+
+def pose_parameters(pose: Pose) -> dict[str, float]:
+    """Return a pose as parameters of a drive, to the millimetre and the milliradian."""
+    x_m, y_m, yaw_rad = pose
+    # Rounding must not make half a turn more than that.
+    yaw_rad = min(max(round(math.remainder(yaw_rad, math.tau), 3), -3.141), 3.141)
+    return {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_rad": yaw_rad}
 
 
 def check_readable(text: Any, resolver: Resolver) -> None:
@@ -163,7 +168,7 @@ def thing_unless_place(
 
     Raises:
         UnknownObject: it is to take something, and names nothing known.
-        NotThere: things are known, but none that it can mean.
+        NotAble: things are known, but none that it can mean.
         Ambiguous: only the speaker can tell.
     """
     if match_place(text, resolver.setting.request.world.places):

@@ -118,11 +118,7 @@ def _contrasts(things: Sequence[Thing], view: Viewpoint | None) -> Iterator[list
 
 
 def _support(thing: Thing) -> str:
-    if thing.rests is None:
-        return ""
-    of = thing.rests.of
-    name = of.rpartition("_")[0] if of.rpartition("_")[2].isdigit() else of
-    return f"{thing.rests.relation} the {name.replace('_', ' ')}"
+    return "" if thing.rests is None else thing.rests.words
 
 
 def _by_side(things: Sequence[Thing], view: Viewpoint | None) -> list[str]:

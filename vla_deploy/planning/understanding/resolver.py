@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.errors import NotThere, UnknownObject
+from vla_deploy.planning.errors import NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.references import words_of
+from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
-from vla_deploy.planning.understanding.fitting import Use, alike, fitting, suits
+from vla_deploy.planning.understanding.fitting import Setting, Use, alike, fitting, suits
 from vla_deploy.planning.understanding.questions import did_you_mean, which_hand, which_thing
-from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
 
@@ -65,7 +64,7 @@ class Resolver:
 
         Raises:
             UnknownObject: it says nothing that the robot knows.
-            NotThere: things are known, but none that it can mean.
+            NotAble: things are known, but none that it can mean.
             Ambiguous: only the speaker can tell which one is meant.
         """
         read = read_expression(text, self.setting.furniture)
@@ -84,7 +83,7 @@ class Resolver:
 
         Raises:
             UnknownObject: it says nothing that the robot knows.
-            NotThere: things are known, but none that it can mean.
+            NotAble: things are known, but none that it can mean.
             Ambiguous: it means several, or only the speaker can tell.
         """
         found = self.things(text, use)
@@ -177,7 +176,7 @@ class Resolver:
 
         Raises:
             UnknownObject: there is nothing that it can mean.
-            NotThere: the hand of which it speaks holds nothing.
+            NotAble: the hand of which it speaks holds nothing.
             Ambiguous: only the speaker can tell what is meant.
         """
         holding = dict(self.setting.holding())
@@ -208,7 +207,7 @@ class Resolver:
         """Return what the hands hold, or the hand that is named.
 
         Raises:
-            NotThere: nothing; the message says what the other hand holds.
+            NotAble: nothing; the message says what the other hand holds.
         """
         holding = {hand: one for hand, one in self.setting.holding() if read.hand in ("", hand)}
         if len(holding) > 1 and not _ONE_THING.isdisjoint(words_of(read.said)):
@@ -216,7 +215,7 @@ class Resolver:
         if not holding:
             others = [f"the {hand} one holds the {it.said}" for hand, it in self.setting.holding()]
             nothing = f"my {read.hand} hand holds nothing" if read.hand else "I hold nothing"
-            raise NotThere("; ".join((nothing, *others)))
+            raise NotAble("; ".join((nothing, *others)))
         return tuple(
             replace(self._again(read, one, use, f"it is in my {hand} hand"), hand=hand)
             for hand, one in holding.items()
@@ -281,20 +280,20 @@ def _are_together(things: Sequence[Thing]) -> bool:
     return all(math.dist(first, one.xy_m) <= TOGETHER_M for one in things)
 
 
-def _not_there(read: Expression, things: Sequence[Thing]) -> NotThere:
+def _not_there(read: Expression, things: Sequence[Thing]) -> NotAble:
     """Return why nothing fits; `things` are those that would, if they were not compared."""
     if not things:
-        return NotThere(f'I see no {_noun(read, 0)}, so I cannot tell which is "{read.said}"')
+        return NotAble(f'I see no {_noun(read, 0)}, so I cannot tell which is "{read.said}"')
     known = " and ".join(dict.fromkeys(f"the {one}" for one in things))
-    return NotThere(f'I see nothing that is "{read.said}", only {known}')
+    return NotAble(f'I see nothing that is "{read.said}", only {known}')
 
 
-def _not_as_many(read: Expression, things: Sequence[Thing]) -> NotThere:
+def _not_as_many(read: Expression, things: Sequence[Thing]) -> NotAble:
     """Return why other things are there than were counted."""
     there = f"{len(things)} {_noun(read, len(things))}"
     if len(things) < read.count:
-        return NotThere(f"I see only {there}")
-    return NotThere(f"I see {there}, and cannot tell which {read.count} you mean")
+        return NotAble(f"I see only {there}")
+    return NotAble(f"I see {there}, and cannot tell which {read.count} you mean")
 
 
 def _noun(read: Expression, count: int) -> str:

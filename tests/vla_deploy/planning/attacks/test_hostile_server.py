@@ -41,14 +41,20 @@ def steps(*listed: object, **changes: object) -> str:
     return json.dumps(told | changes)
 
 
+@pytest.fixture(scope="module")
+def profile(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the file of one profile for all, so that the models on board are opened once."""
+    file = tmp_path_factory.mktemp("profile") / "asking.toml"
+    file.write_text(PROFILE)
+    return str(file)
+
+
 @pytest.fixture
-def desk(loopback: Any, tmp_path: Path) -> Iterator[Desk]:
+def desk(loopback: Any, tmp_path: Path, profile: str) -> Iterator[Desk]:
     config = tmp_path / "base-config"
     config.mkdir()
     (config / "servers.toml").write_text(SERVER.format(url=loopback.url))
-    profile = tmp_path / "asking.toml"
-    profile.write_text(PROFILE)
-    desk = Desk(tmp_path / "base" / "run", str(profile))
+    desk = Desk(tmp_path / "base" / "run", profile)
     desk.tell(scenes()["tidy"].world(home()))
     yield desk
     desk.close()

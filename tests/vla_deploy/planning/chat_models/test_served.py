@@ -74,7 +74,7 @@ def test_a_sure_answer_is_the_plan(loopback, served, ask):
     proposal = served().propose(ask(TIDY), within())
     assert places_of(proposal) == ["kitchen"]
     assert proposal.back_end == "server bench"
-    assert (proposal.confidence, proposal.read_back) == (0.95, "")
+    assert (proposal.confidence, proposal.is_unsure) == (0.95, False)
     assert proposal.may_be_kept
     assert len(loopback.heard) == 1
     body = loopback.heard[0].body
@@ -92,7 +92,7 @@ def test_an_unsure_answer_is_asked_for_in_other_ways_and_the_majority_wins(loopb
     proposal = served().propose(ask(TIDY), within())
     assert places_of(proposal) == ["kitchen"]
     assert proposal.confidence == pytest.approx(0.6)
-    assert proposal.read_back == "Shall I go to the kitchen?"
+    assert proposal.is_unsure
     systems = [one.body["messages"][0]["content"] for one in loopback.heard]
     assert len(set(systems)) == 3, "each way asks in other words"
 
@@ -100,7 +100,7 @@ def test_an_unsure_answer_is_asked_for_in_other_ways_and_the_majority_wins(loopb
 def test_agreement_of_all_makes_an_unsure_model_sure(loopback, served, ask):
     loopback.then(loopback.says(answer(GO, confidence=0.5)))
     proposal = served().propose(ask(TIDY), within())
-    assert (proposal.confidence, proposal.read_back) == (pytest.approx(0.8), "")
+    assert (proposal.confidence, proposal.is_unsure) == (pytest.approx(0.8), False)
     assert len(loopback.heard) == 3
 
 
@@ -238,7 +238,7 @@ def test_no_more_is_asked_than_the_time_allows(loopback, served, ask):
     loopback.then(loopback.says(answer(GO, confidence=0.3)))
     deadline = Deadline(clock=_Slow(), end_ns=3_000_000_000, given_s=3.0)
     proposal = served().propose(ask(TIDY), deadline)
-    assert proposal.read_back
+    assert proposal.is_unsure
     assert len(loopback.heard) == 1
 
 

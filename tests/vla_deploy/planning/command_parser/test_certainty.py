@@ -45,6 +45,11 @@ def test_a_plain_answer_has_nothing_odd() -> None:
     assert odd("pick up the red cup", {"do": "pick", "what": "red cup"}).count == 0
 
 
+def test_each_word_that_is_neither_copied_nor_a_filler_is_told() -> None:
+    found = odd("please pick up the cup unless the fella objects", {"do": "pick", "what": "cup"})
+    assert found.uncovered == ("unless", "fella", "objects")
+
+
 def test_a_word_never_shown_is_odd_unless_it_is_copied() -> None:
     assert odd("pick up the wug", {"do": "pick", "what": "wug"}).strange == 0
     assert odd("zorble up the red cup", {"do": "pick", "what": "red cup"}).strange == 1

@@ -10,7 +10,7 @@ from tokenizers.models import BPE
 from tokenizers.pre_tokenizers import ByteLevel
 from tokenizers.trainers import BpeTrainer
 
-from training.planner.writing import answer_text
+from training.planner.clause import answer_text
 from vla_deploy.planning.command_parser.grammar import STEPS, answer_schema
 from vla_deploy.planning.command_parser.wording import foreign_share, plain_words
 from vla_deploy.planning.language_model.decoding import Constraint, grammar_of

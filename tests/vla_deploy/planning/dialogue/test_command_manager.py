@@ -141,7 +141,7 @@ class TestObjecting:
     def test_a_plan_that_begins_with_standing_still_ends_what_is_under_way(
         self, open_desk, back_end, propose
     ):
-        halt = propose(("stop", {}), read_back="Shall I stand still?")
+        halt = propose(("stop", {}), is_unsure=True)
         desk = open_desk(back_end("model", halt))
         desk.give(text="go to the kitchen")
         desk.answers()
@@ -403,7 +403,7 @@ class TestWaitingForAWord:
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, back_end, propose):
-        go = propose(GO, read_back="Shall I go to the kitchen?", may_be_kept=True)
+        go = propose(GO, is_unsure=True, may_be_kept=True)
         desk = open_desk(back_end("model", go))
         desk.give(text="kitchen, like, you know")
         return desk
@@ -419,7 +419,7 @@ class TestReadingBack:
 
     def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, back_end, propose):
         bring = (("pick_up", {"object": "red cup"}), ("speak", {"text": "Here is the red cup."}))
-        take = propose(*bring, read_back="Shall I bring the red cup?")
+        take = propose(*bring, is_unsure=True)
         desk = open_desk(back_end("model", take))
         desk.sees("red cup_1", "blue cup_2")
         desk.give(text="cup, like, you know")
@@ -442,9 +442,12 @@ class TestReadingBack:
         ("said", "question"),
         [
             ("no, the blue one", "Shall I pick up the blue cup?"),
-            ("I mean the ball", "Shall I pick up the ball?"),
+            ("I mean the ball", "Shall I pick up the ball? The ball may weigh 0.5 kg."),
             ("the other one", "Shall I pick up the blue cup?"),
-            ("the green ball I mean", "Shall I pick up the green ball?"),
+            (
+                "the green ball I mean",
+                "Shall I pick up the green ball? The green ball may weigh 0.5 kg.",
+            ),
         ],
     )
     def test_a_correction_ends_what_has_begun_and_is_read_back(self, open_desk, said, question):

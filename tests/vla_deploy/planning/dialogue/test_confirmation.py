@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of, things_named
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of, question_about
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.understanding.grounding import PUT_IN
@@ -72,6 +72,16 @@ def test_each_risk_of_a_plan_is_told(butler: World) -> None:
     assert "It takes 70 steps and about 18 minutes." in ask(butler, *[GO] * 70)
 
 
+def test_what_was_left_out_is_named_without_a_word_that_would_end_all(butler: World) -> None:
+    plan = Plan(goal="x", actions=(GO,))
+    proposal = Proposal(plan=plan, back_end="t", confidence=1.0, left_out=("not", "freeze", "not"))
+    request = Request(command_id="c", text="x", world=butler)
+    assert confirmation_of(plan, request, proposal) == (
+        'You said "not" and "standstill", which I may not have understood. '
+        "Shall I go to the kitchen?"
+    )
+
+
 def test_doubt_is_asked_even_where_risks_are_not(butler: World) -> None:
     never = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.NEVER))
     assert ask(never, PICK.model_copy(update={"feasibility_score": 0.6}))
@@ -89,17 +99,17 @@ def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
     plan = Plan(goal="x", actions=(PICK,) * 4)
     agreed = agreement_to(plan, request)
     assert agreed == {"many", "unheard"}
-    assert confirmation_of(plan, request, agreed) == ""
+    assert confirmation_of(plan, request, agreed=agreed) == ""
     back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
     farther = plan.model_copy(update={"actions": (*plan.actions, back)})
-    assert confirmation_of(farther, request, agreed).endswith("I would drive 2 m backward.")
+    assert confirmation_of(farther, request, agreed=agreed).endswith("I would drive 2 m backward.")
 
 
 def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
     request = Request(command_id="c", text="x", world=butler)
     hot, sharp = (Plan(goal="x", actions=(GO,), safety_concerns=(why,)) for why in ("hot", "sharp"))
-    assert confirmation_of(hot, request, agreement_to(hot, request)) == ""
-    assert "sharp" in confirmation_of(sharp, request, agreement_to(hot, request))
+    assert confirmation_of(hot, request, agreed=agreement_to(hot, request)) == ""
+    assert "sharp" in confirmation_of(sharp, request, agreed=agreement_to(hot, request))
 
 
 def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> None:
@@ -107,8 +117,8 @@ def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> 
     request = Request(command_id="c", text="x", world=always)
     speak = Action(id="s", skill="speak", parameters={"text": "hello"})
     said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
-    assert confirmation_of(moved, request, agreement_to(moved, request)) == ""
-    assert confirmation_of(moved, request, agreement_to(said, request))
+    assert confirmation_of(moved, request, agreed=agreement_to(moved, request)) == ""
+    assert confirmation_of(moved, request, agreed=agreement_to(said, request))
 
 
 CUPS = [f"red cup_{number}" for number in range(1, 6)]
@@ -142,5 +152,9 @@ def test_every_thing_of_a_set_is_named_of_many_the_kinds(
     request = Request(
         command_id="c", text="x", world=butler, scene=Snapshot(stamp_ns=0, things=things)
     )
-    found = things_named(Plan(goal="x", actions=actions), request)
-    assert found.count("on the coffee table") == 5 if said is None else found == said
+    found = question_about(Plan(goal="x", actions=actions), request)
+    if said is None:
+        assert found.count("on the coffee table") == 5
+    else:
+        assert "That is" in found if said else "That is" not in found
+        assert found.endswith(said)

@@ -59,7 +59,7 @@ def answered(
 ) -> tuple[list[int], int]:
     constraint = kind(model.guide, grammar_of(SCHEMA))
     done = generate(model.decoder, prompt, constraint, model.config.end_ids, bounds())
-    return [token.number for token in done.tokens], done.runs
+    return list(done.tokens), done.runs
 
 
 def test_an_answer_is_json_of_the_schema_even_from_random_weights(model: LanguageModel) -> None:
@@ -145,7 +145,7 @@ def test_an_answer_ends_when_nobody_waits_any_more(model: LanguageModel) -> None
 
 def test_an_answer_is_cut_at_its_most_tokens(model: LanguageModel) -> None:
     with pytest.raises(AnswerCut, match="3 tokens"):
-        model.answer(ASKED, bounds(most_tokens=3))
+        model.answer(ASKED, bounds(most_tokens=3), SCHEMA)
 
 
 def test_a_prompt_beyond_the_context_is_refused(model: LanguageModel) -> None:

@@ -2,12 +2,11 @@
 
 import pytest
 
-from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
+from vla_deploy.planning.errors import Declined, NotAble, UnknownPlace
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.patterns.awaiting import awaiting, is_word
 from vla_deploy.planning.patterns.backend import pattern_plan
-from vla_deploy.planning.patterns.stopping import is_stop, objects, only_objects
+from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 
@@ -116,7 +115,7 @@ def test_again_does_what_was_done_last() -> None:
     assert does("again", last) == does("do it once again", last) == does(last.said)
     assert does("a bit more", last) == "turn 0.1309"
     assert does("the other way", last) == "turn -0.5236"
-    with pytest.raises(NothingBefore):
+    with pytest.raises(NotAble):
         pattern_plan(request_for("again"))
 
 

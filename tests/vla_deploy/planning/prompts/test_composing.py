@@ -7,10 +7,9 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.chat_models.chat_back_end import PlanAnswer
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.prompts.composing import TEMPLATES, VARIANTS, chat_for
-from vla_deploy.planning.prompts.situation_data import as_data, plain
+from vla_deploy.planning.prompts.composing import TEMPLATES, VARIANTS, as_data, chat_for, plain
 from vla_deploy.planning.understanding import Conversation, Turn
 
 ATTACK = (

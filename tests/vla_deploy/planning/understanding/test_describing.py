@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
+from vla_deploy.planning.errors import Ambiguous, NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.resolver import Resolver
@@ -74,7 +74,7 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
 )
 def test_it_is_told_from_the_things_around(scene: Request, text: str, meant: str | None) -> None:
     if meant is None:
-        with pytest.raises((NotThere, UnknownObject)):
+        with pytest.raises((NotAble, UnknownObject)):
             names(scene, text)
     else:
         assert names(scene, text) == [meant]
@@ -113,7 +113,7 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
     ],
 )
 def test_what_is_not_there_is_said_to_be_not(scene: Request, text: str, says: str) -> None:
-    with pytest.raises(NotThere, match=says):
+    with pytest.raises(NotAble, match=says):
         names(scene, text)
 
 
@@ -140,7 +140,7 @@ def test_what_may_not_be_taken_is_counted_and_then_not_taken(home: "Home") -> No
     scene = home.ask(box, *BOTTLES)
     assert names(scene, "the first thing from the left", Use.SEE) == ["box_1"]
     assert names(scene, "the second thing from the left") == ["bottle_3"]
-    with pytest.raises(NotThere):
+    with pytest.raises(NotAble):
         names(scene, "the first thing from the left")
 
 

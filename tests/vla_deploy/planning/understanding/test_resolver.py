@@ -3,7 +3,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
+from vla_deploy.planning.errors import Ambiguous, NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.planning.understanding.fitting import Use
@@ -63,7 +63,7 @@ def test_three_are_told_apart_too(home: "Home") -> None:
 
 
 def test_the_answer_settles_it(home: "Home") -> None:
-    talk = Conversation().settled({"cup": "cup_2"})
+    talk = Conversation(choices={"cup": "cup_2"})
     assert name(home.ask("cup_1", "cup_2", conversation=talk), "the cup") == "cup_2"
 
 
@@ -71,7 +71,7 @@ def test_a_word_that_only_sounds_like_a_known_one_is_asked(home: "Home") -> None
     with pytest.raises(Ambiguous) as asked:
         name(home.ask("cup_1"), "the red cap")
     assert asked.value.question == "Did you mean the cup?"
-    talk = Conversation().settled({"red cap": asked.value.candidates[0].name})
+    talk = Conversation(choices={"red cap": asked.value.candidates[0].name})
     assert name(home.ask("cup_1", conversation=talk), "the red cap") == "red cup"
 
 
@@ -117,9 +117,9 @@ def test_a_hand_that_holds_nothing_says_so_and_what_the_other_one_holds(home: "H
     cup = replace(home.things["cup_1"], held_by="right")
     request = home.ask(cup)
     assert name(request, "what is in your right hand", Use.PUT) == "cup_1"
-    with pytest.raises(NotThere, match="my left hand holds nothing; the right one holds the red"):
+    with pytest.raises(NotAble, match="my left hand holds nothing; the right one holds the red"):
         name(request, "what is in your left hand", Use.PUT)
-    with pytest.raises(NotThere, match=r"^I hold nothing$"):
+    with pytest.raises(NotAble, match=r"^I hold nothing$"):
         name(home.ask(), "what you are holding", Use.PUT)
 
 
@@ -179,5 +179,5 @@ def test_so_many_as_are_counted_are_meant(home: "Home", text: str, meant: list[s
 )
 def test_what_is_counted_otherwise_is_told(home: "Home", text: str, reason: str) -> None:
     far = replace(home.things["cup_2"], thing_id="cup_3", position_m=(9.0, 9.0, 0.5))
-    with pytest.raises(NotThere, match=reason):
+    with pytest.raises(NotAble, match=reason):
         Resolver(home.ask("cup_1", "cup_2", far, "ball_1")).things(text, Use.TAKE)

@@ -1,4 +1,8 @@
-"""Recognise words that only mean: stop what you are doing, and those that object to it."""
+"""Recognise words that steer what goes on instead of asking for something.
+
+Some only mean: stop what you are doing. Others object to it, or hold a plan until a word is said:
+"when I say so", "not before I call".
+"""
 
 import re
 from typing import Final
@@ -47,7 +51,9 @@ def is_stop(text: str) -> bool:
     if len(text) > MOST_CHARACTERS:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]
-    return any(bare) and all(map(_is_stop, filter(None, bare)))
+    return any(bare) and all(
+        part in STOP_PHRASES or _STOP_DOING.fullmatch(part) for part in bare if part
+    )
 
 
 def objects(text: str) -> bool:
@@ -74,10 +80,6 @@ def _objecting(text: str) -> list[str]:
     return [part for part in without if part]
 
 
-def _is_stop(said: str) -> bool:
-    return said in STOP_PHRASES or _STOP_DOING.fullmatch(said) is not None
-
-
 def _urged_off(text: str) -> str:
     words = text.split()
     while words and " ".join(words) not in STOP_PHRASES and words[0] in _URGING:
@@ -85,3 +87,44 @@ def _urged_off(text: str) -> str:
     while words and " ".join(words) not in STOP_PHRASES and words[-1] in {*_URGING, "stop"}:
         words = words[:-1]
     return " ".join(words)
+
+
+# --- words by which a plan waits for a word, and that word ----------------------------------------
+
+_WORD: Final = (
+    r"i (?:say (?:so|go|now|when|the word)|tell you(?: to| so)?|give (?:you )?the (?:word|sign|"
+    r"signal|go-ahead)|call(?: you)?|ask you(?: to)?)"
+)
+_WHEN: Final = (
+    r"(?:but )?(?:only )?(?:when(?:ever)?|as soon as|the (?:moment|instant|minute|second)|once|"
+    r"after|not (?:before|until|till)) " + _WORD
+)
+_ORDERS: Final = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        # "When I tell you to go to bed, ..." waits for something else.
+        rf"(?:please,? )?{_WHEN}(?:,? then|[,:]|(?<! to)) (?P<rest>(?!to ).+)",
+        rf"(?:please )?wait (?:until|till) {_WORD}(?:,? and(?: then)?|,? then|,) (?P<rest>.+)",
+        rf"(?P<rest>.+?),? {_WHEN}",
+    )
+)
+
+
+def awaiting(text: str) -> str | None:
+    """Return what a command wants done at a word, None for a command that waits for none."""
+    said = " ".join(text.split()).strip(" .!")
+    found = (order.fullmatch(said) for order in _ORDERS)
+    return next((one["rest"] for one in found if one), None)
+
+
+# A mere "yes", "okay" or "right" is said to other people, too, and for an hour.
+_BEGINS: Final = re.compile(r"(?:now )?(?:go|go ahead|go on|do it|start|begin)(?: now)?|now")
+_AROUND: Final = re.compile(
+    r"[,.!]|\b(?:yes|yeah|yep|sure|ok|okay|right|alright|please|then|hey|robot|butler)\b"
+)
+
+
+def is_word(text: str) -> bool:
+    """Return whether an utterance is the word that begins a held plan."""
+    said = " ".join(_AROUND.sub(" ", text.lower()).split())
+    return _BEGINS.fullmatch(said) is not None

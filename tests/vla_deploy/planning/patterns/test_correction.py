@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.planning.dialogue.correction import (
+from vla_deploy.planning.patterns.follow_up import (
     corrected,
     corrected_by,
     corrected_text,

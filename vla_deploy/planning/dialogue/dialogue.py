@@ -1,0 +1,262 @@
+"""Hold the talk, and bring what was planned to its end: to the executor, to a question, or refused.
+
+At most one question waits at a time. Beside it a plan may be held until the person says go; what
+else is said does not drop it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from drivers.clock import Clock
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
+from vla_deploy.planning.dialogue.confirmation import (
+    agreement_to,
+    confirmation_of,
+    question_about,
+)
+from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
+from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
+from vla_deploy.planning.dialogue.situation import Situation
+from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.interfaces import PlanningResult, Request
+from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.recovery.setback import numbered
+from vla_deploy.planning.understanding import (
+    Candidate,
+    Conversation,
+    Outcome,
+    Question,
+    Turn,
+    Verdict,
+    judge_answer,
+)
+from vla_deploy.planning.understanding.conversation import mentions_of
+
+MOST_ASKED: Final = 3
+HELD_S: Final = 3600.0
+"""How long a plan waits for the word that begins it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PendingQuestion:
+    """Hold the command that waits for an answer; `plan` is what a yes lets run."""
+
+    command: UserCommand
+    answer: PlanningResult
+    question: Question
+    times_asked: int = 1
+
+    @property
+    def plan(self) -> Plan | None:
+        """Return what a yes lets run."""
+        return self.answer.plan
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether any words may answer it, rather than yes, no, or one of a few."""
+        return self.plan is None and not self.question.candidates
+
+
+class Dialogue:
+    """Conclude commands, publish it, and remember it for what is said next.
+
+    `accepted` is called before a plan is dispatched for a command of its own.
+    """
+
+    def __init__(
+        self,
+        accepted: Callable[[Request, PlanningResult], None],
+        situation: Situation,
+        events: PlannerEvents,
+        active: ActivePlans,
+        clock: Clock,
+    ) -> None:
+        self.conversation = Conversation()
+        self.pending: PendingQuestion | None = None
+        self.held: PendingQuestion | None = None
+        self.metrics = PlannerMetrics()
+        self._accepted = accepted
+        self._situation = situation
+        self._events = events
+        self._active = active
+        self._clock = clock
+
+    # --- what was planned -----------------------------------------------------------------------
+
+    def conclude(self, done: PlannedCommand) -> None:
+        """Dispatch a command's plan where it may run at once; else ask, or say what forbids it."""
+        command, answer = done.command, done.answer
+        self.metrics.note(answer.attempts)
+        self.settle()  # what was chosen concerned this command alone
+        try:
+            if answer.is_final:
+                self._situation.check_ready()
+            if answer.plan is None:
+                raise answer.error or PlanInvalid(["no back end was asked for a plan"])
+            self._events.check_length(answer.plan)
+            if done.awaits_word and not command.recovers:  # the word has been said
+                self.hold(done, answer.plan)
+                return
+            agreed = self._active.agreed(command)
+            question = confirmation_of(answer.plan, done.request, answer.proposal, agreed)
+            if question:
+                raise Ambiguous(question)
+            self.dispatch(done, answer.plan)
+        except Ambiguous as unclear:
+            if command.recovers:  # the robot stands in the middle of it: it does not wait
+                self.refuse(command, unclear, answer)
+            else:
+                self._ask(done, unclear)
+        except PlanningError as error:
+            self.refuse(command, error, answer)
+
+    def dispatch(self, done: PlannedCommand, plan: Plan) -> None:
+        """Give a checked plan to the executor, and remember what was understood."""
+        command, request, answer = done.command, done.request, done.answer
+        if command.recovers:
+            plan = numbered(plan, len(request.failed))
+        else:
+            self._accepted(request, answer)
+        self._events.dispatched(command, plan, answer)
+        self._active.add(command, plan, answer, agreement_to(plan, request))
+        self.metrics.planned += 1
+        self._remember_plan(done, plan, Outcome.UNDER_WAY)
+
+    def hold(self, done: PlannedCommand, plan: Plan) -> None:
+        """Read a plan back, and hold it until the person says go; one that was held is dropped."""
+        self.drop(self.take_held(), Says.REPLACED)
+        asked = Says.HELD.format(question=question_about(plan, done.request, done.answer.proposal))
+        now_ns, text = self._clock.now_ns(), done.command.text
+        question = Question(text=asked, asked_ns=now_ns, command_text=text, limit_s=HELD_S)
+        self.held = PendingQuestion(command=done.command, answer=done.answer, question=question)
+        self.metrics.asked += 1
+        self._events.asked(done.command, question, plan, choices=("go",))
+        # "No, the blue one" means this plan, not what was done before it.
+        self._remember_plan(done, plan, Outcome.ASKED)
+
+    def refuse(
+        self,
+        command: UserCommand,
+        reason: PlanningError | str,
+        answer: PlanningResult | None = None,
+        outcome: Outcome = Outcome.REFUSED,
+    ) -> None:
+        """Say why a command is not done."""
+        if command.recovers:
+            self._events.gave_up(command.command_id, str(reason))
+            return
+        self.metrics.refused += 1
+        self._events.refused(command, str(reason), answer)
+        if command.is_doubted and command.may_ask_again:
+            self._events.say(command, Says.HEARD_BADLY)
+        elif not command.is_doubted and (
+            outcome is not Outcome.CANCELLED or isinstance(reason, Says)
+        ):
+            self._events.say(command, spoken_refusal(reason))
+        self.remember(
+            Turn(
+                said=command.text,
+                command_id=command.command_id,
+                told_ns=command.told_ns,
+                outcome=outcome,
+                answer=str(reason),
+            )
+        )
+
+    def drop(self, pending: PendingQuestion | None, why: Says) -> None:
+        """Say that what waits for an answer, if anything does, is left."""
+        if pending is not None:
+            self.refuse(pending.command, why, pending.answer, Outcome.CANCELLED)
+
+    # --- what waits for an answer ---------------------------------------------------------------
+
+    def _ask(self, done: PlannedCommand, unclear: Ambiguous) -> None:
+        question = Question(
+            text=unclear.question,
+            asked_ns=self._clock.now_ns(),
+            command_text=done.command.text,
+            expression=unclear.expression,
+            candidates=unclear.candidates,
+            choices=done.request.conversation.choices,
+        )
+        self.pending = PendingQuestion(command=done.command, answer=done.answer, question=question)
+        self.metrics.asked += 1
+        self._events.asked(done.command, question, done.answer.plan)
+
+    def ask_again(self, pending: PendingQuestion) -> None:
+        """Ask once more in other words, or leave it when that was enough."""
+        if pending.times_asked >= MOST_ASKED:
+            self.drop(self.settle(), Says.STILL_UNCLEAR)
+            return
+        asked = replace(pending.question, asked_ns=self._clock.now_ns())
+        self.pending = replace(pending, question=asked, times_asked=pending.times_asked + 1)
+        told = replace(asked, text=Says.NOT_CLEAR.format(question=asked.text))
+        self._events.asked(pending.command, told, pending.plan)
+
+    def judge(self, text: str) -> tuple[Verdict, Candidate | None]:
+        """Return what an utterance is to the question that waits, and which candidate it picks."""
+        if self.pending is None or self._is_overdue(self.pending):
+            return Verdict.ANEW, None
+        return judge_answer(self.pending.question, text)
+
+    def declines(self, text: object) -> bool:
+        """Return whether words such as "never mind" mean the question, and not all that goes on."""
+        return isinstance(text, str) and self.judge(text)[0] is Verdict.NO
+
+    def settle(self) -> PendingQuestion | None:
+        """Wait no more, and return what waited; nothing that was chosen counts any more."""
+        pending, self.pending = self.pending, None
+        self.conversation = replace(self.conversation, choices={})
+        return pending
+
+    def choose(self, question: Question, chosen: Candidate | None) -> None:
+        """Wait no more; what was chosen counts while the command that waited is planned."""
+        picked = {} if chosen is None else {question.expression: chosen.name}
+        self.pending = None
+        self.conversation = replace(self.conversation, choices={**question.choices, **picked})
+
+    def take_held(self) -> PendingQuestion | None:
+        """Return what was held, and hold nothing any more."""
+        held, self.held = self.held, None
+        return held
+
+    def drop_overdue(self) -> None:
+        """Leave the question that nobody answered in time, and the plan whose word has not come."""
+        if self.pending is not None and self._is_overdue(self.pending):
+            self.drop(self.settle(), Says.NO_ANSWER)
+        if self.held is not None and self._is_overdue(self.held):
+            self.drop(self.take_held(), Says.NO_ANSWER)
+
+    def _is_overdue(self, pending: PendingQuestion) -> bool:
+        return not pending.question.is_open(self._clock.now_ns())
+
+    # --- what was said and done -----------------------------------------------------------------
+
+    def remember(self, turn: Turn) -> None:
+        """Add a turn to the conversation."""
+        self.conversation = self.conversation.after(turn)
+
+    def _remember_plan(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
+        command, request = done.command, done.request
+        self.remember(
+            Turn(
+                said=command.text,
+                command_id=command.command_id,
+                told_ns=command.told_ns,
+                understood=plan.summary,
+                mentioned=mentions_of(plan, request.scene),
+                plan=plan,
+                outcome=outcome,
+                here=request.here,
+            )
+        )
+
+    def ended(self, command_id: str, success: bool, error: str) -> Turn | None:
+        """Note how a command ended that was carried out, and return its turn if it is known."""
+        outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
+        self.conversation = self.conversation.ended(command_id, outcome, error)
+        turns = self.conversation.turns
+        return next((one for one in turns if one.command_id == command_id), None)
