@@ -15,9 +15,9 @@ class Settings:
     name: str
     seed: int = 0
     scale: float = 1.0
-    cpu_minutes: float = 10.0
+    cpu_minutes: float = 60.0
     fresh: int = 4
-    seen: int = 12
+    seen: int = 16
     stretch_s: float = 7.5
     learning_rate: float = 3e-3
     judged_hours: float = 3.0

@@ -15,7 +15,7 @@ from torch.nn import functional
 from training.stop_words.corpus import TRAIN, Clips
 from training.stop_words.mixing import IGNORED, Mixer, Stretch, varied
 from training.stop_words.network import StopNet
-from training.stop_words.rooms import NoiseBank
+from training.stop_words.rooms import NoiseBank, NoiseFrames
 from training.stop_words.settings import Settings
 from training.stop_words.texts import WORDS
 from training.warm_start import begin_from
@@ -56,13 +56,14 @@ def train(out: Path, settings: Settings) -> None:
     if settings.start_from is not None and run.steps == 0:
         random = np.random.default_rng([settings.seed, 3])
         run.begin_from(settings.start_from, [mixer.stretch(random) for _ in range(TYPICAL)])
+    noise = NoiseFrames(bank)
     mixer.hard = run.hard
     pool: deque[Stretch] = deque(maxlen=POOL)
     began_s = time.process_time() - run.spent_s
     while run.done < 1.0:
         random = np.random.default_rng([settings.seed, 2, run.steps])
         fresh = [mixer.stretch(random) for _ in range(settings.fresh)]
-        seen = [varied(pool[k], random) for k in _some(len(pool), settings.seen, random)]
+        seen = [varied(pool[k], noise, random) for k in _some(len(pool), settings.seen, random)]
         run.step([*fresh, *seen], mixer)
         pool.extend(fresh)
         run.spent_s = time.process_time() - began_s
@@ -87,7 +88,7 @@ class _Run:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self.model = StopNet(len(WORDS))
+        self.model = StopNet(len(WORDS)).to(memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.model).eval()
         self.steps = 0
         self.spent_s = 0.0
