@@ -35,8 +35,10 @@ PHONE_WEIGHTS: Final = (1.0, 0.3)
 PHONES_UNTIL: Final = 0.4
 """Share of the time in which the network learns above all to tell sounds apart."""
 TYPICAL: Final = 16
-POOL: Final = 300
-"""Stretches that are shown again, each a few times: mixing one costs more than learning from it."""
+FIRST_POOL: Final = 80
+POOL: Final = 400
+"""Stretches that are shown again, each a few times: mixing one costs more than learning from it.
+So many are mixed before the first step, and so many are held."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -57,13 +59,16 @@ def train(out: Path, settings: Settings) -> None:
         random = np.random.default_rng([settings.seed, 3])
         run.begin_from(settings.start_from, [mixer.stretch(random) for _ in range(TYPICAL)])
     noise = NoiseFrames(bank)
-    mixer.hard = run.hard
-    pool: deque[Stretch] = deque(maxlen=POOL)
     began_s = time.process_time() - run.spent_s
+    mixer.hard = run.hard
+    random = np.random.default_rng([settings.seed, 4, run.steps])
+    first = (mixer.stretch(random) for _ in range(FIRST_POOL))
+    pool: deque[Stretch] = deque(first, maxlen=POOL)
     while run.done < 1.0:
         random = np.random.default_rng([settings.seed, 2, run.steps])
         fresh = [mixer.stretch(random) for _ in range(settings.fresh)]
-        seen = [varied(pool[k], noise, random) for k in _some(len(pool), settings.seen, random)]
+        picked = random.integers(len(pool), size=settings.seen)
+        seen = [varied(pool[int(k)], noise, random) for k in picked]
         run.step([*fresh, *seen], mixer)
         pool.extend(fresh)
         run.spent_s = time.process_time() - began_s
@@ -71,10 +76,6 @@ def train(out: Path, settings: Settings) -> None:
             run.hard = mixer.hard
             run.save(out / STATE)
             _write(run.average.state_dict(), out / WEIGHTS)
-
-
-def _some(held: int, count: int, random: np.random.Generator) -> list[int]:
-    return [int(k) for k in random.integers(held, size=count)] if held else []
 
 
 def _write(values: dict[str, Any], path: Path) -> None:
