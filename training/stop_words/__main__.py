@@ -8,7 +8,6 @@ from pathlib import Path
 
 from training.stop_words.corpus import speak
 from training.stop_words.settings import SIZES, Settings
-from training.stop_words.shipping import ship
 
 
 def main() -> None:
@@ -73,11 +72,13 @@ def _judge(out: Path, settings: Settings) -> None:
 def _card(out: Path, settings: Settings) -> None:
     from training.stop_words.card import describe
 
-    describe(out / MODELS, settings)
+    describe(out, out / MODELS, settings)
 
 
-def _ship(out: Path, _settings: Settings) -> None:
-    ship(out / MODELS)
+def _ship(out: Path, settings: Settings) -> None:
+    from training.stop_words.shipping import ship
+
+    ship(out, out / MODELS, settings)
 
 
 MODELS = "models"

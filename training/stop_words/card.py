@@ -2,14 +2,26 @@
 
 import json
 import time
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 from typing import Any, Final
 
 import numpy as np
 
-from training.stop_words.cast import PARTS
-from training.stop_words.evaluation import ALL, ALL_BUT_KOKORO, METRICS, REFRACTORY_S, SNRS_DB
+from training.stop_words.cast import SHARES
+from training.stop_words.corpus import TRAIN, Clips
+from training.stop_words.evaluation import (
+    ALARMS_PER_HOUR,
+    ALIKE,
+    ALL,
+    ALL_BUT_KOKORO,
+    METRICS,
+    ORDINARY,
+    REFRACTORY_S,
+    SNRS_DB,
+)
 from training.stop_words.export import FILE, FRAMES, INPUT, MOMENTS, OUTPUT
 from training.stop_words.network import REACH, StopNet
 from training.stop_words.settings import Settings
@@ -40,14 +52,15 @@ COSTS: Final = ("missed clean", "missed at 10 dB", "alarms per hour")
 _RUNS: Final = 200
 
 
-def describe(models: Path, settings: Settings) -> None:
+def describe(out: Path, models: Path, settings: Settings) -> None:
     """Write `card.md` and `model.toml` beside the file that they describe.
 
     Raises:
-        FileNotFoundError: the model or its metrics are not there.
+        FileNotFoundError: the model, its metrics or the clips that it learnt are not there.
     """
     metrics = json.loads((models / METRICS).read_text(encoding="utf-8"))
-    (models / CARD).write_text(card(metrics, models, settings), encoding="utf-8")
+    clips = {kind: Counter(_engines(out, kind)) for kind in ("stops", "others")}
+    (models / CARD).write_text(card(metrics, clips, models, settings), encoding="utf-8")
     place = models / "stop_words"
     place.mkdir(exist_ok=True)
     write_manifest(place, manifest(metrics, models))
@@ -55,11 +68,21 @@ def describe(models: Path, settings: Settings) -> None:
     place.rmdir()
 
 
-def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
-    """Return the model card."""
-    counts = ", ".join(
-        f"{part.engine} ({part.stops} and {part.others})" for part in PARTS if part.stops
-    )
+def _engines(out: Path, kind: str) -> list[str]:
+    """Return the engine of each clip that was learnt from."""
+    return [voice.partition("/")[0] for voice in Clips(out / "clips", TRAIN, kind).voices]
+
+
+def card(
+    metrics: dict[str, Any],
+    clips: Mapping[str, Mapping[str, int]],
+    models: Path,
+    settings: Settings,
+) -> str:
+    """Return the model card; `clips` counts those of each engine, with a stop word and without."""
+    stops, others = clips["stops"], clips["others"]
+    counts = ", ".join(f"{engine} ({stops[engine]} and {others[engine]})" for engine in stops)
+    share = SHARES[kokoro.ENGINE] / sum(SHARES[engine] for engine in stops)
     values = {
         "reach_s": f"{REACH * HOP / RATE_HZ:.2f}",
         "verdict": verdict(metrics),
@@ -71,6 +94,9 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "size_kib": (models / FILE).stat().st_size // 1024,
         "run_ms": f"{_run_ms(models / FILE):.1f}",
         "engines": f"{counts}: clips with a stop word, and without",
+        "kokoro_share": f"{share:.0%}",
+        "styles": len(kokoro.STYLES + kokoro.OTHER_LANGUAGES),
+        "alarms": ", ".join(f"{most:g}" for most in ALARMS_PER_HOUR.values()),
         "cpu_minutes": f"{settings.cpu_minutes:g}",
         "seed": settings.seed,
         "judged": ", ".join(kokoro.JUDGED),
@@ -83,10 +109,10 @@ def verdict(metrics: dict[str, Any]) -> str:
     """Return a sentence on whether it does what is asked of it."""
     told = metrics["judged"]["at"][USUAL]
     missed = {snr: told["missed_ratio"][snr][ALL] for snr in AIM_MISSED}
-    alarms = told["false_alarms_per_hour"][ALL]
+    alarms = told["false_alarms_per_hour"][ORDINARY][ALL]
     figures = (
         f"{missed['clean']:.1%} of the stops missed in quiet, {missed['10']:.1%} in noise at "
-        f"10 dB, {alarms:.1f} false alarms per hour of talk, told within "
+        f"10 dB, {alarms:.1f} false alarms per hour of ordinary talk, told within "
         f"{told['delay_p95_s']:.2f} s of the word's end (95 of 100)"
     )
     is_reached = (
@@ -117,7 +143,10 @@ def tables(metrics: dict[str, Any]) -> str:
         ]
         for snr in missed
     ]
-    hours = [f"{one['hours'][ALL]:.1f} h" for one in (metrics, metrics["judged"])]
+    hours = [
+        f"{one['hours'][ORDINARY][ALL]:.1f} h ({one['hours'][ALIKE][ALL]:.1f})"
+        for one in (metrics, metrics["judged"])
+    ]
     lines = [
         *_table([f"missed at the threshold `{USUAL}`", *groups, "judged styles"], rows),
         "",
@@ -131,8 +160,8 @@ def tables(metrics: dict[str, Any]) -> str:
             ],
         ),
         "",
-        f"{hours[0]} of talk by held voices, {hours[1]} by judged ones: each clip in quiet, at 20",
-        "and at 10 dB.",
+        "Alarms are per hour of ordinary talk, in brackets of talk made to sound like a stop word:",
+        f"{hours[0]} by held voices, {hours[1]} by judged ones, each in quiet, at 20 and 10 dB.",
     ]
     return "\n".join(lines)
 
@@ -147,7 +176,8 @@ def _costs(metrics: dict[str, Any], kind: str, key: str | int) -> list[str]:
     cells = [str(held["threshold"])]
     for told, group in ((held, ALL_BUT_KOKORO), (held, kokoro.ENGINE), (judged, ALL)):
         missed, alarms = told["missed_ratio"], told["false_alarms_per_hour"]
-        cells += [f"{missed[snr][group]:.1%}" for snr in AIM_MISSED] + [f"{alarms[group]:.1f}"]
+        cells += [f"{missed[snr][group]:.1%}" for snr in AIM_MISSED]
+        cells.append(f"{alarms[ORDINARY][group]:.1f} ({alarms[ALIKE][group]:.1f})")
     return cells
 
 
@@ -171,7 +201,7 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
             thresholds=metrics["thresholds"],
             measured=SpottingMeasured(
                 missed_ratio=round(told["missed_ratio"]["10"][ALL], 4),
-                false_alarms_per_hour=round(told["false_alarms_per_hour"][ALL], 2),
+                false_alarms_per_hour=round(told["false_alarms_per_hour"][ORDINARY][ALL], 2),
                 delay_p95_s=round(told["delay_p95_s"], 3),
             ),
         ),

@@ -3,7 +3,7 @@
 import gzip
 import json
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -35,12 +35,14 @@ class Said:
     """Hold one clip; `events` are rows of class (1 on), start and end in seconds.
 
     `phones` are rows of a phone's number and where it begins; none where the engine tells none.
+    `is_ordinary` is false for stops, and for talk that was made to sound like one.
     """
 
     samples: Samples
     voice: str
     events: NDArray[np.float32]
     phones: NDArray[np.float32]
+    is_ordinary: bool = False
 
     @property
     def wave(self) -> Wave:
@@ -80,6 +82,7 @@ class Clips:
             voice=index["voices"][place],
             events=np.array(index["events"][place], np.float32).reshape(-1, 3),
             phones=np.array(index["phones"][place], np.float32).reshape(-1, 2),
+            is_ordinary=index["ordinary"][place],
         )
 
 
@@ -113,13 +116,13 @@ def _clips(
 ) -> list[Said]:
     voices = {TRAIN: part.voices, HELD: part.held_voices, JUDGED: part.judged_voices}[split]
     talk = other_talk(count, random, _lexicon(), _examples().draw)
-    texts = (
-        stop_texts(count, talk, random, timed=part.tells_times)
-        if kind == "stops"
-        else [(text, "", False) for text in talk]
-    )
+    if kind == "stops":
+        plain = [one.text for one in talk]
+        texts = [(*one, False) for one in stop_texts(count, plain, random, timed=part.tells_times)]
+    else:
+        texts = [(one.text, "", False, one.is_ordinary) for one in talk]
     clips: list[Said] = []
-    for text, word, is_last in texts:
+    for text, word, is_last, is_ordinary in texts:
         voice = pick(voices, random)
         try:
             clip = part.speak(text, voice, draw_style(random))
@@ -128,7 +131,7 @@ def _clips(
             continue
         said = trimmed(clip, word, is_last=is_last)
         if said is not None:
-            clips.append(said)
+            clips.append(replace(said, is_ordinary=is_ordinary))
     return clips
 
 
@@ -171,6 +174,7 @@ def _write(path: Path, clips: list[Said]) -> None:
         "starts": starts.tolist(),
         "events": [clip.events.tolist() for clip in clips],
         "phones": [clip.phones.tolist() for clip in clips],
+        "ordinary": [clip.is_ordinary for clip in clips],
     }
     partial = path.with_suffix(".part")
     partial.write_text(json.dumps(index), encoding="utf-8")

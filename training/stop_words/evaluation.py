@@ -1,7 +1,8 @@
 """Judge the network on voices that it has not learnt.
 
-Smoothing and thresholds are chosen by the held voices. Then, once, the judged ones tell how good it
-is: nothing is chosen by them.
+Smoothing and thresholds are chosen by the held voices: the latter by how often ordinary talk, which
+is not made to sound like a stop word, sets the network off. Then, once, the judged voices tell how
+good it is: nothing is chosen by them. What is judged is the exported file.
 """
 
 import json
@@ -10,19 +11,20 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
-import torch
+import onnx
 from numpy.typing import NDArray
 
 from training.stop_words.corpus import HELD, JUDGED, Clips, Said
-from training.stop_words.export import trained
-from training.stop_words.network import REACH, Scores
+from training.stop_words.export import FILE, INPUT
+from training.stop_words.network import REACH
 from training.stop_words.rooms import NoiseBank, Sound
 from training.stop_words.settings import Settings
 from training.voices import kokoro
 from training.voices.clip import RATE_HZ
+from vla_deploy.inference.runtime import InferenceSession, SessionOptions
 from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW, log_mel
 
 METRICS: Final = "metrics.json"
@@ -32,16 +34,20 @@ LONGEST_DELAY_S: Final = 0.42
 GRID: Final = tuple(round(float(one), 3) for one in np.arange(0.3, 1.0, 0.005))
 REFRACTORY_S: Final = 1.0
 LATE_S: Final = 0.6
-ALARMS_PER_HOUR: Final = {"high": 12.0, "normal": 4.0, "low": 1.0}
-"""Of the held voices' talk, half of which is made to sound like a stop word."""
+ALARMS_PER_HOUR: Final = {"high": 8.0, "normal": 3.0, "low": 1.0}
+"""Of the held voices' ordinary talk."""
 TALK_SNRS_DB: Final = (None, 20.0, 10.0)
 CURVE: Final = tuple(round(float(one), 2) for one in np.arange(0.4, 1.0, 0.05))
 ALL: Final = "all"
 ALL_BUT_KOKORO: Final = "all_but_kokoro"
+ORDINARY, ALIKE = "ordinary", "alike"
+"""Talk as people talk, and talk that was made to sound like a stop word, or chosen for it."""
 _BEFORE_S, _AFTER_S = 1.0, 0.9
 _LOUDNESS, _HISS = 0.05, 3e-4
 _LOG = logging.getLogger(__name__)
 Scored = NDArray[np.float32]
+_T = TypeVar("_T")
+ByKind = dict[str, dict[str, _T]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,9 +63,10 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Talk:
-    """Hold the scores of a clip of other talk."""
+    """Hold the scores of a clip of other talk, which is ORDINARY or ALIKE."""
 
     engine: str
+    kind: str
     duration_s: float
     scores: Scored
 
@@ -72,13 +79,13 @@ class Heard:
     talk: Sequence[Talk]
 
     @property
-    def hours(self) -> dict[str, float]:
-        """Return how much other talk there is, of each engine and of all."""
-        hours: dict[str, float] = defaultdict(float)
+    def hours(self) -> ByKind[float]:
+        """Return how much other talk there is, of each kind and group."""
+        hours: ByKind[float] = {kind: defaultdict(float) for kind in (ORDINARY, ALIKE)}
         for one in self.talk:
             for group in _groups(one.engine):
-                hours[group] += one.duration_s / 3600.0
-        return dict(hours)
+                hours[one.kind][group] += one.duration_s / 3600.0
+        return hours
 
 
 def evaluate(out: Path, models: Path, settings: Settings) -> None:
@@ -87,12 +94,17 @@ def evaluate(out: Path, models: Path, settings: Settings) -> None:
     Raises:
         FileNotFoundError: nothing was trained yet, or nothing was spoken to judge by.
     """
-    heard = _heard(out, HELD, settings)
-    choices = [_choice(heard, smoothing) for smoothing in SMOOTHINGS]
-    quick = [one for one in choices if one["at"]["low"]["delay_p95_s"] <= LONGEST_DELAY_S]
-    best = min(quick or choices, key=lambda one: float(one["at"]["low"]["missed_mean"]))
+    heard = heard_by(models / FILE, out, HELD, settings)
+    best = chosen(heard)
     _write(models, best)
     _LOG.info("smoothing %d: %s", best["smoothing"], json.dumps(best["at"]["low"], indent=2))
+
+
+def chosen(heard: Heard) -> dict[str, Any]:
+    """Return the smoothing and the thresholds that serve best, and what they cost."""
+    choices = [_choice(heard, smoothing) for smoothing in SMOOTHINGS]
+    quick = [one for one in choices if one["at"]["low"]["delay_p95_s"] <= LONGEST_DELAY_S]
+    return min(quick or choices, key=lambda one: float(one["at"]["low"]["missed_mean"]))
 
 
 def judge(out: Path, models: Path, settings: Settings) -> None:
@@ -102,7 +114,7 @@ def judge(out: Path, models: Path, settings: Settings) -> None:
         FileNotFoundError: the model was not evaluated yet, or nothing was spoken to judge by.
     """
     metrics = json.loads((models / METRICS).read_text(encoding="utf-8"))
-    heard = _heard(out, JUDGED, settings)
+    heard = heard_by(models / FILE, out, JUDGED, settings)
     told = _figures(heard, metrics["thresholds"], metrics["smoothing"])
     _write(models, metrics | {"judged": told})
     _LOG.info("judged: %s", json.dumps(told["at"]["low"], indent=2))
@@ -113,10 +125,13 @@ def _write(models: Path, metrics: dict[str, Any]) -> None:
     (models / METRICS).write_text(text + "\n", encoding="utf-8")
 
 
-def _heard(out: Path, split: str, settings: Settings) -> Heard:
-    """Let the network hear phrases and other talk of the voices of one split."""
-    torch.set_num_threads(1)
-    net = Scores(trained(out)).eval()
+def heard_by(file: Path, out: Path, split: str, settings: Settings) -> Heard:
+    """Let an exported network hear phrases and other talk of the voices of one split.
+
+    Raises:
+        FileNotFoundError: there is no such network, or nothing was spoken to judge by.
+    """
+    net = _opened(file)
     random = np.random.default_rng([settings.seed, 3])
     others = Clips(out / "clips", split, "others")
     bank = NoiseBank(others, random)
@@ -125,11 +140,19 @@ def _heard(out: Path, split: str, settings: Settings) -> Heard:
     return Heard(talk=talk, trials=_trials(net, stops, bank, settings, random))
 
 
-def scores_of(net: Scores, sound: Sound) -> tuple[NDArray[np.float64], Scored]:
+def _opened(file: Path) -> InferenceSession:
+    """Open a network for clips of any length: it has no padding, so that it says the same."""
+    model = onnx.load(file)
+    for value in (*model.graph.input, *model.graph.output):
+        value.type.tensor_type.shape.dim[2].dim_param = value.name
+    options = SessionOptions()
+    options.intra_op_num_threads = 1
+    return InferenceSession(model.SerializeToString(), options)
+
+
+def scores_of(net: InferenceSession, sound: Sound) -> tuple[NDArray[np.float64], Scored]:
     """Return the time of each moment in seconds, and each word's score: (words, moments)."""
-    frames = torch.from_numpy(log_mel(sound).T[None].copy())
-    with torch.no_grad():
-        scores: Scored = net(frames)[0, 1:].numpy()
+    scores: Scored = net.run(None, {INPUT: log_mel(sound).T[None]})[0][0, 1:]
     newest = np.arange(scores.shape[1]) * STRIDE + REACH - 1
     return (newest * HOP + WINDOW) / RATE_HZ, scores
 
@@ -151,7 +174,11 @@ def in_noise(
 
 
 def _trials(
-    net: Scores, stops: Clips, bank: NoiseBank, settings: Settings, random: np.random.Generator
+    net: InferenceSession,
+    stops: Clips,
+    bank: NoiseBank,
+    settings: Settings,
+    random: np.random.Generator,
 ) -> Sequence[Trial]:
     trials = []
     offset_s = _BEFORE_S + REACH * HOP / RATE_HZ
@@ -174,7 +201,11 @@ def _trials(
 
 
 def _talk(
-    net: Scores, others: Clips, bank: NoiseBank, settings: Settings, random: np.random.Generator
+    net: InferenceSession,
+    others: Clips,
+    bank: NoiseBank,
+    settings: Settings,
+    random: np.random.Generator,
 ) -> list[Talk]:
     """Return the scores of clips of other talk, each clip in each noise."""
     spent_s = 0.0
@@ -184,7 +215,8 @@ def _talk(
         for snr_db in TALK_SNRS_DB:
             duration_s = len(said.samples) / RATE_HZ
             scores = scores_of(net, in_noise(said, snr_db, bank, random))[1]
-            talk.append(Talk(engine=_engine(said), duration_s=duration_s, scores=scores))
+            kind = ORDINARY if said.is_ordinary else ALIKE
+            talk.append(Talk(engine=_engine(said), kind=kind, duration_s=duration_s, scores=scores))
             spent_s += duration_s
         if spent_s >= 3600.0 * settings.judged_hours:
             break
@@ -202,10 +234,8 @@ def _groups(engine: str) -> tuple[str, ...]:
 
 def _choice(heard: Heard, smoothing: int) -> dict[str, Any]:
     """Return thresholds and figures with one smoothing."""
-    peaks = _peaks(heard, smoothing)[ALL]
-    thresholds = {
-        name: _threshold(peaks, most * heard.hours[ALL]) for name, most in ALARMS_PER_HOUR.items()
-    }
+    peaks, hours = _peaks(heard, smoothing)[ORDINARY][ALL], heard.hours[ORDINARY][ALL]
+    thresholds = {name: _threshold(peaks, most * hours) for name, most in ALARMS_PER_HOUR.items()}
     return {
         "smoothing": smoothing,
         "thresholds": thresholds,
@@ -235,15 +265,15 @@ def smoothed(scores: Scored, count: int) -> Scored:
     return best
 
 
-def _peaks(heard: Heard, smoothing: int) -> dict[str, list[float]]:
-    """Return the highest score of each second of talk, by engine and of all."""
+def _peaks(heard: Heard, smoothing: int) -> ByKind[list[float]]:
+    """Return the highest score of each second of talk, by its kind and group."""
     size = round(REFRACTORY_S * RATE_HZ / HOP / STRIDE)
-    peaks: dict[str, list[float]] = defaultdict(list)
+    peaks: ByKind[list[float]] = {kind: defaultdict(list) for kind in (ORDINARY, ALIKE)}
     for one in heard.talk:
         best = smoothed(one.scores, smoothing)
         highest = [float(best[at : at + size].max()) for at in range(0, len(best), size)]
         for group in _groups(one.engine):
-            peaks[group] += highest
+            peaks[one.kind][group] += highest
     return peaks
 
 
@@ -256,7 +286,7 @@ def _threshold(peaks: list[float], most: float) -> float:
 
 
 def _told(
-    heard: Heard, peaks: Mapping[str, Sequence[float]], threshold: float, smoothing: int
+    heard: Heard, peaks: ByKind[list[float]], threshold: float, smoothing: int
 ) -> dict[str, Any]:
     missed: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
     delays_s = []
@@ -271,8 +301,11 @@ def _told(
         for snr, groups in missed.items()
     }
     alarms = {
-        group: sum(peak >= threshold for peak in highest) / heard.hours[group]
-        for group, highest in peaks.items()
+        kind: {
+            group: sum(peak >= threshold for peak in highest) / heard.hours[kind][group]
+            for group, highest in groups.items()
+        }
+        for kind, groups in peaks.items()
     }
     return {
         "threshold": threshold,

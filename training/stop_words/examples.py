@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from training.stop_words.picking import pick
-from training.stop_words.texts import is_clean
+from training.stop_words.texts import Other, is_clean
 
 FOLDER: Final = Path("/usr/share/wordnet")
 _PARTS: Final = ("adj", "adv", "noun", "verb")
@@ -42,10 +42,12 @@ class Examples:
         self.alike = [one for one in sentences if _ALIKE.search(one)]
         self.others = [one for one in sentences if not _ALIKE.search(one)]
 
-    def draw(self, random: np.random.Generator) -> str:
+    def draw(self, random: np.random.Generator) -> Other:
         """Return one of them."""
-        some = self.alike if random.random() < 0.5 else self.others
-        return pick(some, random)
+        is_ordinary = random.random() >= 0.5
+        return Other(
+            text=pick(self.others if is_ordinary else self.alike, random), is_ordinary=is_ordinary
+        )
 
 
 def _sentences(folder: Path) -> Iterator[str]:

@@ -11,9 +11,17 @@ from training.stop_words.cast import SHARES
 from training.stop_words.corpus import Clips, Said
 from training.stop_words.network import REACH
 from training.stop_words.picking import pick
-from training.stop_words.rooms import NoiseBank, in_a_room
+from training.stop_words.rooms import NoiseBank, NoiseFrames, in_a_room
 from training.voices.clip import RATE_HZ
-from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW, log_mel
+from vla_deploy.speech.stop_words.features import (
+    BAND_HZ,
+    BANDS,
+    HOP,
+    SPREAD,
+    STRIDE,
+    WINDOW,
+    log_mel,
+)
 
 Sound = NDArray[np.float32]
 Labels = NDArray[np.int64]
@@ -24,8 +32,10 @@ FIRST_S: Final = 0.14
 LAST_S: Final = 0.38
 AFTER_S: Final = 0.7
 STOP_SHARE: Final = 0.42
-HARD_SHARE: Final = 0.35
-MAX_HARD: Final = 600
+HARD_SHARE: Final = 0.2
+MAX_HARD: Final = 1500
+"""So many clips that fooled the network are remembered, each once. With a few hundred, each as
+often as it fools, those that noise turns into a stop word crowd out all others."""
 WORD_SHARES: Final = (0.5, 0.25, 0.25)
 PHONE_AGO_S: Final = 0.1
 """A phone is told when what follows it can be heard too."""
@@ -70,7 +80,7 @@ class Mixer:
 
     def remember(self, numbers: list[int]) -> None:
         """Take these clips of other talk more often from now on."""
-        self.hard = [*self.hard, *numbers][-MAX_HARD:]
+        self.hard = [*dict.fromkeys([*numbers, *self.hard])][:MAX_HARD]
 
     def stretch(self, random: np.random.Generator) -> Stretch:
         """Return the next stretch."""
@@ -100,7 +110,7 @@ class Mixer:
         heard = in_a_room(sound, random)
         power = float(np.mean(heard[heard != 0.0] ** 2)) + 1e-9
         if random.random() < 0.9:
-            snr_db = random.uniform(2.0, 30.0)
+            snr_db = random.uniform(3.0, 33.0)
             level = np.sqrt(power * 10.0 ** (-snr_db / 10.0))
             heard = heard + np.float32(level) * self._noise.take(self._count, random)
         loudness = 10.0 ** (random.uniform(-42.0, -8.0) / 20.0)
@@ -110,12 +120,44 @@ class Mixer:
         return np.clip(heard, -1.0, 1.0)
 
 
-def varied(stretch: Stretch, random: np.random.Generator) -> Stretch:
-    """Return a stretch as if it were louder or quieter, with a few bands missing."""
-    frames = stretch.frames + np.float32(random.uniform(-0.3, 0.3))
-    width, low = int(random.integers(0, 6)), int(random.integers(0, frames.shape[1] - 6))
-    frames[:, low : low + width] = frames.mean()
+def varied(stretch: Stretch, noise: NoiseFrames, random: np.random.Generator) -> Stretch:
+    """Return a stretch as another speaker might say it elsewhere: no label changes.
+
+    The throat is longer or shorter, it is louder or quieter, half of the time in one noise more,
+    and a few bands and moments are missing.
+    """
+    frames = _of_another_throat(stretch.frames, random)
+    if random.random() < 0.5:
+        frames = _with_noise(frames, noise.take(len(frames), random), random.uniform(5.0, 30.0))
+    frames += np.float32(random.uniform(-0.5, 0.5))
+    mean = frames.mean()
+    for most, line in ((6, frames.T), (6, frames.T), (5, frames), (5, frames), (5, frames)):
+        width = int(random.integers(0, most + 1))
+        start = int(random.integers(0, len(line) - most))
+        line[start : start + width] = mean
     return replace(stretch, frames=frames)
+
+
+def _of_another_throat(
+    frames: NDArray[np.float32], random: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return frames in which each band has what another one had, by a ratio of frequencies."""
+    ratio = np.exp(random.uniform(-0.13, 0.13))
+    places = np.interp(ratio * BAND_HZ, BAND_HZ, np.arange(BANDS))
+    low = np.minimum(places.astype(np.int64), BANDS - 2)
+    share = (places - low).astype(np.float32)
+    moved: NDArray[np.float32] = frames[:, low] * (1.0 - share) + frames[:, low + 1] * share
+    return moved
+
+
+def _with_noise(
+    frames: NDArray[np.float32], noise: NDArray[np.float32], snr_db: float
+) -> NDArray[np.float32]:
+    """Return the frames of two sounds at once, of mean powers at that ratio."""
+    sound, other = SPREAD * frames, SPREAD * noise
+    level = np.log(np.mean(np.exp(sound)) / np.mean(np.exp(other))) - snr_db * np.log(10.0) / 10.0
+    both: NDArray[np.float32] = np.logaddexp(sound, other + np.float32(level)) / SPREAD
+    return both
 
 
 def _by_word(stops: Clips) -> list[_ByEngine]:

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from training.voices.phones import PHONES
 from vla_deploy.speech.stop_words.features import BANDS, STRIDE
 
-CHANNELS: Final = 256
+CHANNELS: Final = 160
 FIRST_TAPS: Final = 5
 TAPS: Final = 5
 DILATIONS: Final = (1, 1, 2, 2, 4, 4, 4)
@@ -20,24 +20,24 @@ REACH: Final = FIRST_TAPS + STRIDE * (TAPS - 1) * sum(DILATIONS)
 """Frames in that one frame out looks at."""
 
 
+def _convolution(channels: int, taps: int, **how: int) -> nn.Conv2d:
+    """Return a convolution over time; the kernels for two dimensions are several times quicker."""
+    across = {name: (1, count) for name, count in how.items()}
+    return nn.Conv2d(channels, CHANNELS, (1, taps), bias=False, **across)
+
+
 class Block(nn.Module):
-    """Mix over time channel by channel, then over channels, and add it to what came in."""
+    """Mix over time and channels, and add it to what came in."""
 
     def __init__(self, dilation: int) -> None:
         super().__init__()
         self.cut = (TAPS - 1) * dilation
-        self.over_time = nn.Conv1d(
-            CHANNELS, CHANNELS, TAPS, dilation=dilation, groups=CHANNELS, bias=False
-        )
-        self.norm_time = nn.BatchNorm1d(CHANNELS)
-        self.over_channels = nn.Conv1d(CHANNELS, CHANNELS, 1, bias=False)
-        self.norm_channels = nn.BatchNorm1d(CHANNELS)
+        self.mix = _convolution(CHANNELS, TAPS, dilation=dilation)
+        self.norm = nn.BatchNorm2d(CHANNELS)
 
     def forward(self, x: Tensor) -> Tensor:
         """Return fewer frames than came in: those whose past was whole."""
-        mixed = torch.relu(self.norm_time(self.over_time(x)))
-        mixed = self.norm_channels(self.over_channels(mixed))
-        return torch.relu(mixed + x[:, :, self.cut :])
+        return torch.relu(self.norm(self.mix(x)) + x[..., self.cut :])
 
 
 class StopNet(nn.Module):
@@ -50,23 +50,27 @@ class StopNet(nn.Module):
     def __init__(self, words: int) -> None:
         super().__init__()
         self.first = nn.Sequential(
-            nn.Conv1d(BANDS, CHANNELS, FIRST_TAPS, stride=STRIDE, bias=False),
-            nn.BatchNorm1d(CHANNELS),
+            _convolution(BANDS, FIRST_TAPS, stride=STRIDE),
+            nn.BatchNorm2d(CHANNELS),
             nn.ReLU(),
         )
         self.blocks = nn.Sequential(*(Block(dilation) for dilation in DILATIONS))
-        self.last = nn.Conv1d(CHANNELS, 1 + words, 1)
-        self.phones = nn.Conv1d(CHANNELS, len(PHONES), 1)
+        self.last = nn.Conv2d(CHANNELS, 1 + words, 1)
+        self.phones = nn.Conv2d(CHANNELS, len(PHONES), 1)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Return the logits."""
-        logits: Tensor = self.last(self.blocks(self.first(frames)))
-        return logits
+        logits: Tensor = self.last(self._states(frames))
+        return logits.squeeze(2)
 
     def with_phones(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Return the logits of words and of phones (batch, phones, n)."""
-        states = self.blocks(self.first(frames))
-        return self.last(states), self.phones(states)
+        states = self._states(frames)
+        return self.last(states).squeeze(2), self.phones(states).squeeze(2)
+
+    def _states(self, frames: Tensor) -> Tensor:
+        states: Tensor = self.blocks(self.first(frames.unsqueeze(2)))
+        return states
 
 
 TEMPERATURE: Final = 3.0

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from training.stop_words.corpus import Clips
 from training.stop_words.picking import pick
 from training.voices.clip import RATE_HZ
+from vla_deploy.speech.stop_words.features import log_mel
 
 Sound = NDArray[np.float32]
 BANK_S: Final = 60
 _TAIL_S: Final = 0.6
+_LEVEL: Final = 0.05
 
 
 class NoiseBank:
@@ -27,13 +29,26 @@ class NoiseBank:
             _motors(count, random),
             _knocks(count, random),
         ]
-        self._sounds = [sound / np.sqrt(np.mean(sound**2)) for sound in sounds]
+        self.sounds = [sound / np.sqrt(np.mean(sound**2)) for sound in sounds]
 
     def take(self, count: int, random: np.random.Generator) -> Sound:
         """Return a stretch of one kind, of mean power 1 over the whole bank's minute."""
-        sound = pick(self._sounds, random)
+        sound = pick(self.sounds, random)
         start = int(random.integers(len(sound) - count))
         return sound[start : start + count]
+
+
+class NoiseFrames:
+    """Hold the same noises as frames, for stretches that are frames already."""
+
+    def __init__(self, bank: NoiseBank) -> None:
+        self._noises = [log_mel(np.float32(_LEVEL) * sound) for sound in bank.sounds]
+
+    def take(self, count: int, random: np.random.Generator) -> NDArray[np.float32]:
+        """Return so many frames of one kind."""
+        frames: NDArray[np.float32] = pick(self._noises, random)
+        start = int(random.integers(len(frames) - count))
+        return frames[start : start + count]
 
 
 def in_a_room(sound: Sound, random: np.random.Generator) -> Sound:

@@ -15,13 +15,13 @@ class Settings:
     name: str
     seed: int = 0
     scale: float = 1.0
-    cpu_minutes: float = 10.0
-    fresh: int = 4
-    seen: int = 12
+    cpu_minutes: float = 60.0
+    fresh: int = 2
+    seen: int = 18
     stretch_s: float = 7.5
     learning_rate: float = 3e-3
     judged_hours: float = 3.0
-    judged_stops: int = 1000
+    judged_stops: int = 400
     start_from: Path | None = None
     """The exported model to go on from, else from random weights."""
 

@@ -6,18 +6,29 @@ import shutil
 from pathlib import Path
 from typing import Final
 
+from training.stop_words.corpus import HELD
+from training.stop_words.evaluation import METRICS, chosen, heard_by
+from training.stop_words.export import FILE
+from training.stop_words.settings import Settings
+
 SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "stop_words"
-NAMES: Final = ("stop_words.onnx", "metrics.json", "card.md", "model.toml")
+NAMES: Final = (FILE, METRICS, "card.md", "model.toml")
 _LOG = logging.getLogger(__name__)
 
 
-def ship(models: Path, place: Path = SHIPPED) -> bool:
+def ship(out: Path, models: Path, settings: Settings, place: Path = SHIPPED) -> bool:
     """Copy the files of a model; return whether it was done.
+
+    The one that is there hears the clips that chose the new one's thresholds, and gets those that
+    would serve it best: what either would miss at as many false alarms is compared.
 
     Raises:
         FileNotFoundError: the model is not complete.
     """
-    new, old = _missed(models), _missed(place) if (place / "metrics.json").exists() else 1.0
+    new = json.loads((models / METRICS).read_text(encoding="utf-8"))["at"]["low"]["missed_mean"]
+    old = 1.0
+    if (place / FILE).exists():
+        old = chosen(heard_by(place / FILE, out, HELD, settings))["at"]["low"]["missed_mean"]
     if new >= old:
         _LOG.warning("not shipped: it misses %.4f of the stops, that of %s %.4f", new, place, old)
         return False
@@ -26,9 +37,3 @@ def ship(models: Path, place: Path = SHIPPED) -> bool:
         shutil.copyfile(models / name, place / name)
     _LOG.info("shipped to %s: it misses %.4f of the stops, before %.4f", place, new, old)
     return True
-
-
-def _missed(models: Path) -> float:
-    """Return the share of stops missed in noise at 10 dB, at the normal threshold."""
-    metrics = json.loads((models / "metrics.json").read_text(encoding="utf-8"))
-    return float(metrics["at"]["normal"]["missed_ratio"]["10"]["all"])

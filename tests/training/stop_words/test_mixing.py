@@ -6,11 +6,11 @@ import pytest
 pytest.importorskip("torch")
 
 from training.stop_words.corpus import Said
-from training.stop_words.mixing import IGNORED, PHONE_AGO_S, Mixer, Stretch
+from training.stop_words.mixing import IGNORED, MAX_HARD, PHONE_AGO_S, Mixer, Stretch, varied
 from training.stop_words.network import REACH
 from training.voices.clip import RATE_HZ
 from training.voices.phones import NUMBERS
-from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW
+from vla_deploy.speech.stop_words.features import BANDS, HOP, STRIDE, WINDOW
 
 CLIP_S = 1.0
 
@@ -30,6 +30,15 @@ class Silence:
     def take(self, count: int, random: np.random.Generator) -> np.ndarray:
         """Return nothing to hear."""
         return np.zeros(count, np.float32)
+
+
+class Hum:
+    """Add frames of one tone."""
+
+    def take(self, count: int, random: np.random.Generator) -> np.ndarray:
+        """Return frames with one loud band."""
+        loud = np.where(np.arange(BANDS) == 7, 0.5, -2.0).astype(np.float32)
+        return np.tile(loud, (count, 1))
 
 
 def said(engine: str, phones: list[tuple[str, float]], word: int = 0) -> Said:
@@ -80,3 +89,28 @@ def test_engines_with_few_clips_are_heard_as_often_as_those_with_many() -> None:
         int(n) for seed in range(40) for n in np.unique(stretch(others, seed).others) if n >= 0
     ]
     assert 0.3 < np.mean(np.array(heard) == 60) < 0.9
+
+
+def test_a_stretch_that_is_varied_sounds_otherwise_and_says_the_same() -> None:
+    made = stretch(Clips([said("espeak", [("f", 0.0)])]))
+    before = made.frames.copy()
+    some = [varied(made, Hum(), np.random.default_rng(seed)) for seed in range(8)]
+    assert np.array_equal(made.frames, before), "the stretch itself is shown again"
+    for one in some:
+        assert one.frames.shape == before.shape
+        assert one.frames.dtype == np.float32
+        assert np.isfinite(one.frames).all()
+        assert not np.allclose(one.frames, before)
+        assert one.labels is made.labels
+    assert len({float(one.frames.mean()) for one in some}) == len(some)
+
+
+def test_a_clip_that_fools_often_is_remembered_once_and_the_oldest_forgotten() -> None:
+    one = Clips([said("espeak", [("f", 0.0)], word) for word in (1, 2, 3)])
+    mixer = Mixer(one, one, Silence(), 6.0)
+    mixer.remember([4, 4, 5])
+    mixer.remember([5, 6])
+    assert mixer.hard == [5, 6, 4]
+    mixer.remember(list(range(100, 100 + MAX_HARD)))
+    assert len(mixer.hard) == MAX_HARD
+    assert 4 not in mixer.hard

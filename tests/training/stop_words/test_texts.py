@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from training.stop_words.stop_phrases import stop_phrases
-from training.stop_words.texts import WORDS, is_clean, other_talk
+from training.stop_words.texts import WORDS, Other, is_clean, other_talk
 
 
 @pytest.mark.parametrize(
@@ -21,10 +21,12 @@ def test_forms_of_a_stop_word_are_clean(text: str) -> None:
 
 def test_other_talk_is_clean_and_as_much_as_asked_for() -> None:
     words = ["apple", "doorstop", "stopgap"]
-    talk = other_talk(300, np.random.default_rng(0), words, lambda _: "rein a horse")
+    example = Other(text="rein a horse", is_ordinary=True)
+    talk = other_talk(300, np.random.default_rng(0), words, lambda _: example)
     assert len(talk) == 300
-    assert "rein a horse" in talk
-    assert all(map(is_clean, talk))
+    assert example in talk
+    assert all(is_clean(one.text) for one in talk)
+    assert 0.5 < np.mean([one.is_ordinary for one in talk]) < 0.8
 
 
 @pytest.mark.parametrize("word", WORDS)

@@ -21,7 +21,8 @@ STRIDE: Final = 2
 _FFT: Final = 512
 _LOW_HZ, _HIGH_HZ = 80.0, 7_600.0
 _FLOOR: Final = np.float32(1e-6)
-_CENTRE, _SPREAD = np.float32(-4.0), np.float32(4.0)
+_CENTRE, SPREAD = np.float32(-4.0), np.float32(4.0)
+"""A value is the logarithm of a band's power, less the one and divided by the other."""
 
 
 class LogMelStream:
@@ -56,13 +57,13 @@ def log_mel(sound: Sound) -> Frames:
 
 def silence(count: int) -> Frames:
     """Return the frames of digital silence."""
-    return np.full((count, BANDS), (np.log(_FLOOR) - _CENTRE) / _SPREAD, np.float32)
+    return np.full((count, BANDS), (np.log(_FLOOR) - _CENTRE) / SPREAD, np.float32)
 
 
 def _log_mel(windows: Sound) -> Frames:
     spectrum = np.fft.rfft(windows * _HANN, _FFT)
     power = (spectrum.real**2 + spectrum.imag**2).astype(np.float32)
-    frames: Frames = (np.log(power @ _MEL + _FLOOR) - _CENTRE) / _SPREAD
+    frames: Frames = (np.log(power @ _MEL + _FLOOR) - _CENTRE) / SPREAD
     return frames
 
 
@@ -73,12 +74,14 @@ def _mel_of(hz: ArrayLike) -> NDArray[np.float64]:
 def _mel_matrix() -> NDArray[np.float32]:
     """Return triangles that are equally wide in mel, of shape (bins, `BANDS`)."""
     bins = _mel_of(np.fft.rfftfreq(_FFT, 1.0 / RATE_HZ))
-    edges = np.linspace(_mel_of(_LOW_HZ), _mel_of(_HIGH_HZ), BANDS + 2)
-    low, middle, high = edges[:-2], edges[1:-1], edges[2:]
+    low, middle, high = _EDGES[:-2], _EDGES[1:-1], _EDGES[2:]
     up = (bins[:, None] - low) / (middle - low)
     down = (high - bins[:, None]) / (high - middle)
     return np.clip(np.minimum(up, down), 0.0, None).astype(np.float32)
 
 
+_EDGES: Final = np.linspace(_mel_of(_LOW_HZ), _mel_of(_HIGH_HZ), BANDS + 2)
+BAND_HZ: Final = 700.0 * (10.0 ** (_EDGES[1:-1] / 2_595.0) - 1.0)
+"""The middle of each band."""
 _HANN: Final = np.hanning(WINDOW).astype(np.float32)
 _MEL: Final = _mel_matrix()
