@@ -70,7 +70,10 @@ class Measurer:
     def _cpu_ratio(self, process: str) -> float | None:
         newest = self._recent[-1]
         oldest = next((one for one in self._recent if process in one.usages), newest)
-        elapsed_s = (newest.stamp_ns - oldest.stamp_ns) / NS_PER_S
+        # A twin's time may be slower or faster than the wall's. What is done by either of them is
+        # no more per second than on a robot, where both are one.
+        elapsed_ns = max(newest.stamp_ns - oldest.stamp_ns, newest.wall_ns - oldest.wall_ns)
+        elapsed_s = elapsed_ns / NS_PER_S
         if process not in newest.usages or elapsed_s <= 0.0:
             return None
         return (newest.usages[process].cpu_s - oldest.usages[process].cpu_s) / elapsed_s

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from drivers.clock import Clock
+from drivers.clock import Clock, MonotonicClock
 from platforms import Profile
 from platforms.probes import ProbeSet, open_probes
 from vla_deploy.ipc import ClaimBook, SharedSpace
@@ -35,7 +35,7 @@ def open_keeper(
         profile,
         space,
         clock,
-        BackgroundSampler(probes, clock),
+        BackgroundSampler(probes, clock, MonotonicClock()),
         Emergencies(partial(critical_trips_c, probe_root)),
         Enforcer(CgroupTree(realtime=profile().realtime_priority > 0)),
         ClaimBook(space, clock),

@@ -35,9 +35,11 @@ class Snapshot:
     """Carry what was measured in one round; `pids` are the processes that ran then.
 
     `peak_memory_mb` is of all together since the start, `memory_kind` says how it was measured.
+    `wall_ns` is the wall clock's time at `stamp_ns`, which is by the clock of the run.
     """
 
     stamp_ns: int
+    wall_ns: int
     readings: Mapping[str, Reading]
     usages: Mapping[str, Usage]
     pids: Mapping[str, int]
@@ -79,10 +81,15 @@ class BackgroundSampler:
     """
 
     def __init__(
-        self, open_probes: Callable[[], Probes], clock: Clock, period_s: float = SAMPLE_PERIOD_S
+        self,
+        open_probes: Callable[[], Probes],
+        clock: Clock,
+        wall: Clock,
+        period_s: float = SAMPLE_PERIOD_S,
     ) -> None:
         self._open_probes = open_probes
         self._clock = clock
+        self._wall = wall
         self._period_s = period_s
         self._meter = UsageMeter(clock.now_ns())
         self._pids: Mapping[str, int] = {}
@@ -142,10 +149,11 @@ class BackgroundSampler:
             _log.warning("budgets: nothing was measured this time: %s", failure, exc_info=error)
 
     def _sample(self, probes: Probes) -> Snapshot:
-        pids, stamp_ns = self._pids, self._clock.now_ns()
+        pids, stamp_ns, wall_ns = self._pids, self._clock.now_ns(), self._wall.now_ns()
         usages = self._meter.sample(pids, stamp_ns)
         return Snapshot(
             stamp_ns=stamp_ns,
+            wall_ns=wall_ns,
             readings=probes.read(),
             usages=usages,
             pids=pids,

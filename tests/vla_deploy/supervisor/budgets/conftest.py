@@ -60,6 +60,8 @@ class World:
         self.readings: dict[str, float | None] = {}
         self.memory_mb = dict.fromkeys(self.pids, 50.0)
         self.cpu_ratio = dict.fromkeys(self.pids, 0.1)
+        self.wall_ratio = 1.0
+        """Seconds of the wall clock in one of the run's."""
         self.running = dict(self.pids)
         self.restarted: list[str] = []
         self._cpu_s = dict.fromkeys(self.pids, 0.0)
@@ -96,6 +98,7 @@ class World:
             self._cpu_s[name] += self.cpu_ratio[name] / 2
         return Snapshot(
             stamp_ns=self.clock.ns,
+            wall_ns=round(self.wall_ratio * self.clock.ns),
             readings={
                 name: Reading(name=name, value=value, unit="", reason="asleep" * (value is None))
                 for name, value in self.readings.items()

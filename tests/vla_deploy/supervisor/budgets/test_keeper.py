@@ -67,6 +67,15 @@ def test_all_is_given_back_when_the_hog_behaves_again(world):
 _COUNTED = {"taken", "undone", "slow", "smaller_model", "restart"}
 
 
+@pytest.mark.parametrize(("wall_ratio", "told"), [(1.0, 0.6), (3.0, 0.2), (0.2, 0.6)])
+def test_cpu_is_told_by_whichever_clock_has_gone_further(world, wall_ratio, told):
+    world.wall_ratio = wall_ratio
+    world.cpu_ratio["perception"] = 0.6
+    world.go(5)
+    row = row_of(world.cell("budget"), "cpu_ratio", "perception")
+    assert row["measured"] == pytest.approx(told)
+
+
 def test_a_cpu_hog_is_judged_by_the_mean_of_the_last_moments(world):
     world.go(5)
     world.cpu_ratio["perception"] = 3.0

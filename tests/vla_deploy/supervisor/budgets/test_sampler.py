@@ -45,7 +45,7 @@ def board() -> Board:
 
 
 def test_a_round_that_fails_is_logged_and_counted_and_the_next_one_is_tried(board, caplog):
-    sampler = BackgroundSampler(lambda: board, MonotonicClock(), period_s=0.001)
+    sampler = BackgroundSampler(lambda: board, MonotonicClock(), MonotonicClock(), period_s=0.001)
     assert board.enough.wait(10.0)
     sampler.close()
     newest = sampler.latest()
@@ -60,7 +60,7 @@ def test_a_round_that_fails_is_logged_and_counted_and_the_next_one_is_tried(boar
 
 def test_a_late_reader_gets_every_round(board):
     board.errors.clear()
-    sampler = BackgroundSampler(lambda: board, MonotonicClock(), period_s=0.001)
+    sampler = BackgroundSampler(lambda: board, MonotonicClock(), MonotonicClock(), period_s=0.001)
     assert board.enough.wait(10.0)
     sampler.close()
     every = sampler.since(0)
