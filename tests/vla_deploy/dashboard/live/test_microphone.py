@@ -172,11 +172,11 @@ def test_a_flood_is_refused_after_a_second_and_a_half_of_sound(rig: Rig, run: An
 def test_whoever_sends_nothing_loses_the_floor(
     rig: Rig, run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(microphone, "SILENT_S", 0.05)
-
     async def talk(url: str) -> None:
         async with connect(url) as client:
             await begin(client)
+            monkeypatch.setattr(microphone, "SILENT_S", 0.05)
+            await client.send(bytes(640))  # the wait for it began before, the next one is short
             assert (await end_of(client))[0] == 4408
 
     run(talk)
