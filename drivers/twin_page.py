@@ -166,15 +166,9 @@ STOPPED: Final = frozenset("Tt")
 
 def process_state(pid: int) -> str:
     """Return the state of a process as proc_pid_stat(5) has it, "X" for one that is no more."""
+    # Unbuffered and without a Path: the twin asks hundreds of times a second.
     try:
-        handle = os.open(
-            f"/proc/{pid}/stat", os.O_RDONLY
-        )  # the twin asks hundreds of times a second
+        with open(f"/proc/{pid}/stat", "rb", buffering=0) as file:  # noqa: PTH123
+            return chr(file.read(512).rpartition(b") ")[2][0])
     except OSError:
         return "X"
-    try:
-        return chr(os.read(handle, 512).rpartition(b") ")[2][0])
-    except (OSError, IndexError):
-        return "X"
-    finally:
-        os.close(handle)

@@ -1,6 +1,5 @@
 """Run the real processes on a twin as a user does, and talk to them by the command line."""
 
-import contextlib
 import json
 import os
 import shutil
@@ -22,7 +21,7 @@ from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from sim_twin.truth import fastest_joint
 from vla_deploy.cli.session import Session
-from vla_deploy.supervisor.orphans import run_id_of
+from vla_deploy.supervisor.orphans import end_leftovers, run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
 _POLL_NS: Final = NS_PER_S // 50
@@ -241,9 +240,7 @@ class ProcessStack:
         self.process.kill()
         self._wait()
         members = self.members()
-        for member in members:
-            with contextlib.suppress(psutil.NoSuchProcess):
-                member.kill()
+        end_leftovers(self.run_dir.name)
         psutil.wait_procs(members, timeout=_END_S)
         shutil.rmtree((self.run_dir / "ipc").resolve(), ignore_errors=True)
 
