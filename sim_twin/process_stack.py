@@ -165,6 +165,19 @@ class ProcessStack:
         row: dict[str, Any] = rows[name]
         return row
 
+    def is_back(self, name: str, pid: int, timeout_s: float = 60.0) -> bool:
+        """Return whether another process took the place of `pid` in time, and is ready.
+
+        Raises:
+            KeyError: there is no such process.
+        """
+
+        def is_ready() -> bool:
+            row = self.row(name)
+            return row["pid"] not in (pid, None) and row["state"] == "ready"
+
+        return self.wait_until(is_ready, timeout_s)
+
     def kill(self, name: str) -> None:
         """End a process as `kill -9` does.
 

@@ -91,8 +91,7 @@ def test_the_robot_drives_on_without_it_and_its_history_is_found_again(
     command_id = page.drive("turn left 180 degrees")
     stack.kill("dashboard")
     assert stack.wait_until(lambda: stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
-    assert stack.wait_until(lambda: stack.row("dashboard")["pid"] not in (pid, None))
-    assert stack.wait_until(lambda: stack.row("dashboard")["state"] == "ready", 60.0)
+    assert stack.is_back("dashboard", pid)
     assert Page(stack).url == page.url
     is_done = stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]

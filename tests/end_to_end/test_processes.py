@@ -27,15 +27,6 @@ class Run(ProcessStack):
     def pids(self) -> dict[str, int]:
         return {row["name"]: row["pid"] for row in self.document("process_table")["processes"]}
 
-    def is_back(self, name: str, pid: int, timeout_s: float = 60.0) -> bool:
-        """Return whether another process took the place of `pid` in time, and is ready."""
-
-        def is_ready() -> bool:
-            row = self.row(name)
-            return row["pid"] not in (pid, None) and row["state"] == "ready"
-
-        return self.wait_until(is_ready, timeout_s)
-
     def drive(self) -> "subprocess.Popen[str]":
         saying = self.begin("say", DRIVE)
         moves = self.wait_until(lambda: self.fastest_rad_s() > MOVING_RAD_S)
