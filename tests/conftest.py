@@ -52,11 +52,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection() -> None:
+    """Let no search for garbage run over ten thousand tests while they are gathered."""
+    gc.disable()
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
     """Keep ten thousand collected tests out of every later collection of garbage."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 TREES = Path(__file__).parent / "platforms" / "trees"

@@ -1,6 +1,7 @@
 """The dashboard commands and stops the robot, and the robot does not need the dashboard."""
 
 import json
+import socket
 import tempfile
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -11,6 +12,8 @@ from urllib.parse import urlsplit
 import pytest
 
 from sim_twin.process_stack import ProcessStack
+from vla_deploy.dashboard.settings import SETTINGS_FILE
+from vla_deploy.state_dir import config_dir_of
 
 pytestmark = [
     pytest.mark.gl,
@@ -22,11 +25,21 @@ MOVING_RAD_S = 1.0
 STANDSTILL_RAD_S = 0.05
 
 
+def unused_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
 @pytest.fixture(scope="module")
 def stack(coarse: str) -> Iterator[ProcessStack]:
     """The real processes, armed: each test leaves them so, but for the last."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
-        stack = ProcessStack(Path(folder) / "base", "--fast", "--profile", coarse)
+        base = Path(folder) / "base"
+        settings = config_dir_of(base) / SETTINGS_FILE
+        settings.parent.mkdir(parents=True)
+        # Of its own: the usual one would be taken by another robot while its dashboard is away.
+        settings.write_text(f"port = {unused_port()}\n", encoding="utf-8")
+        stack = ProcessStack(base, "--fast", "--profile", coarse)
         try:
             stack.wait_until_armed()
             yield stack

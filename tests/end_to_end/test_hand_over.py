@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from platforms import load_profile
 from sim_twin.stack import LockstepStack
+from vla_deploy.skills.node import ExecutorNode
 
 pytestmark = pytest.mark.gl
 
@@ -49,9 +51,20 @@ def test_a_cup_that_nobody_takes_is_kept(coarse_at_table: LockstepStack) -> None
 
 
 @pytest.mark.timeout(240)
-def test_a_cup_is_kept_until_somebody_pulls_at_it(coarse_at_table: LockstepStack) -> None:
+def test_a_cup_is_kept_over_a_restart_of_the_executor_and_until_somebody_pulls_at_it(
+    coarse_at_table: LockstepStack, coarse: str
+) -> None:
     stack = coarse_at_table
     assert stack.say("pick up the red cup")["success"]
+    stack.lockstep.kill(stack.executor)
+    rate_hz = load_profile(coarse).executor_rate_hz
+    stack.lockstep.add(ExecutorNode(stack.lockstep.context, stack.robot, rate_hz))
+    stack.lockstep.run_for(1.0)
+    sample = stack.space.cell_reader("executor_status").latest()
+    assert sample is not None
+    assert sample.document()["holding"] == {"left": "cup", "right": None}
+    assert stack.lockstep.truth()["held"] == [CUP]
+
     command = stack.give(text="hand it over")
     stack.lockstep.run_for(6.0)
     _knock(stack)

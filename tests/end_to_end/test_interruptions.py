@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from platforms import load_profile
 from sim_twin.stack import LockstepStack
-from vla_deploy.skills.node import ExecutorNode
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(240)]
 
@@ -90,17 +88,3 @@ def test_fingers_that_close_on_nothing_are_reported(coarse_at_table: LockstepSta
     tuck = stack.robot.poses["tuck"]
     joints = stack.lockstep.truth()["joints"]
     assert all(joints[name]["position"] == pytest.approx(tuck[name], abs=0.1) for name in tuck)
-
-
-def test_a_restarted_executor_recalls_what_the_hand_holds(coarse_at_table: LockstepStack) -> None:
-    stack = coarse_at_table
-    assert stack.say("pick up the red cup")["success"]
-    stack.lockstep.kill(stack.executor)
-    rate_hz = load_profile("desktop").executor_rate_hz
-    stack.lockstep.add(ExecutorNode(stack.lockstep.context, stack.robot, rate_hz))
-    stack.lockstep.run_for(1.0)
-    assert holding(stack) == {"left": "cup", "right": None}
-    assert stack.lockstep.truth()["held"] == ["red_cup"]
-    assert stack.say("put it on the coffee table")["success"]
-    assert stack.lockstep.truth()["held"] == []
-    assert stack.lockstep.truth()["objects"]["red_cup"]["position_m"][2] > 0.45

@@ -37,14 +37,15 @@ class Run(ProcessStack):
 class Runs:
     """Hold the run of the test before for the next one, as long as it is as good as new."""
 
-    def __init__(self, base: Path) -> None:
+    def __init__(self, base: Path, profile: str) -> None:
         self._base = base
+        self._profile = profile
         self._run: Run | None = None
 
     def start(self, *options: str) -> Run:
         """Start a run where there was one, which is cut off unless it has ended."""
         self.end()
-        self._run = Run(self._base, "--fast", "--profile", "desktop", *options)
+        self._run = Run(self._base, "--fast", "--profile", self._profile, *options)
         self._run.wait_until_armed()
         return self._run
 
@@ -68,9 +69,9 @@ def is_as_new(run: Run) -> bool:
 
 
 @pytest.fixture(scope="module")
-def runs() -> Iterator[Runs]:
+def runs(coarse: str) -> Iterator[Runs]:
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
-        runs = Runs(Path(folder) / "base")
+        runs = Runs(Path(folder) / "base", coarse)
         yield runs
         runs.end()
 
@@ -111,8 +112,8 @@ def test_bad_requests_are_one_line_each_and_lose_nothing(run: Run, tmp_path: Pat
     assert run.pids() == pids
 
 
-def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run) -> None:
-    profile = load_profile("desktop")
+def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run, coarse: str) -> None:
+    profile = load_profile(coarse)
     pid = run.row("control")["pid"]
     saying = run.drive()
     run.kill("control")

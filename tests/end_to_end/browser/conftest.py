@@ -66,7 +66,7 @@ def stack(chromium: Browser, coarse: str) -> Iterator[ProcessStack]:
             assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0), 60.0)
             yield stack
         finally:
-            stack.close()
+            stack.cut()
 
 
 def add_accounts(base: Path) -> None:
