@@ -60,7 +60,7 @@ def open_planner(
     local: Sequence[BackEnd] = (),
     models_away: Mapping[str, str] | None = None,
 ) -> Planner:
-    """Return a planner for a robot: patterns, cache, models on board, servers, the parser.
+    """Return a planner for a robot: patterns, models on board, servers, the parser.
 
     Of `local` and the servers, in this order, `max_rungs` are taken. `base` is the runtime
     directory, where `servers.toml` lies; `models_away` maps models that could not be opened to the

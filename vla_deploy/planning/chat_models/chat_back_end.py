@@ -180,13 +180,12 @@ class ChatBackEnd(BackEnd):
             raise CannotBeDone(f"{self.name} sees no way to do it: {reason}")
         return answer.plan(request.text)
 
-    def proposal(self, plan: Plan, confidence: float, *, may_be_kept: bool = True) -> Proposal:
+    def proposal(self, plan: Plan, confidence: float) -> Proposal:
         """Return a plan, which is read back where the model is not sure."""
         return Proposal(
             plan=plan,
             back_end=self.name,
             confidence=round(confidence, 3),
             is_unsure=confidence < SURE,
-            may_be_kept=may_be_kept,
             knows_grammar=True,
         )

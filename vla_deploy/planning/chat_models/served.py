@@ -98,8 +98,7 @@ class ServedModel(ChatBackEnd):
         if not found:
             raise failure
         candidate, confidence = elected(found, asked, request)
-        # What was made of an image cannot be compared with later.
-        return self.proposal(candidate.plan, confidence, may_be_kept=self._image(request) is None)
+        return self.proposal(candidate.plan, confidence)
 
     def _planned(self, request: Request, way: str, deadline: Deadline) -> PlanCandidate:
         """Return one plan that may run; a model whose plan is refused is sent the reason, once."""

@@ -254,9 +254,7 @@ class Dialogue:
             )
         )
 
-    def ended(self, command_id: str, success: bool, error: str) -> Turn | None:
-        """Note how a command ended that was carried out, and return its turn if it is known."""
+    def ended(self, command_id: str, success: bool, error: str) -> None:
+        """Note how a command ended that was carried out."""
         outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
         self.conversation = self.conversation.ended(command_id, outcome, error)
-        turns = self.conversation.turns
-        return next((one for one in turns if one.command_id == command_id), None)
