@@ -51,7 +51,6 @@ def planner(tmp_path, loopback, parser):
         profile = tmp_path / "mine.toml"
         profile.write_text(
             f'inherits = "desktop"\n[planning]\nservers = ["bench"]\nwithin_s = {within_s}\n'
-            "candidates = 1\n"
         )
         settings, clock = load_profile(profile).planning, MonotonicClock()
         return open_planner(load_robot("butler"), settings, clock, tmp_path / "base", (parser,))

@@ -7,16 +7,16 @@ import pytest
 
 from vla_deploy.memory import Episode, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
-from vla_deploy.planning.chat_models.local import LocalModel
+from vla_deploy.planning.chat_models.chat_model import LocalModel
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.language_model import LanguageModel
-from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import load_robot
 
 
 @pytest.fixture
 def chat(model: LanguageModel) -> LocalModel:
-    return LocalModel("chat", model, load_robot("butler"))
+    return LocalModel("chat", model, "butler", sorted(load_robot("butler").places), checked)
 
 
 @pytest.fixture
