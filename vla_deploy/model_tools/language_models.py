@@ -80,8 +80,9 @@ def describe(source: LanguageModelSource) -> Manifest:
     names = sorted(path.name for path in source.folder.iterdir() if is_part(path.name))
     missing = [name for name in (GENAI_CONFIG, TOKENIZER, graph) if name not in names]
     if missing:
-        faults = tuple(f"{name} is missing; export the model again" for name in missing)
-        raise ModelFolderInvalid(source.folder, faults)
+        raise ModelFolderInvalid(
+            source.folder, *(f"{name} is missing; export the model again" for name in missing)
+        )
     language = Language(use=Use.CHAT, most_tokens=source.most_tokens)
     return source.manifest(PLANNER, names, language=language)
 

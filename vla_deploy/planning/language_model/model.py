@@ -6,43 +6,66 @@ from pathlib import Path
 from threading import Lock
 from typing import Final
 
-from llguidance import LLTokenizer
-from tokenizers import Tokenizer
+import numpy as np
 
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelMismatch
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.graph_session import GraphSession
-from vla_deploy.inference.language_schema import TOKENIZER
 from vla_deploy.inference.manifest import Language
 from vla_deploy.inference.store import Model
-from vla_deploy.planning.language_model.decoding import (
-    AnswerBounds,
-    Constraint,
-    Decoder,
-    Generated,
-    JsonSchema,
-    generate,
-    grammar_of,
-)
-from vla_deploy.planning.language_model.errors import ModelFolderInvalid
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.language_model.decoding import Constraint, Decoder, JsonSchema, Scores
+from vla_deploy.planning.language_model.errors import AnswerFailed
 from vla_deploy.planning.language_model.model_folder import (
     ChatTemplate,
-    GenaiConfig,
     Message,
     read_genai_config,
+    read_tokenizers,
 )
 
-# Exports pad their vocabulary up to a round number of rows.
-_MOST_PADDING: Final = 1024
+# Tokens of one run. Exports score every token that they read: 3000 of a prompt at once would be
+# gigabytes of scores, of which the last is wanted, and seconds that nothing can break off.
+PIECE_TOKENS: Final = 128
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ModelAnswer(Generated):
-    """Hold a whole answer, and how many runs of the model it took."""
+class AnswerBounds:
+    """Bound an answer: it ends by the deadline, which also a recall ends, and by its length."""
+
+    deadline: Deadline
+    most_tokens: int
+
+    def check(self, count: int) -> None:
+        """Accept an answer that has so many tokens and is not whole yet.
+
+        Raises:
+            AnswerFailed: the deadline passed, nobody waits, or it may not be longer.
+        """
+        if self.deadline.is_recalled:
+            why = "nobody waits for it any more"
+        elif self.deadline.left_s <= 0.0:
+            why = "time is up"
+        elif count >= self.most_tokens:
+            why = "it may have no more"
+        else:
+            return
+        raise AnswerFailed(f"the answer is not whole after {count} tokens: {why}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelAnswer:
+    """Hold a whole answer, and what it cost.
+
+    `chosen` is the log-probability of each token that the model was asked for, among all tokens,
+    also those that the schema forbids: it is low where the model would have said something else.
+    """
 
     text: str
+    chosen: tuple[float, ...]
     prompt_tokens: int
+    reused_tokens: int
+    runs: int
 
 
 class LanguageModel:
@@ -58,8 +81,8 @@ class LanguageModel:
         """
         self.language = language
         self.config = read_genai_config(folder)
-        self.tokenizer, self.guide = _tokenizers(folder, self.config)
-        self._template = ChatTemplate(folder)
+        self.tokenizer, self.guide = read_tokenizers(folder, self.config)
+        self.template = ChatTemplate(folder)
         self._session = GraphSession(folder / self.config.file_name, choice)
         self.decoder = Decoder(self._session, self.config)
         self.notices = self._session.notices
@@ -72,29 +95,57 @@ class LanguageModel:
         """Return the likeliest answer that is JSON of the schema.
 
         Raises:
-            LanguageModelError: there is no whole answer; each kind says why.
+            LanguageModelError: there is no whole answer; says why.
             RunFailed: a run failed.
         """
-        prompt = self.tokenizer.encode(self.prompt(messages), add_special_tokens=False).ids
-        constraint = Constraint(self.guide, grammar_of(schema))
+        text = self.template.prompt(messages)
+        prompt = self.tokenizer.encode(text, add_special_tokens=False).ids
         with self._one_at_a_time:
-            done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
-        return ModelAnswer(
-            text=self.tokenizer.decode(list(done.tokens)),
-            tokens=done.tokens,
-            chosen=done.chosen,
-            prompt_tokens=len(prompt),
-            reused_tokens=done.reused_tokens,
-            runs=done.runs,
-        )
+            return self.generate(prompt, Constraint(self.guide, schema), bounds)
 
-    def prompt(self, messages: Sequence[Message]) -> str:
-        """Return the text that the model is given for messages.
+    def generate(
+        self, prompt: Sequence[int], constraint: Constraint, bounds: AnswerBounds
+    ) -> ModelAnswer:
+        """Answer a prompt by the likeliest token each time, of those that are allowed.
+
+        Forced tokens go in with the next token that the model is asked for, in one run. A long
+        prompt is read piece by piece.
 
         Raises:
-            ModelFolderInvalid: its chat template does not take them.
+            AnswerFailed: there is no whole answer within the bounds.
+            RunFailed: a run failed.
         """
-        return self._template.prompt(messages)
+        reused = self.decoder.keep(prompt)
+        waiting = list(prompt[reused:])
+        tokens: list[int] = []
+        chosen: list[float] = []
+        runs = 0
+        while True:
+            if forced := constraint.forced():
+                constraint.take(forced)
+                tokens += forced
+                waiting += forced
+            if constraint.is_done:
+                break
+            self.decoder.check_room(len(waiting))
+            for begin in range(0, len(waiting), PIECE_TOKENS):
+                bounds.check(len(tokens))
+                scores = self.decoder.feed(waiting[begin : begin + PIECE_TOKENS])
+                runs += 1
+            token, log_probability = _likeliest(scores, constraint)
+            if token in self.config.end_ids:
+                break
+            tokens.append(token)
+            chosen.append(log_probability)
+            waiting = [token]
+            constraint.take(waiting)
+        return ModelAnswer(
+            text=self.tokenizer.decode(tokens),
+            chosen=tuple(chosen),
+            prompt_tokens=len(prompt),
+            reused_tokens=reused,
+            runs=runs,
+        )
 
     def close(self) -> None:
         """Release the memory; an answer after that fails."""
@@ -117,31 +168,10 @@ def open_language_model(model: Model, choice: ModelChoice) -> LanguageModel:
     return LanguageModel(model.folder, language, choice)
 
 
-def _tokenizers(folder: Path, config: GenaiConfig) -> tuple[Tokenizer, LLTokenizer]:
-    file = folder / TOKENIZER
-    try:
-        text = file.read_text(encoding="utf-8")
-        tokenizer = Tokenizer.from_str(text)
-    # tokenizers raises plain Exception for every fault of a file.
-    except Exception as error:
-        raise ModelFolderInvalid(folder, (f"{TOKENIZER}: {error}",)) from error
-    size = tokenizer.get_vocab_size()
-    faults = tuple(_vocabulary_faults(size, config))
-    if faults:
-        raise ModelFolderInvalid(folder, faults)
-    guide = LLTokenizer(text, n_vocab=max(config.vocabulary, size), eos_token=config.end_ids[0])
-    return tokenizer, guide
-
-
-def _vocabulary_faults(size: int, config: GenaiConfig) -> list[str]:
-    """Compare the tokenizer with the decoder: another model's would give nonsense, unnoticed."""
-    faults = []
-    if size > config.vocabulary or config.vocabulary - size > _MOST_PADDING:
-        faults.append(
-            f"{TOKENIZER} has {size} tokens, expected {config.vocabulary} as genai_config.json "
-            "says: it is another model's"
-        )
-    beyond = [one for one in config.end_ids if one >= size]
-    if beyond:
-        faults.append(f"model.eos_token_id: {beyond} are beyond the {size} tokens of {TOKENIZER}")
-    return faults
+def _likeliest(scores: Scores, constraint: Constraint) -> tuple[int, float]:
+    """Return the likeliest token of those allowed, and its log-probability among all."""
+    allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
+    number = int(np.argmax(allowed))
+    highest = float(scores.max())
+    total = highest + float(np.log(np.exp(scores - highest).sum()))
+    return number, float(scores[number]) - total

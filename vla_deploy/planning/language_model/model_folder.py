@@ -1,80 +1,46 @@
-"""Read a model's folder in the layout of onnxruntime-genai: sizes, tensor names, chat template.
+"""Read a model's folder in the layout of onnxruntime-genai: sizes, tokenizer, chat template.
 
-Exports of Llama, Qwen, Phi and others differ in heads, names and end tokens; `genai_config.json`
-holds all of it. Chat templates are programs of the model's author; they run in a sandbox that can
-change nothing.
+Chat templates are programs of the model's author; they run in a sandbox that can change nothing.
 """
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from jinja2 import TemplateError
+from jinja2 import Template, TemplateError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
+from llguidance import LLTokenizer
 from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from tokenizers import Tokenizer
 
-from vla_deploy.inference.language_schema import GENAI_CONFIG
+from vla_deploy.inference.language_schema import GENAI_CONFIG, TOKENIZER
 from vla_deploy.planning.language_model.errors import ModelFolderInvalid
 
 CONFIG: Final = "tokenizer_config.json"
 # Newer exports keep it in a file of its own.
 TEMPLATE: Final = "chat_template.jinja"
+# Exports pad their vocabulary up to a round number of rows.
+_MOST_PADDING: Final = 1024
 Message = Mapping[str, str]
 
-
-def _at(*keys: str, default: Any = ...) -> Any:
-    """Return a field that stands under these keys of the document's `model`."""
-    return Field(default, validation_alias=AliasPath("model", *keys))
-
-
 _Count = Annotated[int, Field(gt=0, strict=True)]
-_TokenId = Annotated[int, Field(ge=0, strict=True)]
 _TokenIds = Annotated[
-    tuple[_TokenId, ...],
+    tuple[Annotated[int, Field(ge=0, strict=True)], ...],
     Field(min_length=1),
     BeforeValidator(lambda given: given if isinstance(given, list) else [given]),
 ]
-_LayerName = Annotated[str, Field(pattern="%d")]
 
 
 class GenaiConfig(BaseModel):
-    """Hold the sizes of a decoder and the names of its tensors.
-
-    `position_ids` is empty where the graph takes none. Tokens in `end_ids` end an answer.
-    """
+    """Hold the sizes of a decoder; tokens in `end_ids` end an answer."""
 
     model_config = ConfigDict(frozen=True)
 
-    vocabulary: _Count = _at("vocab_size")
-    context_tokens: _Count = _at("context_length")
-    end_ids: _TokenIds = _at("eos_token_id")
-    file_name: str = _at("decoder", "filename")
-    head_size: _Count = _at("decoder", "head_size")
-    layers: _Count = _at("decoder", "num_hidden_layers")
-    kv_heads: _Count = _at("decoder", "num_key_value_heads")
-    input_ids: str = _at("decoder", "inputs", "input_ids", default="input_ids")
-    attention_mask: str = _at("decoder", "inputs", "attention_mask", default="attention_mask")
-    position_ids: str = _at("decoder", "inputs", "position_ids", default="")
-    past_key: _LayerName = _at("decoder", "inputs", "past_key_names")
-    past_value: _LayerName = _at("decoder", "inputs", "past_value_names")
-    logits: str = _at("decoder", "outputs", "logits", default="logits")
-    present_key: _LayerName = _at("decoder", "outputs", "present_key_names")
-    present_value: _LayerName = _at("decoder", "outputs", "present_value_names")
-
-    @cached_property
-    def past_names(self) -> tuple[str, ...]:
-        """Return the inputs that hold key and value of each layer in turn."""
-        return self._in_turn(self.past_key, self.past_value)
-
-    @cached_property
-    def present_names(self) -> tuple[str, ...]:
-        """Return the outputs that hold key and value of each layer, in the same order."""
-        return self._in_turn(self.present_key, self.present_value)
-
-    def _in_turn(self, *patterns: str) -> tuple[str, ...]:
-        return tuple(pattern % layer for layer in range(self.layers) for pattern in patterns)
+    vocabulary: _Count = Field(validation_alias=AliasPath("model", "vocab_size"))
+    context_tokens: _Count = Field(validation_alias=AliasPath("model", "context_length"))
+    end_ids: _TokenIds = Field(validation_alias=AliasPath("model", "eos_token_id"))
+    file_name: str = Field(validation_alias=AliasPath("model", "decoder", "filename"))
 
 
 def read_genai_config(folder: Path) -> GenaiConfig:
@@ -83,15 +49,37 @@ def read_genai_config(folder: Path) -> GenaiConfig:
     Raises:
         ModelFolderInvalid: it is missing, is no JSON, or lacks something; all faults are listed.
     """
-    document = _json_object(folder, GENAI_CONFIG)
     try:
-        return GenaiConfig.model_validate(document)
+        return GenaiConfig.model_validate(_json_object(folder, GENAI_CONFIG))
     except ValidationError as error:
-        faults = tuple(
+        faults = (
             f"{GENAI_CONFIG}: {'.'.join(map(str, one['loc']))}: {one['msg']}"
             for one in error.errors(include_url=False)
         )
-        raise ModelFolderInvalid(folder, faults) from error
+        raise ModelFolderInvalid(folder, *faults) from error
+
+
+def read_tokenizers(folder: Path, config: GenaiConfig) -> tuple[Tokenizer, LLTokenizer]:
+    """Return the model's tokenizer, and the same for constraints.
+
+    Raises:
+        ModelFolderInvalid: there is none, or it is another model's: it would give nonsense.
+    """
+    try:
+        text = (folder / TOKENIZER).read_text(encoding="utf-8")
+        tokenizer = Tokenizer.from_str(text)
+    # tokenizers raises plain Exception for every fault of a file.
+    except Exception as error:
+        raise ModelFolderInvalid(folder, f"{TOKENIZER}: {error}") from error
+    size = tokenizer.get_vocab_size()
+    if not 0 <= config.vocabulary - size <= _MOST_PADDING or max(config.end_ids) >= size:
+        raise ModelFolderInvalid(
+            folder,
+            f"{TOKENIZER} has {size} tokens, expected {config.vocabulary} with {config.end_ids} "
+            f"among them as {GENAI_CONFIG} says: it is another model's",
+        )
+    guide = LLTokenizer(text, n_vocab=config.vocabulary, eos_token=config.end_ids[0])
+    return tokenizer, guide
 
 
 class ChatTemplate:
@@ -105,17 +93,19 @@ class ChatTemplate:
         """
         self._folder = folder
         config = _json_object(folder, CONFIG)
-        self._tokens = {
-            name: _text_of(config.get(name))
-            for name in ("bos_token", "eos_token", "pad_token", "unk_token")
-        }
+        self._tokens = {name: _text_of(config.get(name)) for name in ("bos_token", "eos_token")}
         environment = ImmutableSandboxedEnvironment(trim_blocks=True, lstrip_blocks=True)
         environment.globals["raise_exception"] = _refuse
         environment.filters["tojson"] = json.dumps
+        file = folder / TEMPLATE
+        text = file.read_text("utf-8") if file.is_file() else config.get("chat_template")
+        if not isinstance(text, str):
+            fault = f"no chat template in {TEMPLATE} or {CONFIG}; take the model's instruct form"
+            raise ModelFolderInvalid(folder, fault)
         try:
-            self._template = environment.from_string(_template(folder, config))
+            self._template: Template = environment.from_string(text)
         except TemplateError as error:
-            raise ModelFolderInvalid(folder, (f"chat template: {error}",)) from error
+            raise ModelFolderInvalid(folder, f"chat template: {error}") from error
 
     def prompt(self, messages: Sequence[Message]) -> str:
         """Return the text that asks for the answer to the last message.
@@ -129,31 +119,17 @@ class ChatTemplate:
             )
         except (TemplateError, TypeError, KeyError) as error:
             fault = f"chat template does not take these messages: {error}"
-            raise ModelFolderInvalid(self._folder, (fault,)) from error
+            raise ModelFolderInvalid(self._folder, fault) from error
 
 
 def _json_object(folder: Path, name: str) -> Mapping[str, Any]:
     try:
         document = json.loads((folder / name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise ModelFolderInvalid(folder, (f"{name}: {error}",)) from error
+        raise ModelFolderInvalid(folder, f"{name}: {error}") from error
     if not isinstance(document, dict):
-        raise ModelFolderInvalid(folder, (f"{name}: expected an object",))
+        raise ModelFolderInvalid(folder, f"{name}: expected an object")
     return document
-
-
-def _template(folder: Path, config: Mapping[str, Any]) -> str:
-    file = folder / TEMPLATE
-    if file.is_file():
-        return file.read_text(encoding="utf-8")
-    given = config.get("chat_template")
-    if isinstance(given, list):  # several by name, as of models that take tools
-        named = {one.get("name"): one.get("template") for one in given if isinstance(one, dict)}
-        given = named.get("default")
-    if not isinstance(given, str):
-        fault = f"no chat template in {TEMPLATE} or {CONFIG}; take the model's instruct form"
-        raise ModelFolderInvalid(folder, (fault,))
-    return given
 
 
 def _text_of(token: object) -> str:
