@@ -197,7 +197,7 @@ def _covered(parsed: Parsed) -> frozenset[str]:
         word
         for _, span in copied_spans(parsed.steps, parsed.words)
         if span is not None
-        for word in (*span.spoken, *(parsed.words[place] for place in span.places))
+        for word in span.spoken
     )
     stood_for = (
         word
