@@ -8,6 +8,14 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from platforms import ModelChoice
+from vla_deploy.inference.errors import ModelMismatch
+from vla_deploy.inference.language_model import (
+    AnswerBounds,
+    LanguageModel,
+    ModelAnswer,
+    open_language_model,
+)
+from vla_deploy.inference.language_model.model_folder import CONFIG, TEMPLATE, read_genai_config
 from vla_deploy.inference.language_schema import GENAI_CONFIG, PLANNER, TOKENIZER
 from vla_deploy.inference.manifest import Language, Manifest, Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
@@ -15,14 +23,6 @@ from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
-from vla_deploy.planning.language_model import (
-    AnswerBounds,
-    LanguageModel,
-    ModelAnswer,
-    ModelFolderInvalid,
-    open_language_model,
-)
-from vla_deploy.planning.language_model.model_folder import CONFIG, TEMPLATE, read_genai_config
 
 _PARTS: Final = (GENAI_CONFIG, TOKENIZER, CONFIG, TEMPLATE)
 _WEIGHTS: Final = (".onnx", ".onnx.data", ".onnx_data")
@@ -61,7 +61,7 @@ def add_language_model(
 
     Raises:
         ModelUnknown: the name cannot be used, or is taken and `replace` is not set.
-        ModelFolderInvalid: files are missing, or do not fit together.
+        ModelMismatch: files are missing, or do not fit together.
         InferenceError: it does not run; each kind says why.
         OSError: the model cannot be stored.
     """
@@ -73,16 +73,15 @@ def describe(source: LanguageModelSource) -> Manifest:
     """Return the manifest for a folder of files.
 
     Raises:
-        ModelFolderInvalid: one that is needed is missing, or the configuration has faults.
+        ModelMismatch: one that is needed is missing, or the configuration has faults.
         ModelFileSpoiled: one cannot be read.
     """
     graph = read_genai_config(source.folder).file_name
     names = sorted(path.name for path in source.folder.iterdir() if is_part(path.name))
     missing = [name for name in (GENAI_CONFIG, TOKENIZER, graph) if name not in names]
     if missing:
-        raise ModelFolderInvalid(
-            source.folder, *(f"{name} is missing; export the model again" for name in missing)
-        )
+        faults = tuple(f"{name} is missing; export the model again" for name in missing)
+        raise ModelMismatch(str(source.folder), faults)
     language = Language(use=Use.CHAT, most_tokens=source.most_tokens)
     return source.manifest(PLANNER, names, language=language)
 

@@ -10,6 +10,7 @@ from drivers.clock import Clock, MonotonicClock
 from platforms import ModelChoice, Profile
 from platforms.profile import PlanningSettings
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.language_model import open_language_model
 from vla_deploy.inference.manifest import Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, tier_name
@@ -21,7 +22,6 @@ from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.chat_model import LocalModel, ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
-from vla_deploy.planning.language_model import open_language_model
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import RobotDescription
 

@@ -15,9 +15,9 @@ from training.planner.files import MEAN_OF, TOKENIZER  # noqa: E402
 from training.planner.going_on import NEW_SHARE, mean  # noqa: E402
 from training.planner.settings import SIZES  # noqa: E402
 from training.planner.training import train  # noqa: E402
+from vla_deploy.inference.language_model import LanguageModel  # noqa: E402
 from vla_deploy.inference.manifest import Language, Use  # noqa: E402
 from vla_deploy.inference.opening import PLAIN_CHOICE  # noqa: E402
-from vla_deploy.planning.language_model import LanguageModel  # noqa: E402
 
 
 def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells(

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.inference.errors import ModelFileSpoiled, ModelUnknown
+from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ModelUnknown
+from vla_deploy.inference.language_model import open_language_model
 from vla_deploy.inference.manifest import Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
@@ -17,7 +18,6 @@ from vla_deploy.model_tools.language_models import (
     bench,
 )
 from vla_deploy.model_tools.verifying import verify
-from vla_deploy.planning.language_model import ModelFolderInvalid, open_language_model
 
 
 @pytest.fixture(params=["llama", "qwen2"])
@@ -58,7 +58,7 @@ def test_nothing_is_kept_of_a_folder_that_is_not_whole(
     with pytest.raises(ModelFileSpoiled):
         add_language_model(shelf.store, source(half), clock=shelf.clock)
     graph.unlink()
-    with pytest.raises(ModelFolderInvalid, match=r"model\.onnx is missing"):
+    with pytest.raises(ModelMismatch, match=r"model\.onnx is missing"):
         add_language_model(shelf.store, source(half), clock=shelf.clock)
     assert shelf.store.names() == ()
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.language_model import AnswerBounds, LanguageModel
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.chat import Chat, Message, Role
@@ -20,7 +21,6 @@ from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
-from vla_deploy.planning.language_model import AnswerBounds, LanguageModel
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
 
 SURE: Final = 0.75

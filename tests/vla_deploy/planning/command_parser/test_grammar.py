@@ -11,10 +11,10 @@ from tokenizers.pre_tokenizers import ByteLevel
 from tokenizers.trainers import BpeTrainer
 
 from training.planner.clause import answer_text
+from vla_deploy.inference.errors import AnswerFailed
+from vla_deploy.inference.language_model.decoding import Constraint
 from vla_deploy.planning.command_parser.grammar import STEPS, answer_schema
 from vla_deploy.planning.command_parser.wording import foreign_share, plain_words
-from vla_deploy.planning.language_model import AnswerFailed
-from vla_deploy.planning.language_model.decoding import Constraint
 
 
 @pytest.fixture(scope="module")

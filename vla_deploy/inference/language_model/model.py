@@ -9,20 +9,19 @@ from typing import Final
 import numpy as np
 
 from platforms import ModelChoice
-from vla_deploy.inference.errors import ModelMismatch
+from vla_deploy.inference.errors import AnswerFailed, ModelMismatch
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.graph_session import GraphSession
-from vla_deploy.inference.manifest import Language
-from vla_deploy.inference.store import Model
-from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.language_model.decoding import Constraint, Decoder, JsonSchema, Scores
-from vla_deploy.planning.language_model.errors import AnswerFailed
-from vla_deploy.planning.language_model.model_folder import (
+from vla_deploy.inference.language_model.decoding import Constraint, Decoder, JsonSchema, Scores
+from vla_deploy.inference.language_model.model_folder import (
     ChatTemplate,
     Message,
     read_genai_config,
     read_tokenizers,
 )
+from vla_deploy.inference.manifest import Language
+from vla_deploy.inference.store import Model
+from vla_deploy.model_servers.deadline import Deadline
 
 # Tokens of one run. Exports score every token that they read: 3000 of a prompt at once would be
 # gigabytes of scores, of which the last is wanted, and seconds that nothing can break off.
@@ -75,7 +74,7 @@ class LanguageModel:
         """Open the files of a folder.
 
         Raises:
-            ModelFolderInvalid: they do not fit together.
+            ModelMismatch: they do not fit together.
             ModelFileSpoiled: the graph cannot be loaded.
             ProviderUnavailable: no provider that the choice allows runs it.
         """
@@ -95,7 +94,7 @@ class LanguageModel:
         """Return the likeliest answer that is JSON of the schema.
 
         Raises:
-            LanguageModelError: there is no whole answer; says why.
+            AnswerFailed: there is no whole answer; says why.
             RunFailed: a run failed.
         """
         text = self.template.prompt(messages)
@@ -156,9 +155,8 @@ def open_language_model(model: Model, choice: ModelChoice) -> LanguageModel:
     """Open a model of the store, every file of it as it was checked in.
 
     Raises:
-        ModelMismatch: it is no language model.
+        ModelMismatch: it is no language model, or its files do not fit together.
         ModelFileSpoiled: a file is missing or not what was checked in.
-        ModelFolderInvalid: its files do not fit together.
         ProviderUnavailable: no provider that the choice allows runs it.
     """
     language = model.manifest.language

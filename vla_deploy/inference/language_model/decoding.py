@@ -9,10 +9,9 @@ import llguidance.numpy
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.inference.errors import RunFailed
+from vla_deploy.inference.errors import AnswerFailed, ModelMismatch, RunFailed
 from vla_deploy.inference.graph_session import GraphSession
-from vla_deploy.planning.language_model.errors import AnswerFailed, ModelFolderInvalid
-from vla_deploy.planning.language_model.model_folder import GenaiConfig
+from vla_deploy.inference.language_model.model_folder import GenaiConfig
 
 # A weak model would else go on with tabs and blanks for ever.
 _GUIDANCE: Final = {"whitespace_flexible": False}
@@ -29,7 +28,7 @@ class Decoder:
         """Take an open session.
 
         Raises:
-            ModelFolderInvalid: the graph lacks keys and values, or scores.
+            ModelMismatch: the graph lacks keys and values, or scores.
         """
         self._session = session
         self._config = config
@@ -46,7 +45,7 @@ class Decoder:
         if missing or not self._empty:
             path, what = session.path, ", ".join(sorted(missing)) or f"{_PAST}*"
             fault = f"{path.name} has no {what}; export it with the builder of onnxruntime-genai"
-            raise ModelFolderInvalid(path.parent, fault)
+            raise ModelMismatch(str(path.parent), (fault,))
         self._past = dict(self._empty)
 
     def feed(self, tokens: Sequence[int]) -> Scores:

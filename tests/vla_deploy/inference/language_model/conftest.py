@@ -4,9 +4,9 @@ from pathlib import Path
 import pytest
 
 from tests.vla_deploy.tiny_language_models import folders_under
+from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.inference.manifest import Language, Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.planning.language_model import LanguageModel
 
 Open = Callable[[Path], LanguageModel]
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.memory import Episode, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.chat_models.chat_model import LocalModel
 from vla_deploy.planning.interfaces import Aid
-from vla_deploy.planning.language_model import LanguageModel
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import load_robot
 

@@ -14,8 +14,8 @@ from llguidance import LLTokenizer
 from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from tokenizers import Tokenizer
 
+from vla_deploy.inference.errors import ModelMismatch
 from vla_deploy.inference.language_schema import GENAI_CONFIG, TOKENIZER
-from vla_deploy.planning.language_model.errors import ModelFolderInvalid
 
 CONFIG: Final = "tokenizer_config.json"
 # Newer exports keep it in a file of its own.
@@ -47,7 +47,7 @@ def read_genai_config(folder: Path) -> GenaiConfig:
     """Read the file of a model's folder.
 
     Raises:
-        ModelFolderInvalid: it is missing, is no JSON, or lacks something; all faults are listed.
+        ModelMismatch: it is missing, is no JSON, or lacks something; all faults are listed.
     """
     try:
         return GenaiConfig.model_validate(_json_object(folder, GENAI_CONFIG))
@@ -56,28 +56,28 @@ def read_genai_config(folder: Path) -> GenaiConfig:
             f"{GENAI_CONFIG}: {'.'.join(map(str, one['loc']))}: {one['msg']}"
             for one in error.errors(include_url=False)
         )
-        raise ModelFolderInvalid(folder, *faults) from error
+        raise ModelMismatch(str(folder), tuple(faults)) from error
 
 
 def read_tokenizers(folder: Path, config: GenaiConfig) -> tuple[Tokenizer, LLTokenizer]:
     """Return the model's tokenizer, and the same for constraints.
 
     Raises:
-        ModelFolderInvalid: there is none, or it is another model's: it would give nonsense.
+        ModelMismatch: there is none, or it is another model's: it would give nonsense.
     """
     try:
         text = (folder / TOKENIZER).read_text(encoding="utf-8")
         tokenizer = Tokenizer.from_str(text)
     # tokenizers raises plain Exception for every fault of a file.
     except Exception as error:
-        raise ModelFolderInvalid(folder, f"{TOKENIZER}: {error}") from error
+        raise ModelMismatch(str(folder), (f"{TOKENIZER}: {error}",)) from error
     size = tokenizer.get_vocab_size()
     if not 0 <= config.vocabulary - size <= _MOST_PADDING or max(config.end_ids) >= size:
-        raise ModelFolderInvalid(
-            folder,
+        fault = (
             f"{TOKENIZER} has {size} tokens, expected {config.vocabulary} with {config.end_ids} "
-            f"among them as {GENAI_CONFIG} says: it is another model's",
+            f"among them as {GENAI_CONFIG} says: it is another model's"
         )
+        raise ModelMismatch(str(folder), (fault,))
     guide = LLTokenizer(text, n_vocab=config.vocabulary, eos_token=config.end_ids[0])
     return tokenizer, guide
 
@@ -89,7 +89,7 @@ class ChatTemplate:
         """Read the template.
 
         Raises:
-            ModelFolderInvalid: there is none, or it is no template.
+            ModelMismatch: there is none, or it is no template.
         """
         self._folder = folder
         config = _json_object(folder, CONFIG)
@@ -101,17 +101,17 @@ class ChatTemplate:
         text = file.read_text("utf-8") if file.is_file() else config.get("chat_template")
         if not isinstance(text, str):
             fault = f"no chat template in {TEMPLATE} or {CONFIG}; take the model's instruct form"
-            raise ModelFolderInvalid(folder, fault)
+            raise ModelMismatch(str(folder), (fault,))
         try:
             self._template: Template = environment.from_string(text)
         except TemplateError as error:
-            raise ModelFolderInvalid(folder, f"chat template: {error}") from error
+            raise ModelMismatch(str(folder), (f"chat template: {error}",)) from error
 
     def prompt(self, messages: Sequence[Message]) -> str:
         """Return the text that asks for the answer to the last message.
 
         Raises:
-            ModelFolderInvalid: the template does not take these messages.
+            ModelMismatch: the template does not take these messages.
         """
         try:
             return self._template.render(
@@ -119,16 +119,16 @@ class ChatTemplate:
             )
         except (TemplateError, TypeError, KeyError) as error:
             fault = f"chat template does not take these messages: {error}"
-            raise ModelFolderInvalid(self._folder, fault) from error
+            raise ModelMismatch(str(self._folder), (fault,)) from error
 
 
 def _json_object(folder: Path, name: str) -> Mapping[str, Any]:
     try:
         document = json.loads((folder / name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise ModelFolderInvalid(folder, f"{name}: {error}") from error
+        raise ModelMismatch(str(folder), (f"{name}: {error}",)) from error
     if not isinstance(document, dict):
-        raise ModelFolderInvalid(folder, f"{name}: expected an object")
+        raise ModelMismatch(str(folder), (f"{name}: expected an object",))
     return document
 
 

@@ -12,16 +12,14 @@ import onnx
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.inference.errors import ModelFileSpoiled
-from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.language_model import (
+from vla_deploy.inference.errors import AnswerFailed, ModelFileSpoiled, ModelMismatch
+from vla_deploy.inference.language_model import (
     AnswerBounds,
-    AnswerFailed,
     LanguageModel,
-    ModelFolderInvalid,
 )
-from vla_deploy.planning.language_model import model as model_module
-from vla_deploy.planning.language_model.decoding import Constraint
+from vla_deploy.inference.language_model import model as model_module
+from vla_deploy.inference.language_model.decoding import Constraint
+from vla_deploy.model_servers.deadline import Deadline
 
 SCHEMA = {
     "type": "object",
@@ -202,7 +200,7 @@ def rewrite(file: Path, change: Any) -> None:
 @pytest.mark.parametrize("name", ["genai_config.json", "tokenizer.json", "tokenizer_config.json"])
 def test_a_missing_file_is_named(opened: Open, copied: Path, name: str) -> None:
     (copied / name).unlink()
-    with pytest.raises(ModelFolderInvalid, match=name):
+    with pytest.raises(ModelMismatch, match=name):
         opened(copied)
 
 
@@ -219,7 +217,7 @@ def test_every_fault_of_the_configuration_is_told(opened: Open, copied: Path) ->
         document["model"]["context_length"] = "long"
 
     rewrite(copied / "genai_config.json", spoil)
-    with pytest.raises(ModelFolderInvalid) as refused:
+    with pytest.raises(ModelMismatch) as refused:
         opened(copied)
     assert len(refused.value.faults) == 3
 
@@ -229,7 +227,7 @@ def test_the_tokenizer_of_another_model_is_refused(opened: Open, copied: Path) -
         document["model"]["vocab_size"] = 32_000
 
     rewrite(copied / "genai_config.json", grow)
-    with pytest.raises(ModelFolderInvalid, match="another model's"):
+    with pytest.raises(ModelMismatch, match="another model's"):
         opened(copied)
 
 
@@ -238,7 +236,7 @@ def test_tensors_that_the_graph_lacks_are_named(opened: Open, copied: Path) -> N
     graph = onnx.load(file)
     del graph.graph.output[1]
     onnx.save(graph, file)
-    with pytest.raises(ModelFolderInvalid, match=r"no present\.0\.key"):
+    with pytest.raises(ModelMismatch, match=r"no present\.0\.key"):
         opened(copied)
 
 
@@ -247,11 +245,11 @@ def test_a_template_cannot_reach_beyond_its_sandbox(opened: Open, copied: Path) 
         document["chat_template"] = "{{ messages.__class__.__mro__[1].__subclasses__() }}"
 
     rewrite(copied / "tokenizer_config.json", plot)
-    with pytest.raises(ModelFolderInvalid, match="does not take these messages"):
+    with pytest.raises(ModelMismatch, match="does not take these messages"):
         opened(copied).answer(ASKED, bounds(), SCHEMA)
 
 
 def test_a_model_without_a_template_is_no_chat_model(opened: Open, copied: Path) -> None:
     rewrite(copied / "tokenizer_config.json", lambda document: document.pop("chat_template"))
-    with pytest.raises(ModelFolderInvalid, match="instruct form"):
+    with pytest.raises(ModelMismatch, match="instruct form"):
         opened(copied)
