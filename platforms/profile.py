@@ -93,16 +93,12 @@ class PlanningSettings:
     """Declare who plans what rules do not cover, and how long that may take.
 
     `servers` are names of `servers.toml`, asked in this order after the model on board and before
-    the command parser; of all that take time, `max_rungs` at most. `within_s` is the time for all
-    of them together. An unsure server is asked for `candidates` plans; a prompt has
-    `prompt_characters` at most. So many commands are `remembered` from run to run, 0 for none.
+    the command parser. `within_s` is the time for all of them together. So many commands are
+    `remembered` from run to run, 0 for none.
     """
 
     within_s: float
     servers: tuple[str, ...]
-    max_rungs: int
-    candidates: int
-    prompt_characters: int
     remembered: int
 
 

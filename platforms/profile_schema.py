@@ -184,9 +184,6 @@ _TIMING: Keys = {
 _PLANNING: Keys = {
     "within_s": _Range(1, 300, "s"),
     "servers": _ListOf(_Text(), empty=True),
-    "max_rungs": _Range(0, 8, "", integer=True),
-    "candidates": _Range(1, 5, "", integer=True),
-    "prompt_characters": _Range(6000, 200_000, "characters", integer=True),
     "remembered": _Range(0, 100_000, "commands", integer=True),
 }
 _TABLES: Final = (

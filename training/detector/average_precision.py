@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES
+from vla_deploy.model_tools.detectors.accuracy import average_precision
 from vla_deploy.perception.detectors.boxes import Boxes, iou
-from vla_deploy.perception.model_tools.accuracy import average_precision
 
 MATCH_IOU, TIGHT_IOU = 0.5, 0.75
 SURE_SCORE = 0.35

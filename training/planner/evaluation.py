@@ -15,13 +15,13 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from training.planner.certainty_fit import Judged, fit
 from training.planner.composing import Composer, Example
 from training.planner.files import METRICS
+from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.inference.manifest import Certainty, Language, Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import confidence_of
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step
 from vla_deploy.planning.command_parser.rung import CommandParser, known_words
-from vla_deploy.planning.language_model import LanguageModel
 
 MOST_TOKENS: Final = 160
 _DEADLINE_S: Final = 10.0

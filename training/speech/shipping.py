@@ -17,7 +17,7 @@ from training.voices.clip_store import shards
 from vla_deploy.inference.manifest import Context, Manifest, Whisper
 from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, describe
+from vla_deploy.model_tools.whispers import PLAIN_CHOICE, WhisperSource, describe
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
@@ -75,7 +75,7 @@ def _open(manifest: Manifest, folder: Path) -> Recogniser:
 
 
 def _manifest(folder: Path, whisper: Whisper) -> Manifest:
-    request = Request(
+    source = WhisperSource(
         name="commands-whisper",
         folder=folder,
         whisper=whisper,
@@ -83,7 +83,7 @@ def _manifest(folder: Path, whisper: Whisper) -> Manifest:
         licence="Apache-2.0",
         card=folder / CARD,
     )
-    return describe(request)
+    return describe(source)
 
 
 def ship(out: Path, place: Path = SHIPPED) -> bool:

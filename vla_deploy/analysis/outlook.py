@@ -12,8 +12,7 @@ from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.question import Question
 from vla_deploy.navigation.errors import NoPath
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.validator import others_like
-from vla_deploy.world import Query, Thing, find
+from vla_deploy.world import Query, Thing, access_to, find
 from vla_deploy.world.memory import still_there, where_to_look
 
 Point = tuple[float, float]
@@ -87,8 +86,13 @@ class Outlook:
 
     def others_like(self, thing: Thing) -> Iterator[str]:
         """Yield things that could be taken in place of one."""
-        for other in others_like(thing, self.question.world, self.abilities.body):
-            yield f"take the {other} ({other.thing_id})"
+        world = self.question.world
+        for other in world.things:
+            alike = other.kind == thing.kind or other.colour == thing.colour
+            if other is thing or not alike or other.kind not in GRASPABLE_CLASSES:
+                continue
+            if access_to(other, world, self.abilities.body).is_accessible:
+                yield f"take the {other} ({other.thing_id})"
 
     def _rely_on(self, thing: Thing) -> None:
         if thing.thing_id not in self.relied_on:

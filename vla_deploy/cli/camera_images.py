@@ -14,9 +14,9 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc.rgbd_image import colours, depths_m
+from vla_deploy.model_tools.detectors.images import image_paths, read_image
 from vla_deploy.perception.camera_tools.board import Board, Image
 from vla_deploy.perception.history import JointHistory
-from vla_deploy.perception.model_tools.images import image_paths, read_image
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Camera
 from vla_deploy.robots.model import full_positions

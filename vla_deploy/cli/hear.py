@@ -22,8 +22,7 @@ from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import evidence
 from vla_deploy.speech.microphone import Microphone, linked_microphone
 from vla_deploy.speech.model_selection import select_recogniser
-from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
+from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing, sound_of
 from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base

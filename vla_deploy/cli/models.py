@@ -5,7 +5,7 @@ import dataclasses
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -23,14 +23,14 @@ from vla_deploy.inference.manifest_file import document_of
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import Model
-from vla_deploy.perception.model_tools.adding import Request, add_model
-from vla_deploy.perception.model_tools.benching import Bench, bench
-from vla_deploy.perception.model_tools.images import read_image, spread_paths
-from vla_deploy.perception.model_tools.labelled import read_labelled
-from vla_deploy.perception.model_tools.quantising import quantise
-from vla_deploy.perception.model_tools.trial import empty_images
-from vla_deploy.perception.model_tools.verifying import Finding, verify
-from vla_deploy.speech.model_tools.fetching import PUBLISHED as WHISPERS
+from vla_deploy.model_tools.detectors.adding import DetectorSource, add_model
+from vla_deploy.model_tools.detectors.benching import Bench, bench
+from vla_deploy.model_tools.detectors.images import read_image, spread_paths
+from vla_deploy.model_tools.detectors.labelled import read_labelled
+from vla_deploy.model_tools.detectors.quantising import quantise
+from vla_deploy.model_tools.detectors.trial import empty_images
+from vla_deploy.model_tools.published import WHISPERS
+from vla_deploy.model_tools.verifying import Finding, verify
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -79,7 +79,7 @@ def add(arguments: argparse.Namespace) -> int:
         return _tell(arguments, *models_language.add(arguments, shelf, _profile(arguments)))
     model, trial = add_model(
         shelf.store,
-        _request(arguments),
+        _source(arguments),
         engines=shelf.engines,
         clock=shelf.clock,
         replace=arguments.replace,
@@ -193,7 +193,7 @@ def verify_models(arguments: argparse.Namespace) -> int:
     profile = _profile(arguments)
     findings: list[Finding] = []
     for name in arguments.names or shelf.store.names():
-        findings += _findings(shelf, name, profile if _concerns(shelf, name, profile) else None)
+        findings += verify(shelf, name, profile if _concerns(shelf, name, profile) else None)
     lines = [
         f"{'ok  ' if one.is_ok else 'FAIL'} {one.model:<20} {one.check:<24} {one.detail}"
         for one in findings
@@ -220,19 +220,6 @@ def _shelf(arguments: argparse.Namespace) -> ModelShelf:
     return ModelShelf.of_base(base, MonotonicClock())
 
 
-def _findings(shelf: ModelShelf, name: str, profile: Profile | None) -> Iterator[Finding]:
-    """Check a model by its kind; one whose manifest cannot be read is told as such."""
-    try:
-        model = shelf.store.load(name)
-    except InferenceError:
-        return verify(shelf, name, profile)
-    if model.manifest.whisper is not None:
-        return models_whisper.findings(shelf, model, profile)
-    if model.manifest.language is not None:
-        return models_language.findings(shelf, model, profile)
-    return verify(shelf, name, profile)
-
-
 def _progress(arguments: argparse.Namespace, line: str) -> None:
     if not arguments.json:
         print(line, file=sys.stderr, flush=True)
@@ -255,8 +242,8 @@ def _concerns(shelf: ModelShelf, name: str, profile: Profile) -> bool:
         return False  # `verify` tells what is wrong with it
 
 
-def _request(arguments: argparse.Namespace) -> Request:
-    return Request(
+def _source(arguments: argparse.Namespace) -> DetectorSource:
+    return DetectorSource(
         name=arguments.name,
         onnx=arguments.onnx,
         classes=arguments.classes,

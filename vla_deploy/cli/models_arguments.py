@@ -10,9 +10,8 @@ from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.number_arguments import number_within
 from vla_deploy.inference.manifest import Fit
 from vla_deploy.inference.manifest_schema import COLOURS
+from vla_deploy.model_tools.published import LANGUAGE_MODELS, WHISPERS
 from vla_deploy.perception.detectors.adapters import ADAPTERS
-from vla_deploy.planning.language_model.fetching import PUBLISHED as LANGUAGE_MODELS
-from vla_deploy.speech.model_tools.fetching import PUBLISHED as WHISPERS
 
 EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models add mugs --onnx best.onnx --classes classes.txt

@@ -8,10 +8,10 @@ from pathlib import Path
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.inference.manifest import Measured, Variant
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.perception.model_tools.accuracy import Accuracy
-from vla_deploy.perception.model_tools.labelled import LabelledImage, read_labelled
-from vla_deploy.perception.model_tools.measuring import measure_files, worst
-from vla_deploy.perception.model_tools.quantising import Quantised
+from vla_deploy.model_tools.detectors.accuracy import Accuracy
+from vla_deploy.model_tools.detectors.labelled import LabelledImage, read_labelled
+from vla_deploy.model_tools.detectors.measuring import measure_files, worst
+from vla_deploy.model_tools.detectors.quantising import Quantised
 
 Told = tuple[object, str]
 

@@ -1,38 +1,29 @@
-"""Do what `vla-deploy models` does with a language model: add, measure and check it."""
+"""Do what `vla-deploy models` does with a language model: add, fetch and measure it."""
 
 import argparse
 import dataclasses
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from platforms import ModelChoice, Profile
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.inference.adding import require_free
-from vla_deploy.inference.errors import InferenceError
-from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.language_schema import PLANNER
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.inference.roles import ModelShelf, choice_for
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import Model
-from vla_deploy.perception.model_tools.verifying import Finding
-from vla_deploy.planning.language_model.adding import (
-    LanguageModelSource,
-    add_language_model,
-    try_out,
-)
-from vla_deploy.planning.language_model.benching import bench
-from vla_deploy.planning.language_model.fetching import PUBLISHED, PublishedLanguageModel
-from vla_deploy.planning.language_model.fetching import fetch as fetch_files
+from vla_deploy.model_tools.keeping import require_free
+from vla_deploy.model_tools.language_models import LanguageModelSource, add_language_model, bench
+from vla_deploy.model_tools.published import LANGUAGE_MODELS, PublishedModel
+from vla_deploy.model_tools.published import fetch as fetch_files
 
 Told = tuple[dict[str, object], str]
 
 
 def add(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> Told:
     """Check a language model, try it out as a profile says and keep it."""
-    request = LanguageModelSource(
+    source = LanguageModelSource(
         name=arguments.name,
         folder=arguments.language,
         most_tokens=arguments.most_tokens,
@@ -40,7 +31,7 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> T
         licence=arguments.licence,
         card=arguments.card,
     )
-    return _kept(arguments, shelf, profile, request)
+    return _kept(arguments, shelf, profile, source)
 
 
 def fetch(
@@ -56,21 +47,21 @@ def fetch(
     shelf.store.user.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".fetch-", dir=shelf.store.user) as directory:
         folder, licence = fetch_files(published, Path(directory), tell, arguments.endpoint)
-        request = LanguageModelSource(
+        source = LanguageModelSource(
             name=name,
             folder=folder,
             most_tokens=arguments.most_tokens,
             summary=f"{published.summary}: {published}",
             licence=arguments.licence or licence,
         )
-        return _kept(arguments, shelf, profile, request)
+        return _kept(arguments, shelf, profile, source)
 
 
-def _published(arguments: argparse.Namespace) -> PublishedLanguageModel:
+def _published(arguments: argparse.Namespace) -> PublishedModel:
     if arguments.language is None:
-        found = PUBLISHED[arguments.name]
+        found = LANGUAGE_MODELS[arguments.name]
     else:
-        found = PublishedLanguageModel.named(arguments.language)
+        found = PublishedModel.named(arguments.language)
     return dataclasses.replace(found, revision=arguments.revision or found.revision)
 
 
@@ -78,11 +69,11 @@ def _kept(
     arguments: argparse.Namespace,
     shelf: ModelShelf,
     profile: Profile,
-    request: LanguageModelSource,
+    source: LanguageModelSource,
 ) -> Told:
     model, answer = add_language_model(
         shelf.store,
-        request,
+        source,
         clock=shelf.clock,
         replace=arguments.replace,
         choice=profile.models.get(PLANNER, PLAIN_CHOICE),
@@ -111,35 +102,6 @@ def measure(
         choice = dataclasses.replace(choice, threads=arguments.threads)
     figures = bench(model, choice, rounds=arguments.rounds, clock=shelf.clock)
     return figures, _text(figures)
-
-
-def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterator[Finding]:
-    """Check an installed language model."""
-    name = model.manifest.name
-    yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
-    yield _finding(name, "parts", partial(_whole, model))
-    if profile is None:
-        yield _finding(name, "run", partial(_tried, shelf, model, PLAIN_CHOICE))
-    else:
-        choice = choice_for(model.manifest.role, profile)
-        yield _finding(name, f"profile {profile.name}", partial(_tried, shelf, model, choice))
-
-
-def _whole(model: Model) -> str:
-    check_parts(model)
-    return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
-
-
-def _tried(shelf: ModelShelf, model: Model, choice: ModelChoice) -> str:
-    answer = try_out(model, shelf.clock, choice)
-    return f"answers {answer.text} in {answer.runs} runs"
-
-
-def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
-    try:
-        return Finding(model=model, check=check, is_ok=True, detail=act())
-    except InferenceError as error:
-        return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
 def _text(figures: Mapping[str, Any]) -> str:

@@ -1,27 +1,28 @@
-"""Do what `vla-deploy models` does with a Whisper: add, fetch, measure and check it."""
+"""Do what `vla-deploy models` does with a Whisper: add, fetch and measure it."""
 
 import argparse
 import dataclasses
 import json
 import tempfile
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from platforms import ModelChoice, Profile
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.inference.errors import InferenceError
-from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
-from vla_deploy.inference.roles import ModelShelf, choice_for
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import Model
-from vla_deploy.perception.model_tools.verifying import Finding
-from vla_deploy.speech.errors import SpeechError
-from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, add_whisper, try_out
-from vla_deploy.speech.model_tools.benching import bench, noises, recordings
-from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings
-from vla_deploy.speech.model_tools.fetching import LICENCE, fetch, summary_of
+from vla_deploy.model_tools.published import WHISPERS, fetch
+from vla_deploy.model_tools.whisper_calibration import calibrate, keep, known_recordings
+from vla_deploy.model_tools.whispers import (
+    PLAIN_CHOICE,
+    WhisperSource,
+    add_whisper,
+    bench,
+    noises,
+    recordings,
+)
 from vla_deploy.speech.transcript import Transcript
 
 Told = tuple[dict[str, object], str]
@@ -29,7 +30,7 @@ Told = tuple[dict[str, object], str]
 
 def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     """Check a Whisper, try it out and keep it."""
-    request = Request(
+    source = WhisperSource(
         name=arguments.name,
         folder=arguments.whisper,
         whisper=Whisper(
@@ -41,7 +42,7 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
         licence=arguments.licence,
         card=arguments.card,
     )
-    return _told(*add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace))
+    return _told(*add_whisper(shelf.store, source, clock=shelf.clock, replace=arguments.replace))
 
 
 def fetch_whisper(
@@ -49,17 +50,17 @@ def fetch_whisper(
 ) -> Told:
     """Fetch a published Whisper, check it, try it out and keep it."""
     with tempfile.TemporaryDirectory(prefix="vla-deploy-fetch-") as directory:
-        folder = Path(directory)
-        fetch(arguments.name, folder, tell, arguments.endpoint)
-        request = Request(
+        published = WHISPERS[arguments.name]
+        folder, licence = fetch(published, Path(directory), tell, arguments.endpoint)
+        source = WhisperSource(
             name=arguments.name,
             folder=folder,
             whisper=Whisper(languages=("en",), context=Context.PADDED, hot_words=True),
-            summary=summary_of(arguments.name),
-            licence=LICENCE,
+            summary=published.summary,
+            licence=licence,
         )
         return _told(
-            *add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace)
+            *add_whisper(shelf.store, source, clock=shelf.clock, replace=arguments.replace)
         )
 
 
@@ -96,36 +97,6 @@ def calibrate_whisper(arguments: argparse.Namespace, shelf: ModelShelf, profile:
         f"the confidence {done.error_before:.3f} before, {done.error_after:.3f} now"
     )
     return dataclasses.asdict(done), text
-
-
-def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterator[Finding]:
-    """Check an installed Whisper."""
-    name = model.manifest.name
-    yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
-    yield _finding(name, "files", lambda: _hashed(model))
-    yield _finding(name, "run int8", lambda: _tried(model, shelf, PLAIN_CHOICE))
-    if profile is not None:
-        choice = partial(choice_for, model.manifest.role, profile)
-        check = f"profile {profile.name}"
-        yield _finding(name, check, lambda: _tried(model, shelf, choice()))
-
-
-def _hashed(model: Model) -> str:
-    check_parts(model)
-    return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
-
-
-def _tried(model: Model, shelf: ModelShelf, choice: ModelChoice) -> str:
-    silence = try_out(model, shelf.clock, choice)
-    took = f"{choice.precision}, {choice.threads} threads, {1000 * silence.took_s:.0f} ms"
-    return f"reads {silence.text!r} in silence; {took}"
-
-
-def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
-    try:
-        return Finding(model=model, check=check, is_ok=True, detail=act())
-    except (InferenceError, SpeechError) as error:
-        return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
 def _told(model: Model, silence: Transcript) -> Told:

@@ -4,9 +4,10 @@ InferenceError
 ├── ModelUnknown         no model of that name, or a name that is taken: list what there is
 ├── ManifestInvalid      model.toml has faults: mend every one that is listed
 ├── ModelFileSpoiled     a file is missing, cut off or not what was checked in: add it again
-├── ModelMismatch        the graph is not what the manifest says: mend the manifest, or export anew
+├── ModelMismatch        graph, manifest and other files do not fit together: export anew
 ├── ProviderUnavailable  nothing here runs it as the profile asks: mend profile or installation
 ├── MemoryRefused        others hold the memory it needs: take a smaller one, or raise the budget
+├── AnswerFailed         a language model gives no whole answer: ask another
 ├── RunFailed            a run failed, or told what cannot be: a robot goes on without the answer
 ├── ImagesInvalid        images or labels to measure with cannot be used: mend the folder
 ├── FetchFailed          a published model did not come: mend the network, or add it by hand
@@ -39,7 +40,7 @@ class ModelFileSpoiled(InferenceError):
 
 
 class ModelMismatch(InferenceError):
-    """Report every difference between a graph and its manifest at once."""
+    """Report everything at once in which a model's files do not fit together."""
 
     def __init__(self, model: str, faults: tuple[str, ...]) -> None:
         super().__init__(_listed(model, faults))
@@ -52,6 +53,10 @@ class ProviderUnavailable(InferenceError):
 
 class MemoryRefused(InferenceError):
     """Say who holds the memory that a model needs."""
+
+
+class AnswerFailed(InferenceError):
+    """Say why there is no whole answer: time, tokens, context, or a schema that is none."""
 
 
 class RunFailed(InferenceError):

@@ -1,8 +1,8 @@
 """Build the planner that a profile asks for; models that cannot be opened are skipped."""
 
-import dataclasses
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -10,20 +10,18 @@ from drivers.clock import Clock, MonotonicClock
 from platforms import ModelChoice, Profile
 from platforms.profile import PlanningSettings
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.language_model import open_language_model
 from vla_deploy.inference.manifest import Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.inference.providers import CPU
 from vla_deploy.inference.roles import ModelShelf, tier_name
 from vla_deploy.inference.store import Model
 from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.chat_models.local import LocalModel
-from vla_deploy.planning.chat_models.served import ServedModel
+from vla_deploy.planning.chat_models.chat_model import LocalModel, ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
-from vla_deploy.planning.language_model import open_language_model
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import RobotDescription
 
@@ -60,32 +58,36 @@ def open_planner(
     local: Sequence[BackEnd] = (),
     models_away: Mapping[str, str] | None = None,
 ) -> Planner:
-    """Return a planner for a robot: patterns, cache, models on board, servers, the parser.
+    """Return a planner for a robot: patterns, models on board, servers, the parser.
 
-    Of `local` and the servers, in this order, `max_rungs` are taken. `base` is the runtime
-    directory, where `servers.toml` lies; `models_away` maps models that could not be opened to the
-    reason. Nothing is sent yet.
+    `base` is the runtime directory, where `servers.toml` lies; `models_away` maps models that could
+    not be opened to the reason. Nothing is sent yet.
     """
-    away: dict[str, str] = {}
-    servers = list(_servers(robot, settings, base, away))
-    for name, why in away.items():
-        _log.warning("planning does without server %s: %s", name, why)
-    slow = (*local, *servers)[: settings.max_rungs]
-    return Planner(clock, slow, within_s=settings.within_s, away={**(models_away or {}), **away})
+    away = dict(models_away or {})
+    servers: list[BackEnd] = []
+    for name in settings.servers:
+        try:
+            # A server answers by the wall clock, whatever time the robot lives by.
+            server = ServerShelf.of_base(base, MonotonicClock()).open(name)
+        except ModelServerError as error:
+            away[name] = one_line(error)
+            _log.warning("planning does without server %s: %s", name, away[name])
+        else:
+            servers.append(ServedModel(server, robot.name, sorted(robot.places), checked))
+    return Planner(clock, (*local, *servers), within_s=settings.within_s, away=away)
 
 
 def open_local_models(
     robot: RobotDescription, profile: Profile, shelf: ModelShelf, model_tier: int = 0
-) -> tuple[tuple[CommandParser | LocalModel, ...], dict[str, str]]:
+) -> tuple[tuple[BackEnd, ...], dict[str, str]]:
     """Open the models on board that plan; return them, and why others are away.
 
-    The command parser that comes with the software is the first of them, so that no bound on their
-    number leaves it out; the planner asks it last.
+    The command parser that comes with the software is always one of them.
     """
     choice = profile.models.get(ROLE)
     if choice is None:
         return (), {}
-    opened: list[CommandParser | LocalModel] = []
+    opened: list[BackEnd] = []
     away: dict[str, str] = {}
     for name in dict.fromkeys((NAME, tier_name(choice, model_tier))):
         try:
@@ -113,32 +115,13 @@ def _open(
     language = model.manifest.language
     if language is not None and language.use is Use.COMMAND_PARSER:
         # So small a model is done on the CPU before a GPU has begun.
-        on_cpu = dataclasses.replace(
-            PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
-        )
-        return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
+        choice = replace(PLAIN_CHOICE, memory_arena=choice.memory_arena)
+        return shelf.load(model, choice, lambda: open_command_parser(model, choice))
 
     def opened() -> LocalModel:
-        return LocalModel(model.manifest.name, open_language_model(model, choice), robot)
+        language_model = open_language_model(model, choice)
+        return LocalModel(
+            model.manifest.name, language_model, robot.name, sorted(robot.places), checked
+        )
 
     return shelf.load(model, choice, opened)
-
-
-def _servers(
-    robot: RobotDescription, settings: PlanningSettings, base: Path, away: dict[str, str]
-) -> Iterator[ServedModel]:
-    for name in settings.servers:
-        try:
-            # A server answers by the wall clock, whatever time the robot lives by.
-            server = ServerShelf.of_base(base, MonotonicClock()).open(name)
-        except ModelServerError as error:
-            away[name] = one_line(error)
-            continue
-        yield ServedModel(
-            server,
-            robot.name,
-            sorted(robot.places),
-            checked,
-            candidates=settings.candidates,
-            prompt_characters=settings.prompt_characters,
-        )

@@ -71,14 +71,6 @@ _OBJECT_OR_ELSE = Parameter(type=Type.OBJECT, required=False)
 # Without it the base cruises as fast as its robot file lets it.
 _SPEED = _number(0.05, 2.0, required=False)
 
-# What older tools call for and this robot has nothing for.
-NOT_SKILLS: MappingProxyType[str, str] = MappingProxyType(
-    dict.fromkeys(
-        ("turn_on", "turn_off", "switch_on", "switch_off", "activate", "deactivate"),
-        "this robot declares no device that it could switch",
-    )
-)
-
 SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
     {
         "navigate_to": SkillSpec(

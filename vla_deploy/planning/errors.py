@@ -99,14 +99,8 @@ class NotReady(PlanningError):
 
 
 class PlanInvalid(PlanningError):
-    """Say everything that is wrong with a plan, in one line.
+    """Say everything that is wrong with a plan, in one line."""
 
-    `advice` is a sentence without a full stop with what could be done instead, "" where nothing is;
-    `why` is the rest.
-    """
-
-    def __init__(self, faults: Sequence[str], advice: str = "") -> None:
+    def __init__(self, faults: Sequence[str]) -> None:
         self.faults = tuple(faults)
-        self.advice = advice
-        self.why = "the plan was refused: " + "; ".join(self.faults)
-        super().__init__(f"{self.why.rstrip('.')}. {advice}" if advice else self.why)
+        super().__init__("the plan was refused: " + "; ".join(self.faults))

@@ -92,11 +92,11 @@ class Proposal:
     """Hold a plan that is not checked yet, and which back end made it.
 
     `confidence` is 0 to 1. Where the back end `is_unsure`, or words of the command are `left_out`,
-    nothing moves before the person agrees. With `may_be_kept` the plan took seconds and may be
-    given again in the same situation; `origin` is the back end that made it first, where it was.
-    `covers` are the words that change the scope of a command and are represented in the plan, None
-    for all; `knows_grammar` is set where the back end has read the whole sentence. An `order`
-    stands once the plan is dispatched. With `awaits_word` it is held until the person says go.
+    nothing moves before the person agrees. `origin` is the strategy that made a plan after a
+    failure. `covers` are the words that change the scope of a command and are represented in the
+    plan, None for all; `knows_grammar` is set where the back end has read the whole sentence. An
+    `order` stands once the plan is dispatched. With `awaits_word` it is held until the person says
+    go.
     """
 
     plan: Plan
@@ -104,7 +104,6 @@ class Proposal:
     confidence: float
     is_unsure: bool = False
     left_out: tuple[str, ...] = ()
-    may_be_kept: bool = False
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False

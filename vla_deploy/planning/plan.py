@@ -80,22 +80,11 @@ def dependency_faults(actions: Sequence[Action]) -> list[str]:
         for needed in action.depends_on
         if needed not in ids
     ]
-    cycle = find_cycle(actions)
-    if cycle:
-        faults.append("the dependencies form a cycle: " + " -> ".join(cycle))
-    return faults
-
-
-def find_cycle(actions: Sequence[Action]) -> list[str]:
-    """Return one cycle as ids, first one repeated at the end, or an empty list."""
-    needs: TopologicalSorter[str] = TopologicalSorter(
-        {action.id: action.depends_on for action in actions}
-    )
     try:
-        needs.prepare()
+        TopologicalSorter({action.id: action.depends_on for action in actions}).prepare()
     except CycleError as error:
-        return list(reversed(error.args[1]))
-    return []
+        faults.append("the dependencies form a cycle: " + " -> ".join(reversed(error.args[1])))
+    return faults
 
 
 def execution_order(actions: Sequence[Action]) -> list[Action]:

@@ -1,6 +1,6 @@
 """Ask the back ends for a plan, one after the other, and check what each proposes.
 
-The order: exact patterns and kept plans, language models, the command parser. What patterns make of
+The order: exact patterns, language models, the command parser. What patterns make of
 a sentence with words that change its scope is checked by a language model where there is one; what
 the parser makes of it, where a language model saw no way. Where they move other things, the person
 is asked.
@@ -34,7 +34,6 @@ from vla_deploy.planning.interfaces import (
 )
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.plan_cache import PlanCache
 from vla_deploy.planning.prohibitions import held_to
 from vla_deploy.planning.scope import guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
@@ -86,12 +85,11 @@ class Planner:
         check: Check = checked,
         away: Mapping[str, str] | None = None,
     ) -> None:
-        self.cache = PlanCache(clock)
         self.within_s = within_s
         self.away = dict(away or {})
         self.check = check
         self._clock = clock
-        self._quick: tuple[BackEnd, ...] = (Patterns(), self.cache)
+        self._patterns = Patterns()
         self._models = tuple(one for one in slow if one.is_language_model)
         self._parsers = tuple(one for one in slow if not one.is_language_model)
         self._slow = (*self._models, *self._parsers)
@@ -99,7 +97,7 @@ class Planner:
     @property
     def back_ends(self) -> tuple[str, ...]:
         """Return the names of all back ends, in the order in which they are asked."""
-        return tuple(one.name for one in (*self._quick, *self._slow))
+        return tuple(one.name for one in (self._patterns, *self._slow))
 
     @property
     def slow_back_ends(self) -> tuple[str, ...]:
@@ -112,11 +110,10 @@ class Planner:
         return frozenset().union(*(one.uses for one in self._slow))
 
     def document(self) -> dict[str, Any]:
-        """Return how cache and servers have been doing, as JSON takes it."""
+        """Return who plans and how the servers have been doing, as JSON takes it."""
         documents = (one.document() for one in self._slow)
         return {
             "rungs": list(self.back_ends),
-            "cache": self.cache.document(),
             "servers": [one for one in documents if one is not None],
             "away": self.away,
         }
@@ -134,7 +131,7 @@ class Planner:
 
     def plan_at_once(self, request: Request, deadline: Deadline) -> PlanningResult:
         """Return the answer of the back ends that take no time."""
-        answer = self.first_plan(self._quick, request, deadline)
+        answer = self.first_plan((self._patterns,), request, deadline)
         if not self._slow:
             return _worded(answer, request)
         return replace(answer, is_unchecked=bool(self._models) and _needs_check(answer, request))
@@ -171,11 +168,6 @@ class Planner:
         """Return the answer to a plan that was made elsewhere, in any dialect."""
         deadline = Deadline.within(self._clock, self.within_s)
         return self.first_plan((_GivenPlan(document),), request, deadline)
-
-    def accepted(self, request: Request, answer: PlanningResult) -> None:
-        """Keep a plan that was dispatched for when the same is asked again."""
-        if answer.proposal is not None and answer.proposal.back_end != self.cache.name:
-            self.cache.keep(request, answer.proposal)
 
     def first_plan(
         self,

@@ -1,42 +1,19 @@
-"""Decide whether a plan may run: schema, skills, parameters, dependencies, world.
-
-Of what the world refuses it says what could be done instead.
-"""
+"""Decide whether a plan may run: schema, skills, parameters, dependencies, world."""
 
 import math
-from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any
 
-from vla_deploy.planning.catalogue import (
-    GRASPABLE_CLASSES,
-    NOT_SKILLS,
-    SKILLS,
-    Parameter,
-    SkillSpec,
-    Type,
-)
+from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, Parameter, SkillSpec, Type
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.knowledge import World, match_place, parse_object
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
-from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import (
     bounds_faults,
-    first_broken,
     sharing_faults,
     symbolic_faults,
 )
 from vla_deploy.planning.symbolic.state import Pose
-from vla_deploy.planning.symbolic.table import GRASPABLE, LOGIC, PAYLOAD, TAKES_THINGS
-from vla_deploy.world import Body, Snapshot, Thing, access_to
-from vla_deploy.world.vocabulary import CONTAINERS
-
-# What another thing may keep where one does not; the other rules are about the robot.
-_OF_THE_THING: Final = frozenset({GRASPABLE, PAYLOAD, TAKES_THINGS})
-# The parameter that another thing replaces, and in which words.
-_REPLACED: Final = {
-    "pick_up": ("object", "take the {thing}"),
-    "place": ("destination", "put it in the {thing}"),
-}
+from vla_deploy.world import Snapshot
 
 
 def check_plan(
@@ -47,26 +24,24 @@ def check_plan(
     `here` is the robot's x, y (m) and yaw (rad) in the map. What is not known is not judged.
 
     Raises:
-        PlanInvalid: carries all faults, and what could be done instead.
+        PlanInvalid: carries all faults.
     """
-    faults, advice = _form_faults(plan, world), ""
+    faults = _form_faults(plan, world)
     if not faults:
         # A plan whose actions are all right one by one is gone through symbol by symbol.
         faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
         faults += symbolic_faults(plan.actions, world, scene, here)
-        advice = _instead_of(plan, world, scene, here) if faults else ""
     if faults:
-        raise PlanInvalid(faults, advice)
+        raise PlanInvalid(faults)
 
 
 def _form_faults(plan: Plan, world: World) -> list[str]:
     """Return what is wrong with a plan whatever the robot sees, holds and knows."""
     faults: list[str] = []
     if not plan.feasible:
-        faults.append(
-            "its author says that it is not feasible: " + (plan.reasoning or plan.summary)
-        )
-    if plan.feasible and not plan.actions:
+        why = plan.reasoning or plan.summary
+        faults.append(f"its author says that it is not feasible: {why}")
+    elif not plan.actions:
         faults.append("it has no actions")
     for action in plan.actions:
         faults += [f'action "{action.id}": {fault}' for fault in action_faults(action, world)]
@@ -77,8 +52,6 @@ def action_faults(action: Action, world: World) -> list[str]:
     """Return what is wrong with one action by itself: skill, parameters, types, ranges, names."""
     spec = SKILLS.get(action.skill)
     if spec is None:
-        if action.skill in NOT_SKILLS:
-            return [f"{action.skill}: {NOT_SKILLS[action.skill]}"]
         return [f'unknown skill "{action.skill}"; known: {", ".join(SKILLS)}']
     taken = ", ".join(spec.parameters) or "none"
     faults = [
@@ -159,48 +132,3 @@ def _object_faults(value: Any) -> list[str]:
     except UnknownObject as error:
         return [str(error)]
     return []
-
-
-# --- what could be done instead -------------------------------------------------------------------
-
-
-def _instead_of(plan: Plan, world: World, scene: Snapshot | None, here: Pose | None) -> str:
-    """Return what could be done instead, without a full stop; "" where nothing else would do.
-
-    A replacement keeps the rules that were broken, and nothing is in the way of taking it. The
-    actions must be valid one by one, and their dependencies acyclic.
-    """
-    broken = first_broken(plan.actions, world, scene, here)
-    if broken is None or scene is None or not broken.rules.keys() <= _OF_THE_THING:
-        return ""
-    skill, given = broken.action.skill, broken.action.parameters
-    name, phrase = _REPLACED[skill]
-    subject = Setting(parameters=given, world=world, scene=scene).subject(name)
-    if subject is None or subject.thing is None:
-        return ""
-    if skill == "pick_up":
-        others = others_like(subject.thing, scene, _body(world))
-    else:
-        others = (one for one in scene.things if one.kind in CONTAINERS and not one.held_by)
-    needs = LOGIC[skill].needs
-    for other in others:
-        setting = Setting(parameters={**given, name: other.thing_id}, world=world, scene=scene)
-        if not any(needs[rule](broken.state, setting) for rule in broken.rules):
-            return f"I could {phrase.format(thing=other)} ({other.thing_id}) instead"
-    return ""
-
-
-def others_like(thing: Thing, scene: Snapshot, body: Body) -> Iterator[Thing]:
-    """Yield things of the kind or the colour that could be taken in place of one."""
-    for other in scene.things:
-        alike = other.kind == thing.kind or other.colour == thing.colour
-        if other is thing or not alike or other.kind not in GRASPABLE_CLASSES:
-            continue
-        if access_to(other, scene, body).is_accessible:
-            yield other
-
-
-def _body(world: World) -> Body:
-    return Body(
-        opening_max_m=world.opening_max_m or 0.0, hands=tuple(world.holding), is_free=world.is_free
-    )

@@ -9,7 +9,6 @@ from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import SpeechError
-from vla_deploy.speech.model_tools.fetching import PUBLISHED
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 
@@ -34,7 +33,10 @@ def select_recogniser(shelf: ModelShelf, profile: Profile, model_tier: int) -> S
     reasons: list[str] = []
     for name in (*choice.tiers[first:], *reversed(choice.tiers[:first])):
         if name not in shelf.store.names():
-            reasons.append(_absent(name))
+            reasons.append(
+                f"{name} is not here (vla-deploy models fetch {name}, or add {name} --whisper "
+                "FOLDER)"
+            )
             continue
         try:
             model = shelf.store.load(name)
@@ -50,8 +52,3 @@ def select_recogniser(shelf: ModelShelf, profile: Profile, model_tier: int) -> S
         recogniser.notices = tuple(reasons)
         return SelectedRecogniser(recogniser=recogniser, why="; ".join(reasons))
     return SelectedRecogniser(recogniser=None, why="; ".join(reasons))
-
-
-def _absent(name: str) -> str:
-    remedy = f"fetch {name}" if name in PUBLISHED else f"add {name} --whisper FOLDER"
-    return f"{name} is not here (vla-deploy models {remedy})"

@@ -1,13 +1,16 @@
 """Hear without a process around it: a recording, or a microphone of the command line."""
 
+from pathlib import Path
 from typing import Final
 
+from drivers.audio.wav import read_wav
 from drivers.clock import Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.speech.asr_pipeline import AsrPipeline
+from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.model_selection import SelectedRecogniser
-from vla_deploy.speech.sound import count_of
+from vla_deploy.speech.sound import Sound, count_of
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
 
@@ -41,3 +44,14 @@ def open_hearing(
     queue = TranscriptionQueue(AtOnce(), clock)
     queue.selected = selected
     return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)
+
+
+def sound_of(path: Path) -> Sound:
+    """Return a WAV file as one channel at 16 kHz.
+
+    Raises:
+        DriverError: it is missing, or no WAV file of 16-bit samples.
+        SpeechMissing: it has another rate, and PyAV is not installed.
+    """
+    format_, samples = read_wav(path)
+    return Resampler(format_).feed(samples)

@@ -15,9 +15,9 @@ from training.planner.files import MEAN_OF, TOKENIZER  # noqa: E402
 from training.planner.going_on import NEW_SHARE, mean  # noqa: E402
 from training.planner.settings import SIZES  # noqa: E402
 from training.planner.training import train  # noqa: E402
+from vla_deploy.inference.language_model import LanguageModel  # noqa: E402
 from vla_deploy.inference.manifest import Language, Use  # noqa: E402
 from vla_deploy.inference.opening import PLAIN_CHOICE  # noqa: E402
-from vla_deploy.planning.language_model import LanguageModel  # noqa: E402
 
 
 def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells(
@@ -29,7 +29,9 @@ def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells
     language = Language(use=Use.COMMAND_PARSER, most_tokens=160)
     model = LanguageModel(tmp_path / "model", language, PLAIN_CHOICE)
     command = Composer().example(Random(2)).command
-    prompt = model.tokenizer.encode(model.prompt([{"role": "user", "content": command}])).ids
+    prompt = model.tokenizer.encode(
+        model.template.prompt([{"role": "user", "content": command}])
+    ).ids
     with torch.no_grad():
         wanted = network.scores(network(torch.tensor([prompt])))[0, -1].numpy()
     np.testing.assert_allclose(model.decoder.feed(prompt), wanted, rtol=1e-3, atol=1e-4)

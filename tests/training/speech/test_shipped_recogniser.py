@@ -15,7 +15,7 @@ from training.voices.cast import Speaker, say
 from training.voices.clip import Clip, Style
 from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
+from vla_deploy.model_tools.whispers import PLAIN_CHOICE
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 from vla_deploy.speech.transcript import confidence
 

@@ -49,7 +49,7 @@ def test_a_whisper_is_added_listed_checked_measured_and_removed(
     shown = json.loads(vla("show", "mine", "--json")[1])
     assert shown["whisper"] == {"languages": ["en"], "context": "trimmed", "hot_words": True}
     code, out, _ = vla("verify", "mine", "--profile", "desktop")
-    assert (code, out.count("ok  ")) == (0, 4)
+    assert (code, out.count("ok  ")) == (0, 3)
     code, out, _ = vla("bench", "mine", "--rounds", "2", "--profile", "desktop", "--json")
     figures = json.loads(out)
     assert (code, len(figures["rows"])) == (0, 3)

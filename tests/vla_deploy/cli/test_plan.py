@@ -60,7 +60,7 @@ def test_what_nobody_can_plan_is_refused_with_what_each_said(plan):
     code, printed = plan("sing a sea shanty")
     assert code == 2
     said = [line.split()[0] for line in printed.splitlines()]
-    assert said == ["patterns", "cache", "command_parser"]
+    assert said == ["patterns", "command_parser"]
 
 
 def test_a_server_that_is_not_there_is_told(plan, tmp_path):

@@ -66,14 +66,14 @@ def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
 
 def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
     planner = {
-        "rungs": ["rules", "cache", "server bench"],
+        "rungs": ["rules", "server bench"],
         "by_rung": {"rules": {"planned": 3}, "server bench": {"declined": 2}},
         "refused": 1,
         "away": {"cloud": "no key"},
         "question": "Which cup?",
     }
     text = as_text({**dict.fromkeys(SILENT), "scene": None, "planner": planner})
-    assert "plans by: rules 3, cache 0, server bench 0; refused 1" in text
+    assert "plans by: rules 3, server bench 0; refused 1" in text
     assert "  without cloud: no key" in text
     assert "asks: Which cup?" in text
 

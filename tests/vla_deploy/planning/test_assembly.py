@@ -49,22 +49,18 @@ def open_with(tmp_path, loopback):
 
 def test_nobody_else_is_asked_unless_configured(open_with):
     planner = open_with("within_s = 5.0")
-    assert planner.back_ends == ("patterns", "cache")
+    assert planner.back_ends == ("patterns",)
     assert planner.uses == frozenset()
 
 
-def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
+def test_servers_are_asked_after_the_patterns(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
-    assert planner.back_ends == ("patterns", "cache", "server bench")
+    assert planner.back_ends == ("patterns", "server bench")
     assert planner.uses == {Aid.MEMORY}
     loopback.then(loopback.says(json.dumps(ANSWER)))
     answer = planner.plan(ask("make it nice in here"))
     assert answer.plan.actions[0].parameters == {"place": "kitchen"}
-    assert [one.outcome for one in answer.attempts] == ["declined", "declined", "planned"]
-    planner.accepted(ask("make it nice in here"), answer)
-    again = planner.plan(ask("make it nice in here"))
-    assert (again.proposal.back_end, again.proposal.origin) == ("cache", "server bench")
-    assert len(loopback.heard) == 1
+    assert [one.outcome for one in answer.attempts] == ["declined", "planned"]
     assert planner.document()["servers"][0]["answers"] == 1
 
 
@@ -81,31 +77,20 @@ def test_servers_that_are_not_there_are_told_and_done_without(open_with):
     assert "NO_SUCH_KEY_ANYWHERE" in planner.away["cloud"]
 
 
-def test_no_more_rungs_are_asked_than_the_profile_allows(open_with):
-    assert open_with('servers = ["bench"]\nmax_rungs = 0').slow_back_ends == ()
-
-
-@pytest.mark.parametrize(
-    ("max_rungs", "slow"), [(4, ("server bench", "command_parser")), (1, ("command_parser",))]
-)
-def test_the_shipped_parser_is_asked_last_and_no_bound_leaves_it_out(
-    tmp_path, loopback, ask, max_rungs, slow
-):
+def test_the_shipped_parser_is_asked_last(tmp_path, loopback, ask):
     config = tmp_path / "base-config"
     config.mkdir()
     (config / "servers.toml").write_text(SERVERS.format(url=loopback.url))
     profile = tmp_path / "mine.toml"
-    profile.write_text(
-        f'inherits = "desktop"\n[planning]\nservers = ["bench"]\nmax_rungs = {max_rungs}\n'
-    )
+    profile.write_text('inherits = "desktop"\n[planning]\nservers = ["bench"]\n')
     clock, robot = MonotonicClock(), load_robot("butler")
     planner = planner_for(robot, load_profile(profile), clock, tmp_path / "base")
-    assert planner.slow_back_ends == slow
+    assert planner.slow_back_ends == ("server bench", "command_parser")
     loopback.then(loopback.sends(500, b""))
     answer = planner.plan(ask("would you mind heading over to the kitchen"))
     planner.close()
     assert answer.proposal.back_end == "command_parser"
-    assert [one.back_end for one in answer.attempts[2:]] == list(slow)
+    assert [one.back_end for one in answer.attempts[1:]] == list(planner.slow_back_ends)
 
 
 def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_with, loopback, ask):

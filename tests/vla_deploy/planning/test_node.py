@@ -4,7 +4,6 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
-from vla_deploy.planning.planner import Planner
 
 
 @pytest.fixture
@@ -61,7 +60,7 @@ def test_why_nobody_planned_it_is_told(desk):
     (refused,) = desk.answers()
     assert refused["event"] == "rejected"
     assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
-    assert [one["rung"] for one in refused["attempts"]] == ["patterns", "cache"]
+    assert [one["rung"] for one in refused["attempts"]] == ["patterns"]
 
 
 def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
@@ -157,7 +156,7 @@ def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
     assert desk.answers() == []
 
 
-def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
+def test_the_status_tells_of_commands_and_rungs(desk):
     desk.give(text="go to the kitchen")
     desk.give(text="sing a sea shanty")
     desk.answers()
@@ -165,8 +164,7 @@ def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
     assert (status["heard"], status["planned"], status["refused"]) == (2, 1, 1)
     assert status["by_rung"]["patterns"]["planned"] == 1
     assert status["by_rung"]["patterns"]["declined"] == 1
-    assert status["cache"]["misses"] == 1
-    assert status["rungs"] == ["patterns", "cache"]
+    assert status["rungs"] == ["patterns"]
 
 
 def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
@@ -186,12 +184,3 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
     assert [one["event"] for one in desk.answers()] == ["accepted", "plan"]
     later.do_one()
     assert closed == ["model"]
-
-
-def test_plans_are_kept_by_the_planner_in_force(open_desk, back_end, propose):
-    model = back_end("model", propose(("turn", {"angle_rad": 1.0}), may_be_kept=True))
-    desk = open_desk(model)
-    desk.planner.commit(Planner(desk.clock, (model,)))
-    desk.give(text="sing a sea shanty")
-    desk.answers()
-    assert desk.status()["cache"]["plans"] == 1

@@ -41,7 +41,10 @@ def test_the_first_tier_that_is_there_is_opened(shelf: ModelShelf, scripted_whis
     recogniser = open_best(shelf, profile, 0)
     assert recogniser.model.manifest.name == "small"
     (notice,) = recogniser.notices
-    assert notice == ("whisper-small.en is not here (vla-deploy models fetch whisper-small.en)")
+    assert notice == (
+        "whisper-small.en is not here (vla-deploy models fetch whisper-small.en, or "
+        "add whisper-small.en --whisper FOLDER)"
+    )
     assert open_best(shelf, profile, 2).model.manifest.name == "tiny"
     assert open_best(shelf, profile, 9).model.manifest.name == "tiny"
 
@@ -79,5 +82,5 @@ def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_wh
     profile = profile_with("empty", "missing")
     selected = select_recogniser(shelf, profile, 0)
     assert selected.recogniser is None
-    absent = "{0} is not here (vla-deploy models add {0} --whisper FOLDER)"
+    absent = "{0} is not here (vla-deploy models fetch {0}, or add {0} --whisper FOLDER)"
     assert selected.why == f"{absent.format('empty')}; {absent.format('missing')}"

@@ -17,7 +17,6 @@ COPIED_FIELDS: Final = frozenset(
 # What stands for words that were not said: "come here" goes to "me".
 IMPLIED: Final = ("me", "back", "charging station")
 MOST_STEPS: Final = 6
-MOST_WORDS: Final = 24
 
 _ARMS: Final = ("left", "right")
 _WAYS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -66,8 +65,8 @@ _COPIED: Final[JsonSchema] = {"$ref": "#/$defs/copied"}
 Step = Mapping[str, str]
 
 
-def answer_schema(words: Sequence[str] = ()) -> JsonSchema:
-    """Return the JSON Schema of an answer to a command of these words; without, that of any."""
+def answer_schema(words: Sequence[str]) -> JsonSchema:
+    """Return the JSON Schema of an answer to a command of these words."""
     copied = {"type": "string", "pattern": f"^(?:{_copied(words)})$"}
     return {
         "$defs": {"copied": copied},
@@ -87,8 +86,6 @@ def answer_schema(words: Sequence[str] = ()) -> JsonSchema:
 
 def _copied(words: Sequence[str]) -> str:
     """Return the pattern of what may be copied: some of the words in their order, each once."""
-    if not words:
-        return f"( [a-z0-9_'.]+){{1,{MOST_WORDS}}}"
     in_order = "".join(f"( {re.escape(one)})?" for one in words)
     return "|".join((in_order, *(f" {one}" for one in IMPLIED)))
 
@@ -99,22 +96,15 @@ def field_names(do: str) -> tuple[tuple[str, bool], ...]:
 
 
 def _step_schema(do: str) -> JsonSchema:
-    closed = {
-        "arm": _ARMS,
-        "how": RELATIONS,
-        "about": SUBJECTS,
-        "way": _WAYS.get(do, ()),
+    closed = {"arm": _ARMS, "how": RELATIONS, "about": SUBJECTS, "way": _WAYS.get(do, ())}
+    fields = field_names(do)
+    given = {
+        name: _COPIED if name in COPIED_FIELDS else {"enum": list(closed[name])}
+        for name, _ in fields
     }
-    properties: dict[str, Any] = {"do": {"const": do}}
-    needed = ["do"]
-    for name, is_needed in field_names(do):
-        is_copied = name in COPIED_FIELDS
-        properties[name] = _COPIED if is_copied else {"enum": list(closed[name])}
-        if is_needed:
-            needed.append(name)
     return {
         "type": "object",
-        "properties": properties,
-        "required": needed,
+        "properties": {"do": {"const": do}, **given},
+        "required": ["do", *(name for name, is_needed in fields if is_needed)],
         "additionalProperties": False,
     }

@@ -13,6 +13,7 @@ from typing import Final
 from platforms import ModelChoice
 from vla_deploy.action_words import skill_words
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
+from vla_deploy.inference.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.inference.manifest import Certainty, Use
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
@@ -35,7 +36,6 @@ from vla_deploy.planning.command_parser.wording import (
 )
 from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
-from vla_deploy.planning.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import order_of, proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
@@ -197,7 +197,7 @@ def _covered(parsed: Parsed) -> frozenset[str]:
         word
         for _, span in copied_spans(parsed.steps, parsed.words)
         if span is not None
-        for word in (*span.spoken, *(parsed.words[place] for place in span.places))
+        for word in span.spoken
     )
     stood_for = (
         word

@@ -91,10 +91,7 @@ def _gives_way(done: PlannedCommand) -> bool:
     The command parser and language models make something of misheard words, too.
     """
     proposal, plan, scene = done.answer.proposal, done.answer.plan, done.request.scene
-    is_of_a_model = proposal is not None and (
-        proposal.knows_grammar or proposal.back_end == COMMAND_PARSER
-    )
-    if proposal is not None and not proposal.origin and is_of_a_model:
+    if proposal is not None and (proposal.knows_grammar or proposal.back_end == COMMAND_PARSER):
         return True
     if plan is None or scene is None or not scene.things:
         return False

@@ -159,13 +159,11 @@ class CommandManager:
         self.dialogue.remember(stop)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
-        """Note how the executor ended a command; a plan that failed is not given again."""
+        """Note how the executor ended a command."""
         ended = self._active.end(command_id)
-        turn = self.dialogue.ended(command_id, success, error)
+        self.dialogue.ended(command_id, success, error)
         if ended is not None:
             self._events.ended(*ended, success, error)
-        if turn is not None and not success:
-            self.planner.cache.forget(turn.said)
 
     def turned_away(self, command_id: str, error: str) -> None:
         """Note that the executor does not carry out a plan that it was given."""
@@ -291,7 +289,6 @@ class CommandManager:
             self._prohibitions.apply(order)
         if order is not None and order.forbids and self._breaks(request):
             self._cancel_all(f"{request.command_id}-forbids")
-        self.planner.accepted(request, answer)
 
     def _breaks(self, request: Request) -> bool:
         """Tell whether what is under way does what is forbidden, as far as that is known."""

@@ -4,9 +4,10 @@ At most one question waits at a time. Beside it a plan may be held until the per
 else is said does not drop it.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Final
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 from drivers.clock import Clock
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
@@ -20,8 +21,7 @@ from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
-from vla_deploy.planning.interfaces import PlanningResult, Request
-from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import numbered
 from vla_deploy.planning.understanding import (
@@ -38,6 +38,27 @@ from vla_deploy.planning.understanding.conversation import mentions_of
 MOST_ASKED: Final = 3
 HELD_S: Final = 3600.0
 """How long a plan waits for the word that begins it."""
+
+
+@dataclass(slots=True)
+class PlannerMetrics:
+    """Count what came of commands, and of each back end; `failed` are faults of the planner."""
+
+    heard: int = 0
+    planned: int = 0
+    refused: int = 0
+    asked: int = 0
+    failed: int = 0
+    by_rung: defaultdict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
+
+    def note(self, attempts: Iterable[Attempt]) -> None:
+        """Count what the back ends did for one command."""
+        for one in attempts:
+            self.by_rung[one.back_end][one.outcome.value] += 1
+
+    def document(self) -> dict[str, Any]:
+        """Return the counts as JSON takes them."""
+        return {name: getattr(self, name) for name in self.__slots__}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,9 +275,7 @@ class Dialogue:
             )
         )
 
-    def ended(self, command_id: str, success: bool, error: str) -> Turn | None:
-        """Note how a command ended that was carried out, and return its turn if it is known."""
+    def ended(self, command_id: str, success: bool, error: str) -> None:
+        """Note how a command ended that was carried out."""
         outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
         self.conversation = self.conversation.ended(command_id, outcome, error)
-        turns = self.conversation.turns
-        return next((one for one in turns if one.command_id == command_id), None)

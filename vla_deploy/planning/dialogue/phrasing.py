@@ -10,12 +10,11 @@ from enum import StrEnum
 from itertools import zip_longest
 from typing import Any, Final
 
-from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanInvalid, PlanningError
+from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanningError
 from vla_deploy.planning.plan import Plan
 
 _MOST_STEPS: Final = 6
 _MOST_SPOKEN_CHARACTERS: Final = 160
-_ID: Final = re.compile(r" \(\w+\)")
 _STOP_WORD: Final = re.compile(r"(?<![a-z])(?:stop|halt|freeze)(?![a-z])", re.IGNORECASE)
 
 
@@ -68,20 +67,13 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
 
 
 def spoken_refusal(reason: PlanningError | str) -> str:
-    """Return what is said aloud of a refusal: one sentence, and what could be done instead.
-
-    The rest is to be read.
-    """
+    """Return what is said aloud of a refusal: one sentence; the rest is to be read."""
     if isinstance(reason, Says):
         return reason
     for kind, sentence in _SPOKEN.items():
         if isinstance(reason, kind):
             return sentence
-    if not isinstance(reason, PlanInvalid):
-        return Says.REFUSED.format(reason=first_part(str(reason)))
-    said = Says.REFUSED.format(reason=first_part(reason.why))
-    advice = first_part(_ID.sub("", reason.advice))
-    return f"{said} {advice}." if advice else said
+    return Says.REFUSED.format(reason=first_part(str(reason)))
 
 
 def first_part(reason: str) -> str:

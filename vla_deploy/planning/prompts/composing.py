@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from vla_deploy.model_servers.chat import Chat, Message
 from vla_deploy.planning.bounds import MOST_CHARACTERS
-from vla_deploy.planning.catalogue import SKILLS, Parameter, Type
+from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.understanding import Turn
@@ -20,60 +20,28 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 from vla_deploy.world.words import size_word
 
 TEMPLATES: Final = Path(__file__).parent
-DEFAULT_ROOM: Final = 12_000
-"""Characters of a prompt: about a quarter as many tokens."""
-# Each variant is a way to ask for the same thing; which template files it is made of.
-VARIANTS: Final[Mapping[str, tuple[str, ...]]] = {
-    "few_shot": ("structured", "human_interaction", "few_shot"),
-    "chain_of_thought": ("structured", "human_interaction", "chain_of_thought"),
-    "structured": ("structured", "human_interaction"),
-    "short": ("short",),
-}
-# What a variant gives way to where it leaves the situation too little room.
-_SHORTER: Final[Mapping[str, tuple[str, ...]]] = {
-    "few_shot": ("structured", "short"),
-    "chain_of_thought": ("structured", "short"),
-    "structured": ("short",),
-    "short": (),
-}
+ROOM: Final = 14_000
+"""Characters of a prompt, schema included: about a quarter as many tokens."""
 # Enough for what failed and all that was done before it.
 _FAILURE_CHARACTERS: Final = 600
-_LEAST_DATA: Final = 1_500
-_TAGS: Final = len("<situation>\n\n</situation>\n<command></command>")
-_UNITS: Final = {"_m": "m", "_rad": "rad", "_s": "s"}
 
 
-def chat_for(
-    request: Request,
-    robot: str,
-    variant: str = "few_shot",
-    room: int = DEFAULT_ROOM,
-    jpeg: bytes | None = None,
-) -> Chat:
-    """Return the question; instructions and data together take at most `room` characters.
-
-    Where the variant leaves the situation too little room, shorter instructions are taken.
-    """
-    more = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
+def chat_for(request: Request, robot: str, room: int = ROOM, jpeg: bytes | None = None) -> Chat:
+    """Return the question; of the situation so much is told that `room` characters suffice."""
+    extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
         "robot": plain(robot),
         "skills": skills_in_words(),
         "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
-    for name in (variant, *_SHORTER[variant]):
-        system = "\n\n".join(filled(part, **fields) for part in (*VARIANTS[name], *more))
-        data_room = room - len(system) - _TAGS
-        if data_room >= _LEAST_DATA:
-            break
-    situation: dict[str, Any] = situation_of(request)
-    if request.failed:
-        failed = [plain(one, _FAILURE_CHARACTERS) for one in request.failed]
-        situation["failed_before"] = failed
+    system = "\n\n".join(filled(part, **fields) for part in ("plan", *extra))
     command = as_data(plain(request.text, MOST_CHARACTERS))
-    data = as_data(fitted(situation, max(data_room, 0) - len(command)))
-    text = f"<situation>\n{data}\n</situation>\n<command>{command}</command>"
+    text = "<situation>\n{}\n</situation>\n<command>{}</command>"
+    data_room = room - len(system) - len(text) - len(command)
+    data = as_data(fitted(situation_of(request), data_room))
     images = () if jpeg is None else (jpeg,)
-    return Chat(system=system, messages=(Message(text=text, images=images),), schema_name="plan")
+    message = Message(text=text.format(data, command), images=images)
+    return Chat(system=system, messages=(message,), schema_name="plan")
 
 
 def filled(name: str, **fields: str) -> str:
@@ -88,15 +56,10 @@ def _template(name: str) -> Template:
 
 @cache
 def skills_in_words() -> str:
-    """Return every skill on a line: its name, its parameters with their ranges, what it does."""
-    lines = []
-    for name, spec in SKILLS.items():
-        parameters = ", ".join(
-            f"{key}{'' if one.required else '?'}{_range(key, one)}"
-            for key, one in spec.parameters.items()
-        )
-        lines.append(f"- {name}({parameters}): {spec.summary}")
-    return "\n".join(lines)
+    """Return every skill on a line: its name, its parameters, what it does."""
+    return "\n".join(
+        f"- {name}({', '.join(spec.parameters)}): {spec.summary}" for name, spec in SKILLS.items()
+    )
 
 
 def limits(world: World) -> Iterator[str]:
@@ -114,15 +77,6 @@ def limits(world: World) -> Iterator[str]:
     yield "it handles no people, animals, fire, blades, medicine or hot liquids"
 
 
-def _range(name: str, parameter: Parameter) -> str:
-    if parameter.type is Type.CHOICE:
-        return f" {'|'.join(parameter.choices)}"
-    if parameter.type is not Type.NUMBER:
-        return ""
-    unit = next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "")
-    return f" {parameter.minimum:.4g}..{parameter.maximum:.4g} {unit}".rstrip()
-
-
 # --- the situation as data: no text in it can end the data ----------------------------------------
 
 NAME_CHARACTERS: Final = 60
@@ -130,20 +84,10 @@ SENTENCE_CHARACTERS: Final = 200
 _LOOKED_AT: Final = 4  # times as much as may be left when white space is folded
 # What could end the data is written as an escape of JSON.
 _ESCAPES: Final = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026"}
-# What is cut first, and how many rows of it are kept while anything after it can be cut. The first
-# rows matter most: things that the command names, then the nearest; what was said last.
-CUT_ORDER: Final[tuple[tuple[str, int], ...]] = (
-    ("remembered", 0),
-    ("gone", 0),
-    ("things", 12),
-    ("said_before", 1),
-    ("failed_before", 1),
-    ("things", 0),
-    ("said_before", 0),
-    ("failed_before", 0),
-)
-_COMMA: Final = 1
-MOST_THINGS: Final = 60
+# What is cut first. The first rows of each matter most: things that the command names, then the
+# nearest; what was said last.
+CUT_ORDER: Final = ("remembered", "gone", "said_before", "failed_before", "things")
+MOST_THINGS: Final = 30
 MOST_RECOLLECTIONS: Final = 8
 _UNKNOWN_KIND: Final = "object"
 
@@ -151,12 +95,9 @@ _UNKNOWN_KIND: Final = "object"
 def situation_of(request: Request) -> dict[str, Any]:
     """Return all that a planner should know of a request, apart from the command itself."""
     scene = request.scene
-    things = [] if scene is None else _things(request, scene)
-    gone = [] if scene is None else [plain(one.thing) for one in scene.lost]
     return {
-        "things": things,
-        "left_out": 0 if scene is None else len(scene.things) - len(things),
-        "gone": gone,
+        "things": [] if scene is None else _things(request, scene),
+        "gone": [] if scene is None else [plain(one.thing) for one in scene.lost],
         "hands": {
             plain(hand): what and plain(what) for hand, what in request.world.holding.items()
         },
@@ -165,6 +106,7 @@ def situation_of(request: Request) -> dict[str, Any]:
         "remembered": [
             plain(one, SENTENCE_CHARACTERS) for one in request.recollections[:MOST_RECOLLECTIONS]
         ],
+        "failed_before": [plain(one, _FAILURE_CHARACTERS) for one in request.failed],
     }
 
 
@@ -209,18 +151,12 @@ def _turn(turn: Turn) -> dict[str, str]:
 def fitted(situation: Mapping[str, Any], room: int) -> dict[str, Any]:
     """Return a situation of at most `room` characters of data, its least important rows left out.
 
-    Rows that were left out are counted under `left_out`. What is in no row of the order stays.
+    What is in no row of the order stays.
     """
-    kept = {**situation, "left_out": situation.get("left_out", 0)}
-    rows_of = [value for value in kept.values() if isinstance(value, list)]
-    length = len(as_data(kept)) + len(str(sum(map(len, rows_of))))
-    for name, least in CUT_ORDER:
-        rows = list(kept.get(name, ()))
-        while length > room and len(rows) > least:
-            length -= len(as_data(rows.pop())) + _COMMA
-            kept["left_out"] += 1
-        if name in kept:
-            kept[name] = rows
+    kept = dict(situation)
+    for name in CUT_ORDER:
+        while kept[name] and len(as_data(kept)) > room:
+            kept[name] = kept[name][:-1]
     return kept
 
 

@@ -1,7 +1,6 @@
 """Go through a plan symbol by symbol and name every action that could not be done."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from vla_deploy.planning.catalogue import ARMS, SKILLS
 from vla_deploy.planning.knowledge import World
@@ -10,15 +9,6 @@ from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.state import Pose, State, state_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.world import Snapshot
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Broken:
-    """Hold an action that cannot be done, where it would begin, and why by the rules it breaks."""
-
-    action: Action
-    state: State
-    rules: dict[str, str]
 
 
 def symbolic_faults(
@@ -32,18 +22,18 @@ def symbolic_faults(
     After an action that cannot be done the rest is judged as if it had been. The actions must be
     valid one by one, and their dependencies acyclic.
     """
-    return [
-        f'action "{one.action.id}": {one.action.skill} breaks "{rule}": {why}'
-        for one in _broken(actions, state_of(world, scene, here), world, scene)
-        for rule, why in one.rules.items()
-    ]
-
-
-def first_broken(
-    actions: Sequence[Action], world: World, scene: Snapshot | None, here: Pose | None
-) -> Broken | None:
-    """Return the first action that cannot be done, None where all can."""
-    return next(_broken(actions, state_of(world, scene, here), world, scene), None)
+    faults = []
+    state = state_of(world, scene, here)
+    for action in execution_order(actions):
+        logic = LOGIC[action.skill]
+        setting = Setting(parameters=action.parameters, world=world, scene=scene)
+        faults += [
+            f'action "{action.id}": {action.skill} breaks "{rule}": {why}'
+            for rule, holds in logic.needs.items()
+            if (why := holds(state, setting))
+        ]
+        state = logic.effect(state, setting)
+    return faults
 
 
 def end_state(
@@ -85,18 +75,6 @@ def expected_s(action: Action) -> float:
         return float(action.parameters.get("duration_s", 0.0))
     spec = SKILLS.get(action.skill)
     return max(action.estimated_duration_s, 0.0 if spec is None else spec.estimated_duration_s)
-
-
-def _broken(
-    actions: Sequence[Action], state: State, world: World, scene: Snapshot | None
-) -> Iterator[Broken]:
-    for action in execution_order(actions):
-        logic = LOGIC[action.skill]
-        setting = Setting(parameters=action.parameters, world=world, scene=scene)
-        rules = {rule: why for rule, holds in logic.needs.items() if (why := holds(state, setting))}
-        if rules:
-            yield Broken(action=action, state=state, rules=rules)
-        state = logic.effect(state, setting)
 
 
 # --- parts of the robot that several actions need -------------------------------------------------

@@ -124,9 +124,6 @@ BEFORE: Final = "robot before it"
 FREE_HAND: Final = "hand free"
 HOLDING: Final = "something held"
 WHICH_HAND: Final = "hand named"
-GRASPABLE: Final = "graspable"
-PAYLOAD: Final = "payload"
-TAKES_THINGS: Final = "destination takes things"
 
 LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
     {
@@ -157,8 +154,8 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 "not held": conditions.is_not_held,
                 FREE_HAND: conditions.has_free_hand,
                 BEFORE: conditions.is_before,
-                GRASPABLE: conditions.can_be_gripped,
-                PAYLOAD: conditions.is_light_enough,
+                "graspable": conditions.can_be_gripped,
+                "payload": conditions.is_light_enough,
             },
             effect=takes,
             leaves=("object held",),
@@ -169,7 +166,7 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 WHICH_HAND: conditions.knows_which,
                 KNOWN: conditions.is_known,
                 "not onto itself": conditions.is_not_held,
-                TAKES_THINGS: conditions.takes_things,
+                "destination takes things": conditions.takes_things,
                 BEFORE: conditions.is_before,
             },
             effect=puts,

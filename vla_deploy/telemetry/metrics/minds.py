@@ -7,7 +7,6 @@ from vla_deploy.telemetry.metrics.kinds import Kind, Metric
 from vla_deploy.telemetry.metrics.paths import Each, keys, same
 from vla_deploy.telemetry.metrics.takes import count_of
 
-_RUNGS: Final = (keys("by_rung"), Each("rung"))
 _OUTCOMES: Final = ("planned", "asked", "declined", "refused", "invalid", "late")
 # Speech's own words for them come with its networks, which are not for whoever only counts.
 _VERDICTS: Final = ("accepted", "doubted", "rejected", "stop")
@@ -23,7 +22,7 @@ def _seconds(name: str, topic: str, paths: tuple[tuple[str, str], ...], text: st
             unit="seconds",
             help=f"{text}, {word}.",
             topic=topic,
-            paths=((*_RUNGS, keys(key)) if topic == "planner_status" else (keys(key),),),
+            paths=((keys(key),),),
             kept=word == "p95",
         )
         for word, key in paths
@@ -52,11 +51,7 @@ PLANNING: Final[tuple[Metric, ...]] = (
         kind=Kind.COUNTER,
         help="How often a rung of the planner's ladder was asked, by how that ended.",
         topic="planner_status",
-        paths=((*_RUNGS, same("outcome", *_OUTCOMES)),),
-    ),
-    *_seconds(
-        *("planner_rung", "planner_status", (("p50", "p50_s"), ("p95", "p95_s"))),
-        "Time that a rung of the planner's ladder took, of its last 256 attempts",
+        paths=((keys("by_rung"), Each("rung"), same("outcome", *_OUTCOMES)),),
     ),
     Metric(
         name="vla_planner_rungs_away",

@@ -31,7 +31,6 @@ PROFILE: Final = """inherits = "desktop"
 [planning]
 servers = ["tiny"]
 within_s = 5.0
-candidates = 1
 """
 MEGABYTE: Final = 1_100_000
 

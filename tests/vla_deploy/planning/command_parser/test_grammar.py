@@ -11,10 +11,10 @@ from tokenizers.pre_tokenizers import ByteLevel
 from tokenizers.trainers import BpeTrainer
 
 from training.planner.clause import answer_text
+from vla_deploy.inference.errors import AnswerFailed
+from vla_deploy.inference.language_model.decoding import Constraint
 from vla_deploy.planning.command_parser.grammar import STEPS, answer_schema
 from vla_deploy.planning.command_parser.wording import foreign_share, plain_words
-from vla_deploy.planning.language_model.decoding import Constraint, grammar_of
-from vla_deploy.planning.language_model.errors import SchemaUnusable
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +36,10 @@ COMMAND = "put the red cup in the big box"
 def takes(tokenizer: Tokenizer, answer: str) -> bool:
     schema = answer_schema(COMMAND.split())
     guide = LLTokenizer(tokenizer.to_str(), eos_token=0)
-    constraint = Constraint(guide, grammar_of(schema))
+    constraint = Constraint(guide, schema)
     try:
         constraint.take(tokenizer.encode(answer).ids)
-    except SchemaUnusable:
+    except AnswerFailed:
         return False
     return constraint.is_done
 

@@ -403,7 +403,7 @@ class TestWaitingForAWord:
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, back_end, propose):
-        go = propose(GO, is_unsure=True, may_be_kept=True)
+        go = propose(GO, is_unsure=True)
         desk = open_desk(back_end("model", go))
         desk.give(text="kitchen, like, you know")
         return desk
@@ -501,24 +501,6 @@ class TestReadingBack:
         assert refused["event"] == "rejected"
         assert "vla-deploy arm" in refused["reason"]
         assert desk.plans() == []
-
-    def test_the_plan_that_was_agreed_to_is_kept_for_the_same_words(self, desk):
-        desk.answers()
-        desk.give(command_id="c2", text="yes")
-        desk.answers()
-        desk.give(command_id="c3", text="kitchen, like, you know")
-        asked = desk.answers()[-1]
-        assert asked["event"] == "asked", "agreeing once is not agreeing for ever"
-        assert desk.status()["cache"]["hits"] == 1
-
-    def test_a_plan_that_failed_is_not_given_again(self, desk):
-        desk.answers()
-        desk.give(command_id="c2", text="yes")
-        desk.answers()
-        desk.executor_tells(command_id="c1", event="finished", success=False, error="no way")
-        desk.give(command_id="c3", text="kitchen, like, you know")
-        desk.answers()
-        assert desk.status()["cache"]["hits"] == 0
 
 
 class TestAQuestionOfAModel:

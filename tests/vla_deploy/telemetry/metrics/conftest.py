@@ -132,7 +132,7 @@ DOCUMENTS: dict[str, dict[str, Any]] = {
         "refused": 1,
         "asked": 0,
         "failed": 0,
-        "by_rung": {"rules": {"planned": 3, "declined": 1, "p50_s": 0.004, "p95_s": 0.02}},
+        "by_rung": {"rules": {"planned": 3, "declined": 1}},
         "commands": ["cli-1"],
         "away": {"cloud": "no key"},
     },

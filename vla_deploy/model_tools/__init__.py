@@ -1,0 +1,1 @@
+"""Prepare models for `vla-deploy models`: fetch, add, verify, measure; no robot imports it."""

@@ -1,0 +1,1 @@
+"""Add, measure and quantise detectors."""

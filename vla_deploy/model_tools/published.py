@@ -1,0 +1,178 @@
+"""Fetch published Whispers and language models from the Hugging Face hub."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+from typing import Final
+
+from vla_deploy.inference.errors import FetchFailed, ModelUnknown
+from vla_deploy.inference.language_schema import GENAI_CONFIG
+from vla_deploy.inference.whisper_schema import NEEDED_PARTS
+from vla_deploy.model_tools.hub import HubCommit, HubPlace
+from vla_deploy.model_tools.language_models import is_part
+from vla_deploy.model_tools.whispers import PARTS
+
+_MIT: Final = "MIT"
+_LLAMA: Final = "Llama 3.2 Community License"
+_CPU: Final = "cpu_and_mobile/cpu-int4-rtn-block-32-acc-level-4"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFormat:
+    """Say which files make up a model of a kind; where one lies, there is its `landmark`.
+
+    `option` is that of `models add` for a folder of this form.
+    """
+
+    name: str
+    option: str
+    landmark: str
+    is_part: Callable[[str], bool]
+
+
+WHISPER: Final = ModelFormat(
+    name="CTranslate2",
+    option="--whisper",
+    landmark=NEEDED_PARTS[0],
+    is_part=PARTS.__contains__,
+)
+LANGUAGE: Final = ModelFormat(
+    name="onnxruntime-genai", option="--language", landmark=GENAI_CONFIG, is_part=is_part
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublishedModel:
+    """Name the folder of a repository that a model is published in.
+
+    `licence` is "" where only the repository says.
+    """
+
+    repository: str
+    folder: str = ""
+    revision: str = "main"
+    summary: str = "a published language model"
+    licence: str = ""
+    format: ModelFormat = LANGUAGE
+
+    def __str__(self) -> str:
+        """Return it as `models fetch --language` takes it."""
+        return f"{self.repository}:{self.folder}" if self.folder else self.repository
+
+    @classmethod
+    def named(cls, place: str) -> "PublishedModel":
+        """Read OWNER/REPO[:FOLDER].
+
+        Raises:
+            ModelUnknown: it is no such text.
+        """
+        repository, _, folder = place.partition(":")
+        parts = (*repository.split("/"), *PurePosixPath(folder).parts)
+        if repository.count("/") != 1 or not all(parts) or ".." in parts or folder[:1] == "/":
+            raise ModelUnknown(f"expected OWNER/REPO or OWNER/REPO:FOLDER, got {place!r}")
+        return cls(repository=repository, folder=folder.strip("/"))
+
+
+WHISPERS: Final[Mapping[str, PublishedModel]] = MappingProxyType(
+    {
+        name: PublishedModel(
+            repository=f"Systran/faster-{name}",
+            summary=f"OpenAI's {name}, converted by SYSTRAN; {memory} of memory in int8",
+            licence=_MIT,
+            format=WHISPER,
+        )
+        for name, memory in (
+            ("whisper-tiny.en", "220 MB"),
+            ("whisper-base.en", "300 MB"),
+            ("whisper-small.en", "540 MB"),
+            ("whisper-medium.en", "1.1 GB"),
+            ("whisper-tiny", "220 MB"),
+            ("whisper-base", "300 MB"),
+            ("whisper-small", "540 MB"),
+        )
+    }
+)
+LANGUAGE_MODELS: Final[Mapping[str, PublishedModel]] = MappingProxyType(
+    {
+        "qwen2.5-0.5b-cpu": PublishedModel(
+            repository="amd/Qwen2.5-0.5B-Instruct-quantized_int4-float16-cpu-onnx",
+            summary="Alibaba's Qwen2.5 0.5B Instruct, int4, converted by AMD",
+            licence="Apache-2.0 (Qwen2.5's; the repository states none)",
+        ),
+        "llama-3.2-1b-cpu": PublishedModel(
+            repository="onnx-community/Llama-3.2-1B-Instruct-ONNX",
+            folder=_CPU,
+            summary="Meta's Llama 3.2 1B Instruct, int4 for the CPU",
+            licence=_LLAMA,
+        ),
+        "llama-3.2-1b-gpu": PublishedModel(
+            repository="onnx-community/Llama-3.2-1B-Instruct-ONNX",
+            folder="cuda/cuda-int4-rtn-block-32",
+            summary="Meta's Llama 3.2 1B Instruct, int4 and fp16 for CUDA",
+            licence=_LLAMA,
+        ),
+        "llama-3.2-3b-gpu": PublishedModel(
+            repository="onnx-community/Llama-3.2-3B-Instruct-ONNX",
+            folder="cuda/cuda-int4-rtn-block-32",
+            summary="Meta's Llama 3.2 3B Instruct, int4 and fp16 for CUDA",
+            licence=_LLAMA,
+        ),
+        "phi-3.5-mini-cpu": PublishedModel(
+            repository="microsoft/Phi-3.5-mini-instruct-onnx",
+            folder="cpu_and_mobile/cpu-int4-awq-block-128-acc-level-4",
+            summary="Microsoft's Phi-3.5 mini instruct (3.8B), int4 for the CPU",
+            licence=_MIT,
+        ),
+        "phi-4-mini-cpu": PublishedModel(
+            repository="microsoft/Phi-4-mini-instruct-onnx",
+            folder=_CPU,
+            summary="Microsoft's Phi-4 mini instruct (3.8B), int4 for the CPU",
+            licence=_MIT,
+        ),
+        "phi-4-mini-gpu": PublishedModel(
+            repository="microsoft/Phi-4-mini-instruct-onnx",
+            folder="gpu/gpu-int4-rtn-block-32",
+            summary="Microsoft's Phi-4 mini instruct (3.8B), int4 and fp16 for GPUs",
+            licence=_MIT,
+        ),
+    }
+)
+"""Where models are published; the hub alone knows their hashes."""
+
+
+def fetch(
+    published: PublishedModel,
+    folder: Path,
+    tell: Callable[[str], None],
+    endpoint: str | None = None,
+) -> tuple[Path, str]:
+    """Fetch a model's files into an empty folder, and check them; `tell` gets a line for each.
+
+    Returns the folder that they lie in, and the licence as the table or the hub states it.
+
+    Raises:
+        FetchFailed: the hub cannot be reached, or has no such model there, or the disk is full.
+        ModelFileSpoiled: a file is not what the hub says it is.
+        ToolMissing: the hub's client is not installed.
+    """
+    form = published.format
+    commit = HubCommit(
+        HubPlace(
+            repository=published.repository,
+            by_hand=f"vla-deploy models add NAME {form.option} FOLDER",
+            revision=published.revision,
+            endpoint=endpoint,
+        )
+    )
+    there = PurePosixPath(published.folder)
+    files = [PurePosixPath(path) for path in commit.paths]
+    wanted = [str(file) for file in files if file.parent == there and form.is_part(file.name)]
+    if str(there / form.landmark) not in wanted:
+        models = ", ".join(str(file.parent) for file in files if file.name == form.landmark)
+        raise FetchFailed(
+            f"{published}: no {form.landmark} lies there; expected the layout of {form.name}, "
+            f"which is in: {models or 'no folder of it'}"
+        )
+    commit.fetch(wanted, folder, tell)
+    return folder / published.folder, published.licence or commit.licence or "not stated"

@@ -1,0 +1,103 @@
+"""Check an installed model: its files, a trial run, and what a profile makes of it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from platforms import ModelChoice, Profile
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.file_check import check_parts, checked_file
+from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.roles import ModelShelf, choice_for
+from vla_deploy.inference.session import ModelSession, open_session
+from vla_deploy.inference.store import Model
+from vla_deploy.model_tools import language_models, whispers
+from vla_deploy.model_tools.detectors.trial import only, try_out
+from vla_deploy.perception.detectors.detector import Detector
+from vla_deploy.speech.errors import SpeechError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Hold one check and how it came out."""
+
+    model: str
+    check: str
+    is_ok: bool
+    detail: str
+
+
+def verify(shelf: ModelShelf, name: str, profile: Profile | None = None) -> Iterator[Finding]:
+    """Check a model by itself and, where a profile is given, as that profile would run it.
+
+    A model of several files, which takes seconds to load, is run once.
+    """
+    try:
+        model = shelf.store.load(name)
+    except InferenceError as error:
+        yield Finding(model=name, check="manifest", is_ok=False, detail=str(error))
+        return
+    yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
+    if model.manifest.parts:
+        yield _finding(name, "files", partial(_all_parts, model))
+    for variant in model.manifest.files:
+        yield _finding(name, f"file {variant}", partial(_whole, model, variant))
+        yield _finding(name, f"run {variant}", partial(_trial, shelf, model, variant))
+    if profile is not None:
+        yield _finding(name, f"profile {profile.name}", partial(_as_profile, shelf, model, profile))
+    elif model.manifest.parts:
+        yield _finding(name, "run", partial(_parts_tried, shelf, model, None))
+
+
+def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
+    try:
+        return Finding(model=model, check=check, is_ok=True, detail=act())
+    except (InferenceError, SpeechError) as error:
+        return Finding(model=model, check=check, is_ok=False, detail=str(error))
+
+
+def _all_parts(model: Model) -> str:
+    check_parts(model)
+    return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
+
+
+def _whole(model: Model, variant: Variant) -> str:
+    return f"{checked_file(model, variant).name}, SHA-256 as in the manifest"
+
+
+def _trial(shelf: ModelShelf, model: Model, variant: Variant) -> str:
+    """Run one file on the CPU, whatever it is made for."""
+    session = open_session(
+        only(model, variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
+    )
+    return _tried(session)
+
+
+def _as_profile(shelf: ModelShelf, model: Model, profile: Profile) -> str:
+    choice = choice_for(model.manifest.role, profile)
+    if model.manifest.parts:
+        return _parts_tried(shelf, model, choice)
+    session = open_session(model, choice, engines=shelf.engines, clock=shelf.clock)
+    told = "; ".join((f"{session.variant} on {session.provider}", *session.notices))
+    return f"{told}; {_tried(session)}"
+
+
+def _parts_tried(shelf: ModelShelf, model: Model, choice: ModelChoice | None) -> str:
+    """Run a model of several files, as plainly as it goes without a choice."""
+    if model.manifest.whisper is None:
+        answer = language_models.try_out(model, shelf.clock, choice or PLAIN_CHOICE)
+        return f"answers {answer.text} in {answer.runs} runs"
+    choice = choice or whispers.PLAIN_CHOICE
+    silence = whispers.try_out(model, shelf.clock, choice)
+    took = f"{choice.precision}, {choice.threads} threads, {1000 * silence.took_s:.0f} ms"
+    return f"reads {silence.text!r} in silence; {took}"
+
+
+def _tried(session: ModelSession) -> str:
+    try:
+        if session.model.manifest.detection is None:
+            return f"warm in {session.load_s:.2g} s"
+        return str(try_out(Detector(session)))
+    finally:
+        session.close()
