@@ -1,15 +1,11 @@
 """Read what the executor publishes of a plan that failed, and hold what was tried before."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any
 
 from vla_deploy.planning.plan import Action, Plan, execution_order
-
-_ID_CHARACTERS: Final = 64
-_BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
 
 class FailureCause(StrEnum):
@@ -111,10 +107,7 @@ class Carried:
 
 def numbered(plan: Plan, number: int) -> Plan:
     """Return a recovery's plan with ids that none of the plans before it has."""
-    short = {one.id: _BEFORE.sub("", one.id) for one in plan.actions}
-    names = {name: f"r{number}_{own}"[:_ID_CHARACTERS] for name, own in short.items()}
-    if len(set(names.values())) < len(names):
-        names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
+    names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
     actions = tuple(
         one.model_copy(
             update={"id": names[one.id], "depends_on": tuple(names[it] for it in one.depends_on)}
