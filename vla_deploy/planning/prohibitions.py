@@ -21,7 +21,6 @@ from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.symbolic.state import thing_of
-from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS
@@ -131,41 +130,14 @@ def held_to(
     """Return a grounded plan that keeps out of what is forbidden, also where it only searches.
 
     Raises:
-        NotAble: it does what is forbidden, or nothing else is left to search; says what, and how it
-            is permitted again.
+        NotAble: it does what is forbidden; says what, and how it is permitted again.
     """
     for one in standing:
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
-    closed = [one for one in standing if one.what is Forbidden.PLACE]
-    places = frozenset[str]().union(*(world.surfaces_of(one.words) for one in closed))
-    if places and _searches(plan, scene) and not _open_views(world, places):
-        told = " and ".join(map(str, closed))
-        raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
+    closed = (world.surfaces_of(one.words) for one in standing if one.what is Forbidden.PLACE)
+    places = frozenset[str]().union(*closed)
     return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
-
-
-def is_broken(
-    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
-) -> bool:
-    """Tell whether a plan that may have begun before does what is forbidden, or looks there."""
-    try:
-        kept = held_to(standing, plan, world, scene)
-    except NotAble:
-        return True
-    return _searches(plan, scene) and not {*kept.keeps_out} <= {*plan.keeps_out}
-
-
-def _searches(plan: Plan, scene: Snapshot | None) -> bool:
-    """Tell whether a plan looks for something that is not in the scene."""
-    sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
-    return any(thing_of(text, scene) is None for text in sought)
-
-
-def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
-    """Return from where furniture can be searched that is in none of the closed places."""
-    shut = {view for name in closed & world.sites.keys() for view in world.sites[name].viewpoints}
-    return {view for site in world.sites.values() for view in site.viewpoints} - shut
 
 
 def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None:

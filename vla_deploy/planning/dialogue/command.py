@@ -17,6 +17,9 @@ from vla_deploy.planning.understanding.quantities import numbers_in
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5
 """How surely doubted or other words are heard at most: less than what is carried out unasked."""
+WELL_HEARD: Final = 0.75
+LEAST_INSTEAD: Final = 0.15
+"""Words heard less surely are read back, where others are so likely."""
 _ID_CHARACTERS: Final = 128
 _MOST_OTHERS: Final = 8
 
@@ -50,16 +53,23 @@ class UserCommand:
 
     @property
     def has_unsure_words(self) -> bool:
-        """Return whether a number in it may have been another one, or a "don't" was not heard.
+        """Return whether it may well have been another command, number, or have had a "don't".
 
         "90" may be heard as "19". A "one" where no number was read mostly stands for a thing: "the
         red one".
         """
+        sure = self.heard_confidence
+        if sure is not None and sure < WELL_HEARD and self.may_have_been():
+            return True
         numbers = numbers_in(self.text)
         others = {numbers_in(text) for text, _ in self.others}
         if others - {numbers, (), (1.0,) if not numbers else ()}:
             return True
         return not negates(self.text) and any(negates(text) for text, _ in self.others)
+
+    def may_have_been(self) -> tuple[str, ...]:
+        """Return the other readings that are so likely that they count."""
+        return tuple(text for text, odds in self.others if odds >= LEAST_INSTEAD)
 
     @property
     def is_spoken(self) -> bool:

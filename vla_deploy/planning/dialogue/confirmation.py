@@ -4,7 +4,6 @@ The robot file sets how far it goes (`[planning] require_confirmation`): never, 
 is unsure is always asked, since it may not be what was asked for.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Set
 from typing import Final
 
@@ -14,8 +13,7 @@ from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.scope import quoted
 from vla_deploy.planning.symbolic.conditions import Setting
-from vla_deploy.planning.symbolic.simulation import expected_s
-from vla_deploy.planning.symbolic.state import Subject, subject_of
+from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.plan_bounds import Confirm
 
 Risk = Callable[[Plan, Request], str]
@@ -23,8 +21,6 @@ Risk = Callable[[Plan, Request], str]
 # Below that the words may mean something else, or may have been other words.
 SURE: Final = 0.7
 SURELY_HEARD: Final = 0.6
-MANY_ACTIONS: Final = 25
-LONG_S: Final = 900.0
 MANY_THINGS: Final = 4
 MOST_NAMED: Final = 6
 HEAVY_RATIO: Final = 0.8
@@ -48,44 +44,18 @@ def confirmation_of(
 
 
 def question_about(plan: Plan, request: Request, proposal: Proposal | None = None) -> str:
-    """Return the question whether a plan is wanted: what may be wrong with it, what it takes."""
+    """Return the question whether a plan is wanted, with what may be wrong with it."""
     if proposal is not None and proposal.order is not None and proposal.order.question:
         return proposal.order.question
     left_out = () if proposal is None else proposal.left_out
-    steps = steps_in_words(_called_by_words(plan, request))
+    things = () if request.scene is None else request.scene.things
+    steps = steps_in_words(plan, {one.thing_id: str(one) for one in things})
     parts = (
         Says.LEFT_OUT.format(words=first_part(quoted(left_out))) if left_out else "",
         Says.CONFIRM.format(steps=steps),
         *(f"{reason}." for reason in _reasons(plan, request).values() if reason),
-        _things_named(plan, request),
     )
     return " ".join(filter(None, parts))
-
-
-def _things_named(plan: Plan, request: Request) -> str:
-    """Return the sentence that names what a plan takes, "" for fewer than two things.
-
-    So a yes can catch an error; of many things it tells the kinds.
-    """
-    taken = (action.parameters["object"] for action in plan.actions if action.skill == "pick_up")
-    subjects = [subject_of(str(text), request.scene) for text in dict.fromkeys(taken)]
-    if len(subjects) < 2:
-        return ""
-    if len(subjects) <= MOST_NAMED:
-        return f"That is {listed([_where_it_is(one) for one in subjects])}."
-    kinds = Counter(one.kind for one in subjects)
-    counted = [
-        f"{count} {kind.removesuffix('s')}{'s' * (count > 1)}" for kind, count in kinds.items()
-    ]
-    return f"That is {len(subjects)} things: {listed(counted)}."
-
-
-def _where_it_is(subject: Subject) -> str:
-    """Return "the red cup on the coffee table", as far as that is known."""
-    thing = subject.thing
-    if thing is None or thing.rests is None:
-        return f"the {thing or subject.words}"
-    return f"the {thing} {thing.rests.words}"
 
 
 def agreement_to(plan: Plan, request: Request) -> frozenset[str]:
@@ -102,24 +72,6 @@ def _reasons(plan: Plan, request: Request) -> dict[str, str]:
     whys = {kind: risk(plan, request) for kind, risk in risks.items()}
     found = {why if kind in _EACH else kind: why for kind, why in whys.items() if why}
     return {"any motion": "", **found} if wanted is Confirm.ALWAYS else found
-
-
-def _called_by_words(plan: Plan, request: Request) -> Plan:
-    """Return the plan with "red cup" where it says cup_1: a person knows no ids."""
-    things = () if request.scene is None else request.scene.things
-    words = {one.thing_id: str(one) for one in things}
-    actions = tuple(
-        action.model_copy(
-            update={
-                "parameters": {
-                    name: words.get(value, value) if isinstance(value, str) else value
-                    for name, value in action.parameters.items()
-                }
-            }
-        )
-        for action in plan.actions
-    )
-    return plan.model_copy(update={"actions": actions})
 
 
 def _is_unsure(plan: Plan, _: Request) -> str:
@@ -139,16 +91,14 @@ def _has_concerns(plan: Plan, _: Request) -> str:
     )
 
 
-def _is_long(plan: Plan, _: Request) -> str:
-    long_s = sum(expected_s(action) for action in plan.actions)
-    if long_s <= LONG_S and len(plan.actions) <= MANY_ACTIONS:
+def _moves_many(plan: Plan, request: Request) -> str:
+    taken = [str(one.parameters["object"]) for one in plan.actions if one.skill == "pick_up"]
+    if len(taken) < MANY_THINGS:
         return ""
-    return f"It takes {len(plan.actions)} steps and about {long_s / 60:.0f} minutes"
-
-
-def _moves_many(plan: Plan, _: Request) -> str:
-    count = sum(action.skill == "pick_up" for action in plan.actions)
-    return f"I would move {count} things" if count >= MANY_THINGS else ""
+    subjects = [subject_of(text, request.scene) for text in taken]
+    named = [f"the {one.thing or one.words}" for one in subjects[:MOST_NAMED]]
+    more = [f"{len(taken) - MOST_NAMED} more"] if len(taken) > MOST_NAMED else []
+    return f"I would move {len(taken)} things: {listed([*named, *more])}"
 
 
 def _is_heavy(plan: Plan, request: Request) -> str:
@@ -180,7 +130,6 @@ def _goes_back_far(plan: Plan, _: Request) -> str:
 _DOUBTS: Final[Mapping[str, Risk]] = {"unsure": _is_unsure, "unheard": _is_unheard}
 _RISKS: Final[Mapping[str, Risk]] = {
     "danger": _has_concerns,
-    "long": _is_long,
     "many": _moves_many,
     "heavy": _is_heavy,
     "put down first": _puts_down_first,
