@@ -12,7 +12,6 @@ from typing import Final
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
-from vla_deploy.planning.patterns.steering import awaiting
 
 PATIENCE_S: Final = 1.0
 """So long other readings are tried."""
@@ -70,11 +69,4 @@ def _in_other_words(command: UserCommand, first: UserCommand) -> UserCommand:
     sure = first.heard_confidence
     if text != _MARKS.sub("", first.text):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
-    bare = awaiting(text)
-    return replace(
-        command,
-        text=text if bare is None else bare,
-        others=tuple(rest),
-        heard_confidence=sure,
-        awaits_word=command.awaits_word or bare is not None,
-    )
+    return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

@@ -377,7 +377,7 @@ class CommandManager:
         proposal = pending.answer.proposal
         if pending.plan is None or proposal is None:
             told = corrected_text(pending.question, text)
-            return None if told is None else replace(command, text=told, corrected=None)
+            return None if told is None else replace(command, text=told)
         plan = corrected_by(proposal.plan, text, request.world.places)
         if plan is None:
             return None

@@ -10,7 +10,7 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World, match_place
-from vla_deploy.planning.patterns.follow_up import follow_up
+from vla_deploy.planning.patterns.follow_up import repeated
 from vla_deploy.planning.patterns.phrase import clauses
 from vla_deploy.planning.patterns.table import PATTERNS, is_thing
 from vla_deploy.planning.plan import Plan, chained
@@ -53,7 +53,7 @@ def pattern_plan(request: Request) -> Plan:
         PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
     """
     said = clauses(request.text)
-    plan = follow_up(said[0], request) if len(said) == 1 else None
+    plan = repeated(said[0], request) if len(said) == 1 else None
     if plan is not None:
         return plan
     if not said:

@@ -13,38 +13,27 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place, object_or_none
 from vla_deploy.planning.plan import PUT_IN, Plan, chained
 from vla_deploy.planning.scope import IDIOMS
-from vla_deploy.planning.understanding import Question
-from vla_deploy.planning.understanding.conversation import Outcome, Turn
+from vla_deploy.planning.understanding.conversation import Outcome, Question, Turn
 from vla_deploy.world import Query, UnknownWord, parse_query
 
 _AGAIN: Final = re.compile(
     r"(?:and )?(?:(?:do|try) (?:it|that|this) )?(?:once )?again|once more|one more time|"
     r"repeat(?: (?:it|that))?|(?:do )?the same(?: thing)?(?: again)?"
 )
-_MORE: Final = re.compile(
-    r"(?:(?:and|now|then|go|move|drive|turn|rotate|spin|roll|come|step|wait|all the way|just) )*"
-    r"(?:(?:to )?the other (?:way|side|direction)|back again|the other (?:one|thing),? \w+|"
-    r"(?:a |quite a )?(?:(?:tiny|little|wee|bit|touch|tad|some|much|lot|lots|slightly) )*"
-    r"(?:more|further|farther|longer|less)|twice (?:as|that)|double|"
-    r"(?:the )?same (?:distance|amount|way))(?: [a-z]+){0,4}"
-)
-"""What is more, less or other than before: how much and which way are to be said."""
 
 
-def follow_up(text: str, request: Request) -> Plan | None:
+def repeated(text: str, request: Request) -> Plan | None:
     """Return the plan of a clause that repeats the command before it, None for other clauses.
 
     Raises:
-        NotAble: there is none, it did not end well, or it is to be done in another measure.
+        NotAble: there is none, or it did not end well.
     """
-    if _AGAIN.fullmatch(text):
-        last = last_done(request)
-        if last is None:
-            raise NotAble("nothing was done before that I could repeat; say the whole command")
-        return asked_for(last)
-    if _MORE.fullmatch(text):
-        raise NotAble("I can do the same again, but not more or less of it; say the whole command")
-    return None
+    if _AGAIN.fullmatch(text) is None:
+        return None
+    last = last_done(request)
+    if last is None:
+        raise NotAble("nothing was done before that I could repeat; say the whole command")
+    return asked_for(last)
 
 
 def last_done(request: Request) -> Turn | None:

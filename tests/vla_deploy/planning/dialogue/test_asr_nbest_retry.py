@@ -35,14 +35,6 @@ def test_the_reading_that_makes_sense_is_read_back_and_done_after_a_yes(open_des
     assert plan["command_id"] == "c1"
 
 
-def test_another_reading_may_wait_for_a_word(open_desk):
-    desk = open_desk()
-    desk.give(**spoken("van I stay, so go to Kitchener", ("when I say so, go to the kitchen", 0.6)))
-    ((event, question),) = events(desk.answers())
-    assert event == "asked"
-    assert question.endswith("I wait for you to say go.")
-
-
 def test_a_dont_that_may_not_have_been_heard_is_asked_about(open_desk):
     desk = open_desk()
     desk.give(**spoken("go to the kitchen", ("don't go to the kitchen", 0.6)))
