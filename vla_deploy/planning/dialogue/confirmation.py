@@ -1,22 +1,19 @@
-"""Decide which plans wait for a person's yes: one table of risks, each with what it says of one.
+"""Decide which plans wait for a person's yes: a list of risks, each with what it says of one.
 
 The robot file sets how far it goes (`[planning] require_confirmation`): never, risky, always. What
 is unsure is always asked, since it may not be what was asked for.
 """
 
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Iterator, Set
 from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
 from vla_deploy.planning.interfaces import Proposal, Request
-from vla_deploy.planning.plan import PUT_IN, Action, Plan
+from vla_deploy.planning.plan import PUT_IN, Plan
 from vla_deploy.planning.scope import quoted
-from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.plan_bounds import Confirm
-
-Risk = Callable[[Plan, Request], str]
 
 # Below that the words may mean something else, or may have been other words.
 SURE: Final = 0.7
@@ -68,72 +65,37 @@ def _reasons(plan: Plan, request: Request) -> dict[str, str]:
     if all(action.skill in MOTIONLESS for action in plan.actions):
         return {}
     wanted = request.world.bounds.require_confirmation
-    risks = _DOUBTS if wanted is Confirm.NEVER else {**_DOUBTS, **_RISKS}
-    whys = {kind: risk(plan, request) for kind, risk in risks.items()}
-    found = {why if kind in _EACH else kind: why for kind, why in whys.items() if why}
-    return {"any motion": "", **found} if wanted is Confirm.ALWAYS else found
+    found = {"any motion": ""} if wanted is Confirm.ALWAYS else {}
+    found |= dict(_doubts(plan, request))
+    return found if wanted is Confirm.NEVER else found | dict(_risks(plan, request))
 
 
-def _is_unsure(plan: Plan, _: Request) -> str:
-    unsure = min((action.feasibility_score for action in plan.actions), default=1.0) < SURE
-    return "I am not sure that I understood you" if unsure else ""
-
-
-def _is_unheard(_: Plan, request: Request) -> str:
+def _doubts(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
+    """Yield what is unsure, since it may not be what was asked for."""
+    if min(action.feasibility_score for action in plan.actions) < SURE:
+        yield "unsure", "I am not sure that I understood you"
     heard = request.heard_confidence
-    unheard = heard is not None and heard < SURELY_HEARD
-    return "I am not sure that I heard you right" if unheard else ""
+    if heard is not None and heard < SURELY_HEARD:
+        yield "unheard", "I am not sure that I heard you right"
 
 
-def _has_concerns(plan: Plan, _: Request) -> str:
-    return (
-        f"There may be a danger: {'; '.join(plan.safety_concerns)}" if plan.safety_concerns else ""
-    )
-
-
-def _moves_many(plan: Plan, request: Request) -> str:
+def _risks(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
+    """Yield each risk; a yes to one danger, or one heavy thing, is none to another."""
+    for concern in plan.safety_concerns:
+        yield concern, f"There may be a danger: {concern}"
     taken = [str(one.parameters["object"]) for one in plan.actions if one.skill == "pick_up"]
-    if len(taken) < MANY_THINGS:
-        return ""
     subjects = [subject_of(text, request.scene) for text in taken]
-    named = [f"the {one.thing or one.words}" for one in subjects[:MOST_NAMED]]
-    more = [f"{len(taken) - MOST_NAMED} more"] if len(taken) > MOST_NAMED else []
-    return f"I would move {len(taken)} things: {listed([*named, *more])}"
-
-
-def _is_heavy(plan: Plan, request: Request) -> str:
-    limit_kg = HEAVY_RATIO * request.world.bounds.payload_kg
-    for action in plan.actions:
-        mass_kg = _mass_kg(action, request)
-        if mass_kg is not None and mass_kg > limit_kg:
-            return f"The {action.parameters['object']} may weigh {mass_kg:.1f} kg"
-    return ""
-
-
-def _mass_kg(action: Action, request: Request) -> float | None:
-    setting = Setting(parameters=action.parameters, world=request.world, scene=request.scene)
-    subject = setting.subject("object") if action.skill == "pick_up" else None
-    return None if subject is None else subject.mass_kg
-
-
-def _puts_down_first(plan: Plan, _: Request) -> str:
-    first = any(one.skill == "place" and one.description == PUT_IN for one in plan.actions)
-    return "My hands are full: I would put something down first" if first else ""
-
-
-def _goes_back_far(plan: Plan, _: Request) -> str:
+    names = [f"the {one.thing or one.words}" for one in subjects]
+    if len(names) >= MANY_THINGS:
+        rest = len(names) - MOST_NAMED
+        told = listed([*names[:MOST_NAMED], *([f"{rest} more"] if rest > 0 else [])])
+        yield "many", f"I would move {len(names)} things: {told}"
+    for name, subject in zip(names, subjects, strict=True):
+        mass_kg = subject.mass_kg
+        if mass_kg is not None and mass_kg > HEAVY_RATIO * request.world.bounds.payload_kg:
+            yield f"{name} is heavy", f"{name.capitalize()} may weigh {mass_kg:.1f} kg"
+    if any(one.skill == "place" and one.description == PUT_IN for one in plan.actions):
+        yield "put down first", "My hands are full: I would put something down first"
     ways_m = [float(one.parameters["distance_m"]) for one in plan.actions if one.skill == "move"]
-    back_m = min(ways_m, default=0.0)
-    return f"I would drive {-back_m:g} m backward" if back_m < FAR_BACK_M else ""
-
-
-_DOUBTS: Final[Mapping[str, Risk]] = {"unsure": _is_unsure, "unheard": _is_unheard}
-_RISKS: Final[Mapping[str, Risk]] = {
-    "danger": _has_concerns,
-    "many": _moves_many,
-    "heavy": _is_heavy,
-    "put down first": _puts_down_first,
-    "far back": _goes_back_far,
-}
-# A yes to one of these is none to another one.
-_EACH: Final = frozenset({"danger", "heavy"})
+    if min(ways_m, default=0.0) < FAR_BACK_M:
+        yield "far back", f"I would drive {-min(ways_m):g} m backward"

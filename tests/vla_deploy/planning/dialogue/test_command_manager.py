@@ -437,7 +437,7 @@ class TestReadingBack:
         ("said", "question"),
         [
             ("no, the blue one", "Shall I pick up the blue cup?"),
-            ("I mean the ball", "Shall I pick up the ball? The ball may weigh 0.5 kg."),
+            ("I mean the ball", "Shall I pick up the ball? The green ball may weigh 0.5 kg."),
             ("the other one", "Shall I pick up the blue cup?"),
         ],
     )

@@ -90,7 +90,7 @@ def test_a_heavy_thing_is_asked_for(butler: World) -> None:
     full = Thing(thing_id="bottle_1", kind="bottle", colour="green",
                  position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.20))  # fmt: skip
     said = ask(butler, PICK, scene=Snapshot(stamp_ns=0, things=(full,)))
-    assert said.endswith("The bottle may weigh 0.5 kg.")
+    assert said.endswith("The green bottle may weigh 0.5 kg.")
 
 
 def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
