@@ -10,7 +10,6 @@ from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.steering import awaiting, is_stop
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import negates
 from vla_deploy.planning.understanding.quantities import numbers_in
 
@@ -33,7 +32,7 @@ class UserCommand:
     over that of the words; with `is_doubted` the words are not sure enough to act by, and with
     `may_ask_again` they may be asked for once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
-    on after a failure. `corrected` is the plan that a correction made of the one before it.
+    on after a failure. One that `is_corrected`, by "no, the blue one", is read back.
     With `awaits_word` the plan is held until the person says go.
     """
 
@@ -46,7 +45,7 @@ class UserCommand:
     others: tuple[tuple[str, float], ...] = ()
     is_doubted: bool = False
     may_ask_again: bool = False
-    corrected: Plan | None = None
+    is_corrected: bool = False
     awaits_word: bool = False
     is_answer: bool = False
     recovers: bool = False

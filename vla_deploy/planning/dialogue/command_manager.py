@@ -21,12 +21,10 @@ from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
+from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.follow_up import (
-    CORRECTED,
     asked_for,
-    corrected_by,
-    corrected_text,
+    corrected,
     last_done,
     rejects,
 )
@@ -186,6 +184,8 @@ class CommandManager:
         }
 
     def _begin(self, command: UserCommand) -> None:
+        if command.plan is None and not (command.recovers or command.is_corrected):
+            command = self._correction_of_last(command)
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
@@ -198,9 +198,6 @@ class CommandManager:
             request = replace(request, failed=carried.history)
             deadline = self._deadline(self.planner.within_s)
             answer = recover(carried, request, self.planner.check)
-        elif plan := command.corrected or self._correction_of_last(command, request):
-            self._begin_corrected(command, request, plan)
-            return
         else:
             deadline = self._deadline(self._retry.within_s(command, self.planner.within_s))
             answer = self.planner.plan_at_once(request, deadline)
@@ -373,40 +370,29 @@ class CommandManager:
 
     def _corrected(self, pending: PendingQuestion, text: str) -> UserCommand | None:
         """Return the command that waits with what a correction puts in the place of something."""
-        command, request = pending.command, self._request(pending.command)
-        proposal = pending.answer.proposal
-        if pending.plan is None or proposal is None:
-            told = corrected_text(pending.question, text)
-            return None if told is None else replace(command, text=told)
-        plan = corrected_by(proposal.plan, text, request.world.places)
-        if plan is None:
+        command, request, plan = pending.command, self._request(pending.command), pending.plan
+        told = _correction(command.text, text, plan, request, pending.question.expression)
+        if told is None:
             return None
-        # "The other one" is another than what was asked about.
-        asked = mentions_of(pending.plan, request.scene)
-        self.dialogue.remember(command, Outcome.ASKED, mentioned=asked)
-        return replace(command, corrected=plan)
+        if plan is not None:  # "the other one" is another than what was asked about
+            mentioned = mentions_of(plan, request.scene)
+            self.dialogue.remember(command, Outcome.ASKED, mentioned=mentioned)
+        return replace(command, text=told, others=(), is_corrected=True)
 
-    def _correction_of_last(self, command: UserCommand, request: Request) -> Plan | None:
-        """Return what a command makes of the one before it, which ends where it is under way.
+    def _correction_of_last(self, command: UserCommand) -> UserCommand:
+        """Return a command as it changes the one before it, which ends where it is under way.
 
         What is under way ends by a no, too, of which nothing can be made: "no, the banana".
         """
-        last, plan = last_done(request), None
+        request, told = self._request(command), None
+        last = last_done(request)
         if last is not None and not command.is_doubted:
-            plan = corrected_by(asked_for(last), command.text, request.world.places)
-        if (plan is not None or rejects(command.text)) and self._is_moving:
+            told = _correction(last.said, command.text, last.plan, request)
+        if (told is not None or rejects(command.text)) and self._is_moving:
             self._cancel_all(f"{command.command_id}-corrects")
-        return plan
-
-    def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:
-        """Read a plan back that takes the place of the one that was asked about or has begun."""
-        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0, is_unsure=True)
-        try:
-            answer = PlanningResult(plan=self.planner.check(plan, request), proposal=proposal)
-        except PlanningError as error:
-            answer = PlanningResult(error=error)
-        corrected = replace(command, corrected=plan)
-        self.dialogue.conclude(PlannedCommand(corrected, request, answer))
+        return (
+            command if told is None else replace(command, text=told, others=(), is_corrected=True)
+        )
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought.
@@ -437,3 +423,12 @@ def _stands_still(done: PlannedCommand) -> bool:
     """Tell whether what was planned begins with standing still, now."""
     plan = done.answer.plan
     return plan is not None and plan.actions[0].skill == "stop" and not done.awaits_word
+
+
+def _correction(
+    command: str, text: str, plan: Plan | None, request: Request, unclear: str = ""
+) -> str | None:
+    """Return a command as an utterance corrects its plan, or what was unclear of it."""
+    asked = () if plan is None else asked_for(plan)
+    about = [one.parameters.get("object") for one in asked] or [unclear]
+    return corrected(command, text, about, request.world.places)

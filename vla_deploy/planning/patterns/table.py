@@ -21,6 +21,8 @@ _ONE: Final = (
     rf"(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}|(?:the|that|this) (?:{_LOOK} ){{1,2}}one|"
     "it|that|this|that one|this one|them|those|these"
 )
+NAMED: Final = re.compile(rf"\b(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}\b")
+"""What names a thing, anywhere in a text."""
 # A word for a thing that the robot has not learnt: grounding asks what it is.
 _UNKNOWN: Final = (
     rf"(?:the|a|an|my|that|this) (?:{_LOOK} ){{0,2}}"
