@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.model_servers.deadline import Deadline
@@ -101,54 +101,43 @@ class ActivePlans:
 PATIENCE_S: Final = 1.5
 
 
-@dataclass(frozen=True, slots=True)
-class PlanningJob:
-    """Hold a command whose planning takes time."""
-
-    command: UserCommand
-    deadline: Deadline
-    future: "Future[PlannedCommand]"
-
-
 class AsyncPlanner:
-    """Plan one command at a time in an executor; a step never waits for it."""
+    """Plan one `command` at a time in an executor; a step never waits for it."""
 
     def __init__(self, executor: Executor) -> None:
+        self.command: UserCommand | None = None
         self._executor = executor
-        self._job: PlanningJob | None = None
+        self._deadline: Deadline | None = None
         self._patience: Deadline | None = None
-
-    @property
-    def command(self) -> UserCommand | None:
-        """Return the command that is being planned."""
-        return None if self._job is None else self._job.command
+        self._future: Future[PlannedCommand] | None = None
 
     def begin(
         self, command: UserCommand, deadline: Deadline, plan: Callable[[], PlannedCommand]
     ) -> None:
         """Begin to plan; no other command may be in work."""
-        self._job = PlanningJob(command, deadline, self._executor.submit(plan))
+        self.command, self._deadline = command, deadline
         self._patience = Deadline.within(deadline.clock, PATIENCE_S)
+        self._future = self._executor.submit(plan)
 
-    def take_done(self) -> PlanningJob | None:
-        """Return the job that is done, once."""
-        job = self._job
-        if job is None or not job.future.done():
+    def take_done(self) -> "Future[PlannedCommand] | None":
+        """Return what came of the command, once, as soon as it is planned."""
+        future = self._future
+        if future is None or not future.done():
             return None
-        self._job = None
-        return job
+        self.command = self._future = None
+        return future
 
     def take_tedious(self) -> UserCommand | None:
         """Return the command that takes longer than people like to wait in silence, once."""
-        if self._job is None or self._patience is None or self._patience.left_s > 0.0:
+        if self._patience is None or self._patience.left_s > 0.0:
             return None
         self._patience = None
-        return self._job.command
+        return self.command
 
     def call_off(self) -> UserCommand | None:
         """Give up what is being planned, and return the command that it was."""
-        job, self._job = self._job, None
-        if job is None:
-            return None
-        job.deadline.call_in()
-        return job.command
+        command, self.command = self.command, None
+        if self._deadline is not None:
+            self._deadline.call_in()
+        self._future = None
+        return command

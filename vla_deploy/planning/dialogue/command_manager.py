@@ -217,9 +217,9 @@ class CommandManager:
         return Deadline.within(self._clock, within_s, Event())
 
     def _look_after_job(self) -> None:
-        job = self._async.take_done()
-        if job is not None:
-            self._guarded(job.command, lambda: self._conclude(job.future.result()))
+        command, done = self._async.command, self._async.take_done()
+        if command is not None and done is not None:
+            self._guarded(command, lambda: self._conclude(done.result()))
         tedious = self._async.take_tedious()
         if tedious is not None:
             self._events.say(tedious, Says.WORKING)
