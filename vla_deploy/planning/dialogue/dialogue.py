@@ -89,7 +89,7 @@ class Dialogue:
     def conclude(self, done: PlannedCommand) -> None:
         """Dispatch a command's plan where it may run at once; else ask, or say what forbids it."""
         command, answer = done.command, done.answer
-        if command.is_corrected and answer.proposal is not None:
+        if command.is_corrected and not command.recovers and answer.proposal is not None:
             answer = replace(answer, proposal=replace(answer.proposal, is_unsure=True))
             done = replace(done, answer=answer)
         self.metrics.note(answer.attempts)

@@ -174,6 +174,17 @@ def test_what_has_begun_at_a_word_waits_for_none_after_a_failure(open_desk):
     assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
 
 
+def test_what_was_corrected_and_agreed_to_is_mended_without_another_yes(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.give(command_id="c2", text="no, the bedroom")
+    assert desk.answers()[-1]["question"] == "Shall I go to the bedroom?"
+    desk.give(command_id="c3", text="yes")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[-1])
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+
+
 @pytest.mark.parametrize("said", ["stop", "no, the bedroom", "stay out of the kitchen"])
 def test_a_setback_that_a_cancel_has_overtaken_starts_nothing(open_desk, said):
     desk = open_desk()
