@@ -26,7 +26,6 @@ from vla_deploy.planning.patterns.follow_up import (
     asked_for,
     corrected,
     last_done,
-    rejects,
 )
 from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
 from vla_deploy.planning.plan import Plan
@@ -86,15 +85,16 @@ class CommandManager:
             self._take_anew(command)
 
     def _take_anew(self, command: UserCommand) -> None:
-        """Take an utterance that answers nothing: an objection, or a command of its own.
+        """Take an utterance that answers nothing: a command, an objection, or a correction.
 
-        Whoever objects or forbids ends all that goes on; the rest of what they say, "don't
-        take that, take the blue one", is planned.
+        Whoever objects, corrects or forbids ends all that goes on; what else they want, "don't take
+        that, take the blue one", is planned.
         """
         text, forbids = command.text, self._forbids(command)
+        corrected = self._correction_of_last(command)
         drops_held = self.dialogue.held is not None and denies(text) and not forbids
-        if drops_held or (self._goes_on and (forbids or objects(text))):
-            is_all = only_objects(text) and not forbids
+        if drops_held or (self._goes_on and (forbids or corrected or objects(text))):
+            is_all = only_objects(text) and not (forbids or corrected)
             self.stop_all(command.command_id if is_all else f"{command.command_id}-objects")
             if is_all:
                 self._events.say(command, Says.LEFT)
@@ -102,7 +102,7 @@ class CommandManager:
         if len(self._queue) >= MOST_WAITING:
             self.dialogue.refuse(command, Says.MANY_WAIT)
             return
-        self._queue.append(command)
+        self._queue.append(corrected or command)
         if self._async.command is not None:
             self._events.queued(command, len(self._queue))
 
@@ -184,8 +184,6 @@ class CommandManager:
         }
 
     def _begin(self, command: UserCommand) -> None:
-        if command.plan is None and not (command.recovers or command.is_corrected):
-            command = self._correction_of_last(command)
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
@@ -377,22 +375,20 @@ class CommandManager:
         if plan is not None:  # "the other one" is another than what was asked about
             mentioned = mentions_of(plan, request.scene)
             self.dialogue.remember(command, Outcome.ASKED, mentioned=mentioned)
-        return replace(command, text=told, others=(), is_corrected=True)
+        return _with_words(command, told)
 
-    def _correction_of_last(self, command: UserCommand) -> UserCommand:
-        """Return a command as it changes the one before it, which ends where it is under way.
-
-        What is under way ends by a no, too, of which nothing can be made: "no, the banana".
-        """
-        request, told = self._request(command), None
-        last = last_done(request)
-        if last is not None and not command.is_doubted:
+    def _correction_of_last(self, command: UserCommand) -> UserCommand | None:
+        """Return a command as it changes the one before it, None where it does not."""
+        if command.is_doubted or command.plan is not None:
+            return None
+        request = self._request(command)
+        waits = self._queue[-1] if self._queue else self._async.command
+        last, told = last_done(request), None
+        if waits is not None:
+            told = _correction(waits.text, command.text, None, request)
+        elif last is not None:
             told = _correction(last.said, command.text, last.plan, request)
-        if (told is not None or rejects(command.text)) and self._is_moving:
-            self._cancel_all(f"{command.command_id}-corrects")
-        return (
-            command if told is None else replace(command, text=told, others=(), is_corrected=True)
-        )
+        return None if told is None else _with_words(command, told)
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought.
@@ -432,3 +428,8 @@ def _correction(
     asked = () if plan is None else asked_for(plan)
     about = [one.parameters.get("object") for one in asked] or [unclear]
     return corrected(command, text, about, request.world.places)
+
+
+def _with_words(command: UserCommand, text: str) -> UserCommand:
+    """Return a command in corrected words, of which no other readings are known."""
+    return replace(command, text=text, others=(), is_corrected=True)

@@ -13,7 +13,6 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place, object_or_none
 from vla_deploy.planning.patterns.table import NAMED
 from vla_deploy.planning.plan import PUT_IN, Action, Plan, chained
-from vla_deploy.planning.scope import IDIOMS
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 from vla_deploy.world import UnknownWord, parse_query
 
@@ -64,7 +63,6 @@ _CORRECTIONS: Final = tuple(
         r"(?P<rest>the other(?: one)?)",
     )
 )
-_REJECTS: Final = re.compile(rf"(?!sorry){_NO}(?:[,.!]| (?:the|my|your|that|an?)\b)")
 _INSTEAD: Final = re.compile(r"[, ]+(?:instead|please|rather)$", re.IGNORECASE)
 _ONE: Final = re.compile(r"\bones?\b", re.IGNORECASE)
 _OTHER: Final = re.compile(r"(?:the )?other(?: one)?", re.IGNORECASE)
@@ -75,11 +73,6 @@ def correction_in(text: str) -> str:
     said = text.strip().strip(".!")
     found = next((one for one in (it.fullmatch(said) for it in _CORRECTIONS) if one), None)
     return "" if found is None else _INSTEAD.sub("", found["rest"]).strip()
-
-
-def rejects(text: str) -> bool:
-    """Tell whether an utterance begins with a no, whatever else it says."""
-    return _REJECTS.match(IDIOMS.sub(" ", text.strip().lower())) is not None
 
 
 def corrected(

@@ -441,7 +441,7 @@ class TestReadingBack:
         desk.give(command_id="c2", text=said)
         (asked,) = desk.answers()
         assert (asked["event"], asked["question"]) == ("asked", question)
-        assert desk.plans() == [{"command_id": "c2-corrects", "cancel": True}]
+        assert desk.plans() == [{"command_id": "c2-objects", "cancel": True}]
         desk.give(command_id="c3", text="yes")
         assert events(desk.answers())[-1] == ("c2", "plan")
 
@@ -454,7 +454,7 @@ class TestReadingBack:
         desk.plans()
         desk.give(command_id="c2", text=said)
         desk.answers()
-        assert desk.plans()[0] == {"command_id": "c2-corrects", "cancel": True}
+        assert desk.plans()[0] == {"command_id": "c2-objects", "cancel": True}
 
     def test_a_correction_of_what_was_not_done_is_a_command_of_its_own(self, open_desk):
         desk = open_desk()

@@ -160,7 +160,8 @@ def test_words_that_only_stop_are_known(text: str, stops: bool) -> None:
         ("don't go there, come here", True, True), ("stop and come here", True, True),
         ("don't worry", False, True), ("don't stop", False, True), ("no problem", False, True),
         ("bring it, don't drop it", False, True), ("wait 5 seconds", False, True),
-        ("go to the bus stop", False, True), ("no, the blue one", False, True),
+        ("go to the bus stop", False, True), ("no, the blue one", True, True),
+        ("no the blue one", True, False), ("wait, come here", True, True),
     ],
 )  # fmt: skip
 def test_words_that_object_are_told_from_idioms_and_from_what_is_to_be_done(
