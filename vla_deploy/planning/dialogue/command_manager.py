@@ -310,7 +310,7 @@ class CommandManager:
             self.dialogue.refuse(command, reason)
             return True
         asked = pending.command
-        if command.has_unsure_words:
+        if command.is_unsure:
             asked = replace(asked, heard_confidence=READ_BACK)
         if command.awaits_word:  # "the red one, but only when I say so"
             asked = replace(asked, awaits_word=True)

@@ -14,7 +14,7 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.planning.dialogue.command import READ_BACK, UserCommand
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.interfaces import Aid, Request
 from vla_deploy.planning.knowledge import world_of
@@ -77,7 +77,7 @@ class Situation:
             scene=scene,
             here=here,
             conversation=conversation,
-            heard_confidence=_heard_confidence(command),
+            heard_confidence=command.heard_confidence,
             image=self._image() if Aid.IMAGE in of_use else None,
             recollections=recollections,
             last_seen=last_seen,
@@ -168,11 +168,3 @@ def recalled(
         return (), ()
     sentences = tuple(sentence_of(one.episode, now_s) for one in found)
     return sentences, tuple(one for one in seen if one.seen_s > now_s - OLDEST_S)
-
-
-def _heard_confidence(command: UserCommand) -> float | None:
-    """Return how sure the words are; with unsure words so little that they are read back."""
-    sure = command.heard_confidence
-    if not command.has_unsure_words:
-        return sure
-    return READ_BACK if sure is None else min(sure, READ_BACK)
