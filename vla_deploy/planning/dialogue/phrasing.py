@@ -4,6 +4,7 @@ Every sentence that a person hears or reads from the planner stands in one table
 word: the robot would take a person's for its own.
 """
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
@@ -52,7 +53,7 @@ Parameters = Mapping[str, Any]
 _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "navigate_to": lambda given: _going(given),
     "move": lambda given: _driving(float(given["distance_m"])),
-    "turn": lambda given: "turn right" if float(given["angle_rad"]) < 0 else "turn left",
+    "turn": lambda given: _turning(math.degrees(float(given["angle_rad"]))),
     "look_at": lambda given: f"look {given.get('direction') or 'at ' + _the(given['object'])}",
     "find_object": lambda given: f"look for {_the(given['object'])}",
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
@@ -129,6 +130,10 @@ def _going(given: Parameters) -> str:
 def _driving(distance_m: float) -> str:
     way = "back" if distance_m < 0 else "forward"
     return f"drive {abs(distance_m):g} metres {way}"
+
+
+def _turning(angle_deg: float) -> str:
+    return f"turn {'right' if angle_deg < 0 else 'left'} by {abs(angle_deg):.0f} degrees"
 
 
 def _the(name: object) -> str:

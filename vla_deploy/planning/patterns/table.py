@@ -69,6 +69,7 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
      "turn", {}),
     (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?: (?:to the )?{_SIDE})?", "turn", {}),
     (rf"(?:{_GO}|head|navigate|return)(?: back| over)?(?: to| into)? {_WHERE}", "go", {}),
+    ("(?:turn|spin) (?:a?round once|in a circle)", "turn", {"by": "360 degrees"}),
     # --- look
     ("look a?round", "look", {"way": "around"}),
     (r"look(?: to the)? (?P<way>left|right|up|down|ahead)", "look", {}),

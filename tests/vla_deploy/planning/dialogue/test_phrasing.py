@@ -32,7 +32,7 @@ def test_every_skill_can_be_put_into_words():
             "pick up the red cup, go to the kitchen and put it in the box",
         ),
         ([("move", {"distance_m": -0.5}), ("turn", {"angle_rad": -1.0})],
-         "drive 0.5 metres back and turn right"),
+         "drive 0.5 metres back and turn right by 57 degrees"),
         ([("wait", {"duration_s": 1.0})] * 9,
          "wait 1 seconds, wait 1 seconds, wait 1 seconds, wait 1 seconds, wait 1 seconds, "
          "wait 1 seconds and do 3 things more"),
