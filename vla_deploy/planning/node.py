@@ -77,7 +77,15 @@ class PlannerNode:
         before = _unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
         self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
-            self._keeper = self._new_keeper(self._memory)
+            self._keeper = MemoryKeeper(
+                self._memory,
+                self._space,
+                self._clock,
+                background(self._clock),
+                run_id=self._run_dir.name,
+                places=furniture_points(self._robot.places),
+                wall_s=unix_s,
+            )
         self._manager = CommandManager(
             self._planner,
             Situation(self._space, self._clock, self._robot, self._memory),
@@ -138,17 +146,6 @@ class PlannerNode:
         if self._is_stopped:
             return  # the process ends, and its memory with it
         self._executor.submit(prepared.close)
-
-    def _new_keeper(self, memory: MemoryStore) -> MemoryKeeper:
-        return MemoryKeeper(
-            memory,
-            self._space,
-            self._clock,
-            background(self._clock),
-            run_id=self._run_dir.name,
-            places=furniture_points(self._robot.places),
-            wall_s=unix_s,
-        )
 
     def _hear(self, event: Event) -> None:
         self._manager.metrics.heard += 1

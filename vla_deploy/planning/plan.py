@@ -107,18 +107,14 @@ def execution_order(actions: Sequence[Action]) -> list[Action]:
     return ordered
 
 
-def chained(
-    skills: Sequence[Skill], priorities: Sequence[Priority] | None = None
-) -> tuple[Action, ...]:
-    """Return the actions of skills, one after the other; each of medium priority by default."""
-    ranks = priorities or [Priority.MEDIUM] * len(skills)
+def chained(skills: Sequence[Skill]) -> tuple[Action, ...]:
+    """Return the actions of skills, one after the other."""
     return tuple(
         Action(
             id=f"a{number}",
             skill=skill,
             parameters=dict(parameters),
             depends_on=(f"a{number - 1}",) if number > 1 else (),
-            priority=rank,
         )
-        for number, ((skill, parameters), rank) in enumerate(zip(skills, ranks, strict=True), 1)
+        for number, (skill, parameters) in enumerate(skills, 1)
     )

@@ -8,7 +8,7 @@ import json
 import logging
 import math
 import re
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
@@ -18,10 +18,9 @@ from vla_deploy.planning.errors import CannotBeDone, NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, Proposal, Request, StandingOrder
 from vla_deploy.planning.knowledge import World, match_place, object_or_none
 from vla_deploy.planning.patterns.phrase import courtesy_off
-from vla_deploy.planning.patterns.table import THING, WORDS
+from vla_deploy.planning.patterns.table import WORDS
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.symbolic.state import thing_of
-from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS
@@ -55,31 +54,26 @@ class Prohibitions:
             _write(self._file, self.items)
 
 
+_OF: Final = rf"(?P<of>{WORDS})"
 _TOUCH: Final = "(?:touch|move|lay a (?:hand|finger) on|go near)"
-_EVER: Final = r"(?: again| ever| ever again| any ?more| from now on)?"
+_ENTER: Final = "(?:go|drive|come|enter)(?: back)?(?: in| into| to)?"
+_NOT: Final = "(?:don't|do not|never|you must not|you mustn't|you may not)"
+_EVER: Final = r"(?: again| ever| ever again| any ?more| from now on)"
+# "Don't go there" is about now; a thing is not to be touched until somebody says so.
 _FORBIDS: Final = tuple(
     re.compile(pattern)
     for pattern in (
-        rf"(?:don't|do not|never|you must not|you mustn't|you may not)(?: ever)? {_TOUCH} "
-        rf"(?P<thing>{THING}){_EVER}",
-        rf"(?:leave|let) (?P<thing>{THING}) (?:alone|be)",
-        rf"(?:hands off|keep your hands off) (?P<thing>{THING})",
-        rf"(?:stay|keep) out of (?P<place>{WORDS})",
-        rf"(?:never|don't ever|do not ever|you must not|you mustn't|you may not) "
-        rf"(?:go|drive|come|enter)(?: in| into| to)? (?P<place>{WORDS}){_EVER}",
-        r"(?:don't|do not) (?:go|drive|come)(?: in| into| to)? "
-        rf"(?P<place>{WORDS})(?: ever again| any ?more| from now on)",
+        rf"{_NOT}(?: ever)? {_TOUCH} {_OF}{_EVER}?",
+        rf"(?:never|(?:don't|do not) ever|you (?:must not|mustn't|may not)) {_ENTER} {_OF}{_EVER}?",
+        rf"{_NOT} {_ENTER} {_OF}{_EVER}",
+        rf"(?:leave|let) {_OF} (?:alone|be)",
+        rf"(?:(?:keep your )?hands off|(?:stay|keep) out of) {_OF}",
     )
 )
-_PERMITS: Final = tuple(
-    re.compile(pattern)
-    for pattern in (
-        rf"you (?:may|can) {_TOUCH} (?P<thing>{THING})(?: again)?",
-        r"you (?:may|can) (?:go|drive|come) (?:back )?(?:in|into|to) "
-        rf"(?P<place>{WORDS})(?: again)?",
-        rf"forget what i said about (?P<thing>{THING})",
-        rf"forget what i said about (?P<place>{WORDS})",
-    )
+_PERMITS: Final = (
+    re.compile(
+        rf"(?:you (?:may|can) (?:{_TOUCH}|{_ENTER})|forget what i said about) {_OF}(?: again)?"
+    ),
 )
 
 
@@ -92,19 +86,19 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Stan
     for forbids, patterns in ((True, _FORBIDS), (False, _PERMITS)):
         for pattern in patterns:
             found = pattern.fullmatch(clause)
-            meant = _meant(found.groupdict(), world) if found is not None else None
+            meant = None if found is None else _meant([found["of"]], world)
             if meant is not None and (forbids or meant in standing):
                 return StandingOrder(forbids=forbids, of=meant)
     return None
 
 
-def order_of(groups: Mapping[str, str], forbids: bool, request: Request) -> StandingOrder:
-    """Return the order about the words of a "thing" or a "place".
+def order_of(said: Collection[str], forbids: bool, request: Request) -> StandingOrder:
+    """Return the order about what some words name.
 
     Raises:
         CannotBeDone: they name nothing that may be forbidden, or that is not forbidden.
     """
-    meant = _meant(groups, request.world)
+    meant = _meant(said, request.world)
     if meant is None:
         raise CannotBeDone('say what: "don\'t touch the keys", "you may go into the kitchen again"')
     if not forbids and meant not in request.prohibitions:
@@ -131,49 +125,23 @@ def held_to(
     """Return a grounded plan that keeps out of what is forbidden, also where it only searches.
 
     Raises:
-        NotAble: it does what is forbidden, or nothing else is left to search; says what, and how it
-            is permitted again.
+        NotAble: it does what is forbidden; says what, and how it is permitted again.
     """
     for one in standing:
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
-    closed = [one for one in standing if one.what is Forbidden.PLACE]
-    places = frozenset[str]().union(*(world.surfaces_of(one.words) for one in closed))
-    if places and _searches(plan, scene) and not _open_views(world, places):
-        told = " and ".join(map(str, closed))
-        raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
+    closed = (world.surfaces_of(one.words) for one in standing if one.what is Forbidden.PLACE)
+    places = frozenset[str]().union(*closed)
     return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
 
 
-def is_broken(
-    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
-) -> bool:
-    """Tell whether a plan that may have begun before does what is forbidden, or looks there."""
-    try:
-        kept = held_to(standing, plan, world, scene)
-    except NotAble:
-        return True
-    return _searches(plan, scene) and not {*kept.keeps_out} <= {*plan.keeps_out}
-
-
-def _searches(plan: Plan, scene: Snapshot | None) -> bool:
-    """Tell whether a plan looks for something that is not in the scene."""
-    sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
-    return any(thing_of(text, scene) is None for text in sought)
-
-
-def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
-    """Return from where furniture can be searched that is in none of the closed places."""
-    shut = {view for name in closed & world.sites.keys() for view in world.sites[name].viewpoints}
-    return {view for site in world.sites.values() for view in site.viewpoints} - shut
-
-
-def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None:
-    place = match_place(groups.get("place") or "", world.places)
-    if place is not None:
+def _meant(said: Collection[str], world: World) -> Prohibition | None:
+    """Return the prohibition about the place, else about the thing that some words name."""
+    for place in filter(None, (match_place(one, world.places) for one in said)):
         return Prohibition(what=Forbidden.PLACE, words=place)
-    thing = object_or_none(groups.get("thing") or "")
-    return None if thing is None else Prohibition(what=Forbidden.THING, words=str(thing))
+    for thing in filter(None, map(object_or_none, said)):
+        return Prohibition(what=Forbidden.THING, words=str(thing))
+    return None
 
 
 def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | None) -> bool:

@@ -48,18 +48,13 @@ WORDS: Final[Mapping[ScopeGroup, frozenset[str]]] = {
 }  # fmt: skip
 _GROUP: Final = {word: group for group, words in WORDS.items() for word in words}
 IDIOMS: Final = re.compile(
-    r"\b(?:if you(?:'d| would| could| can| please| don't| do not| like| want| wouldn't| have| get|"
-    r"'re| are)(?: not)?(?: (?:mind|please|like|want|be so kind|a (?:moment|minute|second|chance)|"
-    r"time|able|free))?|if possible|if that's (?:ok|okay|all right)|"
-    r"if it(?:'s| is) (?:no|not too much) (?:trouble|bother)|no (?:problem|rush|hurry|worries|need "
-    r"to (?:rush|hurry))|don't (?:worry|rush|hurry|forget(?: to)?|drop (?:it|them|that)|spill "
-    r"(?:it|any|anything))(?! about)|do not (?:worry|hurry|forget to)|why don't you|"
-    r"(?:without|try not to|careful not to|be careful not to) (?:drop|spill|break)(?:ping|ing)?"
-    r"(?: (?:it|them|anything))?|when(?:ever)? you (?:can|have (?:a |the )?(?:moment|minute|second|"
-    r"time|chance)|get (?:a|the) chance|'re (?:ready|free)|are (?:ready|free))|"
-    r"all right|all the way|at once|once more|first of all|after all|or so|or something|"
-    r"more or less|not (?:too )?far|right away|straight away|rather (?:quickly|soon)|"
-    r"as soon as (?:possible|you can)|would rather you|put (?:\w+ ){1,4}away|away with)\b"
+    r"\b(?:if you(?:'d| would| could| can| please| don't| do not| like| want| wouldn't| have)"
+    r"(?: not)?(?: (?:mind|please|like|a (?:moment|minute|second)|time))?|"
+    r"if (?:possible|that's (?:ok|okay|all right))|no (?:problem|rush|hurry|worries)|"
+    r"(?:don't|do not) (?:worry|rush|hurry|forget(?: to)?|drop (?:it|them|that))(?! about)|"
+    r"when(?:ever)? you (?:can|have (?:a |the )?(?:moment|minute|second|time)|are (?:ready|free))|"
+    r"all right|all the way|at once|once more|right away|as soon as (?:possible|you can)|"
+    r"put (?:\w+ ){1,4}away|away with)\b"
 )
 """What asks nicely, or says how, with such words in it."""
 _PHRASES: Final = (

@@ -96,22 +96,18 @@ def test_what_is_not_seen_is_not_taken_where_it_may_be_the_forbidden(
 
 
 @pytest.mark.parametrize(
-    ("command", "order", "ends"),
+    ("command", "order"),
     [
-        ("bring me the keys", "don't touch the keys", True),
-        ("go to the kitchen", "stay out of the kitchen", True),
-        ("find the remote", "stay out of the kitchen", True),
-        ("bring me the keys", "don't touch the red cup", False),
-        ("go to the bedroom", "stay out of the kitchen", False),
+        ("bring me the keys", "don't touch the keys"),
+        ("find the remote", "stay out of the kitchen"),
+        ("go to the bedroom", "stay out of the kitchen"),
     ],
 )
-def test_what_does_the_forbidden_ends_where_it_is_under_way(
-    command: str, order: str, ends: bool
-) -> None:
+def test_what_is_under_way_ends_where_something_is_forbidden(command: str, order: str) -> None:
     with fresh_desk() as desk:
         in_the_flat(desk)
         assert desk.say(command)[1].outcome == "plan"
-        assert desk.say(order)[1].outcome == ("stop" if ends else "plan")
+        assert desk.say(order)[1].outcome == "stop"
 
 
 def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
@@ -134,8 +130,6 @@ def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
          ["kitchen", "kitchen_table"]),
         (("stay out of the kitchen",), "find the remote in the kitchen", "refuse", None),
         (("stay out of the kitchen",), "find the red cup", "plan", ["kitchen", "kitchen_table"]),
-        (("stay out of the kitchen", "stay out of the bedroom", "stay out of the living room"),
-         "find the remote", "refuse", None),
     ],
 )  # fmt: skip
 def test_a_search_leaves_out_what_may_not_be_entered(

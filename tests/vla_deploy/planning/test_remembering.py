@@ -9,7 +9,7 @@ from platforms import load_profile
 from vla_deploy.memory import LastSeen, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.assembly import open_memory
-from vla_deploy.planning.dialogue.situation import OLDEST_S, Recall
+from vla_deploy.planning.dialogue.situation import OLDEST_S, recalled
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.patterns.backend import Patterns
 
@@ -76,15 +76,14 @@ def test_another_thing_than_asked_for_is_not_told(ask: Callable[..., Request]) -
 
 def test_what_is_too_old_is_not_called_up(memory: MemoryStore) -> None:
     memory.add([], [keys(unix_s() - OLDEST_S - 60.0)])
-    assert Recall(memory).things() == ()
+    assert recalled(memory, None)[1] == ()
     memory.add([], [keys(unix_s() - 60.0)])
-    assert [one.place for one in Recall(memory).things()] == ["bedside_table"]
+    assert [one.place for one in recalled(memory, None)[1]] == ["bedside_table"]
 
 
 def test_a_memory_that_cannot_be_read_is_done_without(memory: MemoryStore) -> None:
     memory.close()
-    assert Recall(memory).sentences("the keys") == ()
-    assert Recall(memory).things() == ()
+    assert recalled(memory, "the keys") == ((), ())
 
 
 def test_a_memory_that_cannot_be_opened_is_done_without(tmp_path: Path) -> None:

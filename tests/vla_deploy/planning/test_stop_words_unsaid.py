@@ -68,7 +68,7 @@ def test_no_fixed_sentence_holds_a_stop_word() -> None:
 
 
 def test_a_plan_that_stops_is_read_back_without_the_word(propose: Any) -> None:
-    steps = steps_in_words(propose(("navigate_to", {"place": "kitchen"}), ("stop", {})).plan)
+    steps = steps_in_words(propose(("navigate_to", {"place": "kitchen"}), ("stop", {})).plan, {})
     assert steps == "go to the kitchen and stand still"
 
 

@@ -144,9 +144,6 @@ ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
     "whether": _tell_whether,
     "doing": _tell_doing,
     "able": _told(ABILITIES),
-    # One that may not move refuses every plan before.
-    "ready": _told(READY),
-    "thanks": _told("You are welcome."),
     # No board or drive measures the charge.
     "battery": _told("I cannot measure how full my battery is."),
 }

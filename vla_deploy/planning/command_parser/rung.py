@@ -43,8 +43,6 @@ from vla_deploy.planning.scope import WORDS, ScopeGroup
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
 MOST_FOREIGN: Final = 0.2
-# What standing orders call the fields of a step.
-_ORDER_GROUPS: Final = {"what": "thing", "where": "place"}
 # A model that nobody has measured is asked back about everything.
 UNMEASURED: Final = Certainty(
     bias=0.0, least=0.0, mean=0.0, strange=0.0, read_back_below=1.0, decline_below=0.0
@@ -96,9 +94,8 @@ class CommandParser(BackEnd):
         reader = Steps(parsed.words, request)
         if len(parsed.steps) == 1 and parsed.steps[0]["do"] in ("forbid", "permit"):
             step = parsed.steps[0]
-            said = reader.fields(step, "what", "where")
-            groups = {_ORDER_GROUPS[name]: words for name, words in said.items()}
-            return proposal_of(order_of(groups, step["do"] == "forbid", request), request, NAME)
+            said = reader.fields(step, "what", "where").values()
+            return proposal_of(order_of(said, step["do"] == "forbid", request), request, NAME)
         skills = [skill for step in parsed.steps for skill in reader.skills(step)]
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.

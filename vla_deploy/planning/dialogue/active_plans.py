@@ -1,15 +1,14 @@
 """Remember what is under way: the command that is being planned, the plans that are carried out."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import PlanningResult, Request
+from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import Carried, read_setback
 from vla_deploy.planning.recovery.strategies import RECOVERY
@@ -27,7 +26,11 @@ class ActivePlans:
 
     def __init__(self, further_plans: int = NOT_BOUNDED.further_plans) -> None:
         self._further_plans = further_plans
-        self._active: OrderedDict[str, tuple[UserCommand, Carried]] = OrderedDict()
+        self._active: dict[str, tuple[UserCommand, Carried]] = {}
+
+    def __bool__(self) -> bool:
+        """Return whether any plan is carried out."""
+        return bool(self._active)
 
     def add(
         self,
@@ -40,16 +43,16 @@ class ActivePlans:
 
         What is `agreed` to with the first counts for all that follow.
         """
-        _, before = self._active.pop(command.command_id, (command, None))
-        proposal = answer.proposal
-        strategy = proposal.origin if proposal is not None and proposal.back_end == RECOVERY else ""
+        before, proposal = self.of(command.command_id), answer.proposal
+        self.end(command.command_id)
         if command.recovers and before is not None:
-            carried = before.going_on(plan, strategy)
+            is_mended = proposal is not None and proposal.back_end == RECOVERY
+            carried = before.going_on(plan, proposal.origin if proposal and is_mended else "")
         else:
             carried = Carried(plan=plan, given=command.plan is not None, agreed=agreed)
         self._active[command.command_id] = replace(command, recovers=True), carried
         while len(self._active) > _MOST_REMEMBERED:
-            self._active.popitem(last=False)
+            del self._active[next(iter(self._active))]
 
     def agreed(self, command: UserCommand) -> frozenset[str]:
         """Return what the person need not be asked again for another plan of a command."""
@@ -74,22 +77,18 @@ class ActivePlans:
         command, carried = known
         if carried.given:
             raise CannotBeDone("the plan was given, and is not changed")
-        if self._further_plans == 0:
-            raise CannotBeDone("this robot makes no other plan: [planning] further_plans is 0")
         if len(carried.setbacks) >= self._further_plans:
-            plans = "plan" if self._further_plans == 1 else "plans"
-            raise CannotBeDone(f"{self._further_plans} other {plans} failed, too")
+            raise CannotBeDone(
+                f"[planning] further_plans of the robot file allows {self._further_plans} other "
+                "plans, and no more"
+            )
         self._active[command_id] = command, carried.after(found)
         return command
 
-    def plans(self) -> tuple[Plan, ...]:
-        """Return the plans that are carried out."""
-        return tuple(carried.plan for _, carried in self._active.values())
-
     def end(self, command_id: str) -> tuple[UserCommand, Plan] | None:
         """Forget a command that has come to its end; return it with its plan, if it is known."""
-        command, carried = self._active.pop(command_id, (None, None))
-        return (command, carried.plan) if command and carried else None
+        known = self._active.pop(command_id, None)
+        return None if known is None else (known[0], known[1].plan)
 
     def end_all(self) -> None:
         """Forget all: they are cancelled, so a setback that is still under way starts nothing."""
@@ -102,69 +101,43 @@ class ActivePlans:
 PATIENCE_S: Final = 1.5
 
 
-@dataclass(slots=True, kw_only=True)
-class PlanningJob:
-    """Hold a command whose planning takes time."""
-
-    command: UserCommand
-    request: Request
-    deadline: Deadline
-    future: "Future[PlanningResult]"
-    patience: Deadline | None
-
-    def result(self) -> PlannedCommand:
-        """Return the command with what came of it, once the job is done."""
-        return PlannedCommand(self.command, self.request, self.future.result())
-
-
 class AsyncPlanner:
-    """Plan one command at a time in an executor; a step never waits for it."""
+    """Plan one `command` at a time in an executor; a step never waits for it."""
 
     def __init__(self, executor: Executor) -> None:
+        self.command: UserCommand | None = None
         self._executor = executor
-        self._job: PlanningJob | None = None
-
-    @property
-    def command(self) -> UserCommand | None:
-        """Return the command that is being planned."""
-        return None if self._job is None else self._job.command
+        self._deadline: Deadline | None = None
+        self._patience: Deadline | None = None
+        self._future: Future[PlannedCommand] | None = None
 
     def begin(
-        self,
-        command: UserCommand,
-        request: Request,
-        deadline: Deadline,
-        plan: Callable[[], PlanningResult],
+        self, command: UserCommand, deadline: Deadline, plan: Callable[[], PlannedCommand]
     ) -> None:
         """Begin to plan; no other command may be in work."""
-        self._job = PlanningJob(
-            command=command,
-            request=request,
-            deadline=deadline,
-            future=self._executor.submit(plan),
-            patience=Deadline.within(deadline.clock, PATIENCE_S),
-        )
+        self.command, self._deadline = command, deadline
+        self._patience = Deadline.within(deadline.clock, PATIENCE_S)
+        self._future = self._executor.submit(plan)
 
-    def take_done(self) -> PlanningJob | None:
-        """Return the job that is done, once."""
-        job = self._job
-        if job is None or not job.future.done():
+    def take_done(self) -> "Future[PlannedCommand] | None":
+        """Return what came of the command, once, as soon as it is planned."""
+        future = self._future
+        if future is None or not future.done():
             return None
-        self._job = None
-        return job
+        self.command = self._future = None
+        return future
 
     def take_tedious(self) -> UserCommand | None:
         """Return the command that takes longer than people like to wait in silence, once."""
-        job = self._job
-        if job is None or job.patience is None or job.patience.left_s > 0.0:
+        if self._patience is None or self._patience.left_s > 0.0:
             return None
-        job.patience = None
-        return job.command
+        self._patience = None
+        return self.command
 
     def call_off(self) -> UserCommand | None:
         """Give up what is being planned, and return the command that it was."""
-        job, self._job = self._job, None
-        if job is None:
-            return None
-        job.deadline.call_in()
-        return job.command
+        command, self.command = self.command, None
+        if self._deadline is not None:
+            self._deadline.call_in()
+        self._future = None
+        return command

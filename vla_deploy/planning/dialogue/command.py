@@ -1,7 +1,7 @@
 """Read what people and programs give the planner to do; nothing of it is trusted to be whole."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Final
 
@@ -10,13 +10,15 @@ from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.steering import awaiting, is_stop
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import negates
 from vla_deploy.planning.understanding.quantities import numbers_in
 
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5
 """How surely doubted or other words are heard at most: less than what is carried out unasked."""
+WELL_HEARD: Final = 0.75
+LEAST_INSTEAD: Final = 0.15
+"""Words heard less surely are read back, where others are so likely."""
 _ID_CHARACTERS: Final = 128
 _MOST_OTHERS: Final = 8
 
@@ -30,7 +32,7 @@ class UserCommand:
     over that of the words; with `is_doubted` the words are not sure enough to act by, and with
     `may_ask_again` they may be asked for once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
-    on after a failure. `corrected` is the plan that a correction made of the one before it.
+    on after a failure. One that `is_corrected`, by "no, the blue one", is read back.
     With `awaits_word` the plan is held until the person says go.
     """
 
@@ -43,23 +45,19 @@ class UserCommand:
     others: tuple[tuple[str, float], ...] = ()
     is_doubted: bool = False
     may_ask_again: bool = False
-    corrected: Plan | None = None
+    is_corrected: bool = False
     awaits_word: bool = False
     is_answer: bool = False
     recovers: bool = False
 
     @property
-    def has_unsure_words(self) -> bool:
-        """Return whether a number in it may have been another one, or a "don't" was not heard.
+    def is_unsure(self) -> bool:
+        """Return whether its words are read back before anything moves."""
+        return self.heard_confidence is not None and self.heard_confidence <= READ_BACK
 
-        "90" may be heard as "19". A "one" where no number was read mostly stands for a thing: "the
-        red one".
-        """
-        numbers = numbers_in(self.text)
-        others = {numbers_in(text) for text, _ in self.others}
-        if others - {numbers, (), (1.0,) if not numbers else ()}:
-            return True
-        return not negates(self.text) and any(negates(text) for text, _ in self.others)
+    def may_have_been(self) -> tuple[str, ...]:
+        """Return the other readings that are so likely that they count."""
+        return tuple(text for text, odds in self.others if odds >= LEAST_INSTEAD)
 
     @property
     def is_spoken(self) -> bool:
@@ -105,19 +103,20 @@ def read_command(event: Event) -> UserCommand:
     rest = awaiting(text)
     heard: Any = given.get("heard")
     heard = heard if isinstance(heard, Mapping) else {}
-    return UserCommand(
+    command = UserCommand(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
         source=str(given.get("source", "")),
         text=text if rest is None else rest,
         plan=plan,
-        heard_confidence=_confidence(heard),
+        heard_confidence=_ratio(heard.get("confidence")),
         others=tuple(islice(_others(heard.get("others")), _MOST_OTHERS)),
         is_doubted=bool(heard.get("doubted")),
         may_ask_again=bool(heard.get("ask_again")),
         is_answer=bool(given.get("answer")),
         awaits_word=rest is not None,
     )
+    return _bounded(command)
 
 
 def _words(given: Mapping[str, Any]) -> str:
@@ -134,12 +133,24 @@ def _words(given: Mapping[str, Any]) -> str:
     return text.strip()
 
 
-def _confidence(heard: Mapping[str, Any]) -> float | None:
-    """Return how sure the words are; of doubted ones so little that they are read back."""
-    confidence = _ratio(heard.get("confidence"))
-    if not heard.get("doubted"):
-        return confidence
-    return READ_BACK if confidence is None else min(confidence, READ_BACK)
+def _bounded(command: UserCommand) -> UserCommand:
+    """Return a command as sure as it is heard; of unsure words so little that they are read back.
+
+    "90" may be heard as "19", and a "don't" may not be heard at all. A "one" where no number was
+    read mostly stands for a thing: "the red one".
+    """
+    sure, text = command.heard_confidence, command.text
+    numbers = numbers_in(text)
+    others = {numbers_in(one) for one, _ in command.others}
+    is_unsure = (
+        command.is_doubted
+        or (sure is not None and sure < WELL_HEARD and bool(command.may_have_been()))
+        or bool(others - {numbers, (), (1.0,) if not numbers else ()})
+        or (not negates(text) and any(negates(one) for one, _ in command.others))
+    )
+    if not is_unsure:
+        return command
+    return replace(command, heard_confidence=READ_BACK if sure is None else min(sure, READ_BACK))
 
 
 def _ratio(value: Any) -> float | None:

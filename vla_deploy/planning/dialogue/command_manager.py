@@ -13,7 +13,7 @@ from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
-from vla_deploy.planning.dialogue.asr_nbest_retry import LEAST_INSTEAD, NBestRetry
+from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to
 from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
@@ -21,29 +21,18 @@ from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
+from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.follow_up import (
-    CORRECTED,
     asked_for,
-    corrected_by,
-    corrected_text,
+    corrected,
     last_done,
-    rejects,
 )
 from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.prohibitions import Prohibitions, is_broken, read_order
+from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.planning.recovery.strategies import recover
-from vla_deploy.planning.understanding import (
-    Candidate,
-    Outcome,
-    Turn,
-    Verdict,
-    described,
-    guess,
-    judge_answer,
-)
+from vla_deploy.planning.understanding import Candidate, Outcome, Verdict, judge_answer
 from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
@@ -86,45 +75,36 @@ class CommandManager:
     def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
         command = self._doubted_yes(command)
-        if pending is not None and command.is_doubted:
-            reason = f"heard too badly to answer: {pending.question.text}"
-            self.dialogue.refuse(command, reason)
-            return
-        is_taken = (
-            self._takes_as_word(command)
-            if pending is None
-            else self._takes_as_answer(command, pending)
-        )
-        if is_taken:
-            return
-        if command.is_answer:
-            self.dialogue.refuse(command, Says.NOTHING_ASKED)
+        if pending is not None:
+            is_taken = self._takes_as_answer(command, pending)
         else:
+            is_taken = self._takes_as_word(command)
+        if not is_taken and command.is_answer:
+            self.dialogue.refuse(command, Says.NOTHING_ASKED)
+        elif not is_taken:
             self._take_anew(command)
 
     def _take_anew(self, command: UserCommand) -> None:
-        """Take an utterance that answers nothing: an objection, or a command of its own."""
-        is_objection = self._objects(command)
-        if is_objection and only_objects(command.text):
-            self.stop_all(command.command_id)
-            self._events.say(command, Says.LEFT)
-        elif self._async.command is not None and self._forbids(command):
-            self._begin(command)  # it holds for what is being planned, too
-        elif len(self._queue) >= MOST_WAITING:
-            self.dialogue.refuse(command, Says.MANY_WAIT)
-        else:
-            if is_objection:  # "don't take that, take the blue one"
-                self.stop_all(f"{command.command_id}-objects")
-            self._queue.append(command)
-            if self._async.command is not None:
-                self._events.queued(command, len(self._queue))
+        """Take an utterance that answers nothing: a command, an objection, or a correction.
 
-    def _objects(self, command: UserCommand) -> bool:
-        """Tell whether a command objects to what goes on; to forbid something is an order."""
-        is_held = self.dialogue.held is not None
-        if not ((self._goes_on and objects(command.text)) or (is_held and denies(command.text))):
-            return False
-        return not self._forbids(command)
+        Whoever objects, corrects or forbids ends all that goes on; what else they want, "don't take
+        that, take the blue one", is planned.
+        """
+        text, forbids = command.text, self._forbids(command)
+        corrected = self._correction_of_last(command)
+        drops_held = self.dialogue.held is not None and denies(text) and not forbids
+        if drops_held or (self._goes_on and (forbids or corrected or objects(text))):
+            is_all = only_objects(text) and not (forbids or corrected)
+            self.stop_all(command.command_id if is_all else f"{command.command_id}-objects")
+            if is_all:
+                self._events.say(command, Says.LEFT)
+                return
+        if len(self._queue) >= MOST_WAITING:
+            self.dialogue.refuse(command, Says.MANY_WAIT)
+            return
+        self._queue.append(corrected or command)
+        if self._async.command is not None:
+            self._events.queued(command, len(self._queue))
 
     @property
     def _goes_on(self) -> bool:
@@ -134,7 +114,7 @@ class CommandManager:
     @property
     def _is_moving(self) -> bool:
         """Return whether a plan is carried out, be it one of a planner that has ended since."""
-        return bool(self._active.plans()) or self._situation.is_executing
+        return bool(self._active) or self._situation.is_executing
 
     def _forbids(self, command: UserCommand) -> bool:
         """Tell whether a command forbids something for good, which is safe at once."""
@@ -150,13 +130,12 @@ class CommandManager:
         asked = [one.command for one in open_ones if one is not None]
         dropped = (*asked, self._async.call_off(), *self._queue)
         self._queue.clear()
-        self._retry.forget()
         for command in dropped:
             if command is not None:
                 self.dialogue.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
         # "Again" after a stop cannot mean what was done before it.
-        stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
-        self.dialogue.remember(stop)
+        stop = UserCommand(command_id=command_id, told_ns=self._clock.now_ns(), text="stop")
+        self.dialogue.remember(stop, Outcome.CANCELLED)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command."""
@@ -215,42 +194,31 @@ class CommandManager:
             request = replace(request, failed=carried.history)
             deadline = self._deadline(self.planner.within_s)
             answer = recover(carried, request, self.planner.check)
-        elif plan := command.corrected or self._correction_of_last(command, request):
-            self._begin_corrected(command, request, plan)
-            return
         else:
             deadline = self._deadline(self._retry.within_s(command, self.planner.within_s))
             answer = self.planner.plan_at_once(request, deadline)
-        urgent = self._retry.is_urgent(command) and not answer.is_unchecked
-        if urgent or not self.planner.goes_on(answer):
+        if not self.planner.goes_on(answer):
             self._conclude(PlannedCommand(command, request, answer))
             return
         self._events.planning(command, self.planner.slow_back_ends)
-        slowly = partial(self.planner.plan_slowly, request, deadline, answer)
-        self._async.begin(command, request, deadline, slowly)
+        planner = self.planner
+
+        def slowly() -> PlannedCommand:
+            found = planner.plan_slowly(request, deadline, answer)
+            return PlannedCommand(command, request, found)
+
+        self._async.begin(command, deadline, slowly)
 
     def _deadline(self, within_s: float) -> Deadline:
         return Deadline.within(self._clock, within_s, Event())
 
     def _look_after_job(self) -> None:
-        job = self._async.take_done()
-        if job is not None:
-            self._guarded(job.command, lambda: self._conclude(self._held_to_now(job.result())))
+        command, done = self._async.command, self._async.take_done()
+        if command is not None and done is not None:
+            self._guarded(command, lambda: self._conclude(done.result()))
         tedious = self._async.take_tedious()
         if tedious is not None:
             self._events.say(tedious, Says.WORKING)
-
-    def _held_to_now(self, done: PlannedCommand) -> PlannedCommand:
-        """Return what came of a job, held to what was forbidden meanwhile."""
-        plan, standing = done.answer.plan, self._prohibitions.items
-        if plan is None or done.request.prohibitions == standing:
-            return done
-        request = replace(done.request, prohibitions=standing)
-        try:
-            answer = replace(done.answer, plan=self.planner.check(plan, request))
-        except PlanningError as error:
-            answer = replace(done.answer, plan=None, error=error)
-        return PlannedCommand(done.command, request, answer)
 
     def _conclude(self, done: PlannedCommand) -> None:
         """Conclude a command, or try it next in other words that may have been said."""
@@ -282,20 +250,13 @@ class CommandManager:
     def _accept(self, request: Request, answer: PlanningResult) -> None:
         """Obey an order from now on, whatever planner another profile brings.
 
-        What is under way ends where it does what has just been forbidden.
+        What is under way ends where something is forbidden.
         """
         order = None if answer.proposal is None else answer.proposal.order
         if order is not None:
             self._prohibitions.apply(order)
-        if order is not None and order.forbids and self._breaks(request):
+        if order is not None and order.forbids and self._is_moving:
             self._cancel_all(f"{request.command_id}-forbids")
-
-    def _breaks(self, request: Request) -> bool:
-        """Tell whether what is under way does what is forbidden, as far as that is known."""
-        plans, standing = self._active.plans(), self._prohibitions.items
-        if not plans:
-            return self._situation.is_executing
-        return any(is_broken(standing, plan, request.world, request.scene) for plan in plans)
 
     def _request(self, command: UserCommand) -> Request:
         talk = self.dialogue.conversation
@@ -307,9 +268,8 @@ class CommandManager:
         waiting = self.dialogue.pending or self.dialogue.held
         if waiting is None or judge_answer(waiting.question, command.text)[0] is not Verdict.YES:
             return command
-        others = (text for text, odds in command.others if odds >= LEAST_INSTEAD)
-        verdicts = {judge_answer(waiting.question, text)[0] for text in others}
-        if Verdict.NO not in verdicts:
+        others = command.may_have_been()
+        if all(judge_answer(waiting.question, one)[0] is not Verdict.NO for one in others):
             return command
         return replace(command, is_doubted=True, may_ask_again=True)
 
@@ -318,48 +278,54 @@ class CommandManager:
         held = self.dialogue.held
         if held is None or held.plan is None:
             return False
-        if corrected := self._correction_of_held(held, command):
-            self.dialogue.take_held()
-            self._events.answered(command, held.command)
-            self._queue.appendleft(corrected)
-            return True
+        turns, sure = self.dialogue.conversation.turns, not command.is_doubted
+        is_last = bool(turns) and turns[-1].command_id == held.command.command_id
+        corrected = self._corrected(held, command.text) if is_last and sure else None
         verdict, _ = judge_answer(held.question, command.text)
-        begins = is_word(command.text)
-        if verdict is Verdict.NO and not command.is_doubted and not self._goes_on:
+        begins, drops = is_word(command.text), verdict is Verdict.NO and not self._goes_on
+        if sure and (corrected or drops or (begins and not command.awaits_word)):
             self.dialogue.take_held()
             self._events.answered(command, held.command)
-            self.dialogue.drop(held, Says.LEFT)
-        elif begins and not command.is_doubted and not command.awaits_word:
-            self.dialogue.take_held()
-            self._events.answered(command, held.command)
-            self._run_confirmed(held, held.plan)
+            if corrected is not None:
+                self._queue.appendleft(corrected)
+            elif drops:
+                self.dialogue.drop(held, Says.LEFT)
+            else:
+                self._run_confirmed(held, held.plan)
         elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
             self.dialogue.refuse(command, Says.STILL_HELD)
         else:
             return False
         return True
 
-    def _correction_of_held(
-        self, held: PendingQuestion, command: UserCommand
-    ) -> UserCommand | None:
-        """Return the held command as an utterance corrects it, if nothing was said since."""
-        turns = self.dialogue.conversation.turns
-        is_last = bool(turns) and turns[-1].command_id == held.command.command_id
-        return self._corrected(held, command.text) if is_last and not command.is_doubted else None
-
     # --- answers --------------------------------------------------------------------------------
 
     def _takes_as_answer(self, command: UserCommand, pending: PendingQuestion) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
-        if command.has_unsure_words:
-            doubted = replace(pending.command, heard_confidence=READ_BACK)
-            pending = replace(pending, command=doubted)
+        if command.is_doubted:
+            reason = f"heard too badly to answer: {pending.question.text}"
+            self.dialogue.refuse(command, reason)
+            return True
+        asked = pending.command
+        if command.is_unsure:
+            asked = replace(asked, heard_confidence=READ_BACK)
         if command.awaits_word:  # "the red one, but only when I say so"
-            pending = replace(pending, command=replace(pending.command, awaits_word=True))
-        go_on = self._continuation(command, pending)
-        if go_on is not None:
-            self._events.answered(command, pending.command)
-            go_on()
+            asked = replace(asked, awaits_word=True)
+        pending = replace(pending, command=asked)
+        verdict, chosen, instead = Verdict.ANEW, None, None
+        if command.plan is None:
+            verdict, chosen = self.dialogue.judge(command.text)
+        if command.plan is None and verdict in (Verdict.ANEW, Verdict.MIXED):
+            instead = self._instead_of(pending, command)
+            is_command = verdict is Verdict.ANEW or self._at_once(command).plan is not None
+            verdict = Verdict.ANEW if is_command else Verdict.UNCLEAR
+        if instead is not None:
+            self._events.answered(command, asked)
+            self.dialogue.settle()
+            self._queue.appendleft(instead)
+        elif verdict is not Verdict.ANEW:
+            self._events.answered(command, asked)
+            self._go_on(pending, verdict, chosen)
         elif command.is_answer:
             self.dialogue.refuse(command, f"that does not answer: {pending.question.text}")
         else:
@@ -367,28 +333,14 @@ class CommandManager:
             return False
         return True
 
-    def _continuation(
-        self, command: UserCommand, pending: PendingQuestion
-    ) -> Callable[[], None] | None:
-        """Return how an utterance lets the pending command go on, None where it is no answer."""
-        if command.plan is not None:
-            return None
-        verdict, chosen = self.dialogue.judge(command.text)
-        full = described(pending.question, command.text)
-        if verdict is not Verdict.ANEW and not (full and verdict is Verdict.UNCLEAR):
-            return partial(self._go_on, pending, verdict, chosen)
-        if pending.is_open and not self._at_once(command).is_final:
-            text = f"{pending.command.text}: {command.text}"
-            return partial(self._replace, replace(pending.command, text=text))
-        if corrected := self._corrected(pending, command.text):
-            return partial(self._replace, corrected)
-        if full:
-            return partial(self._replace, replace(pending.command, text=full))
-        guessed = guess(pending.question, command.text)
-        if guessed and self._at_once(command).plan is None:
-            doubted = replace(pending.command, heard_confidence=READ_BACK)
-            return partial(self._go_on, replace(pending, command=doubted), Verdict.CHOSEN, guessed)
-        return None
+    def _instead_of(self, pending: PendingQuestion, command: UserCommand) -> UserCommand | None:
+        """Return what an utterance that chooses nothing makes of the command that waits, if it is
+        about that.
+        """
+        corrected = self._corrected(pending, command.text)
+        if corrected is None and pending.is_open and not self._at_once(command).is_final:
+            return replace(pending.command, text=f"{pending.command.text}: {command.text}")
+        return corrected
 
     def _at_once(self, command: UserCommand) -> PlanningResult:
         """Return what words that may be an answer are as a command, without slow planning."""
@@ -398,61 +350,42 @@ class CommandManager:
     def _go_on(self, pending: PendingQuestion, verdict: Verdict, chosen: Candidate | None) -> None:
         if verdict is Verdict.NO:
             self._leave(Says.LEFT)
-        elif verdict is Verdict.UNCLEAR:
+            return
+        if verdict is Verdict.UNCLEAR:
             self.dialogue.ask_again(pending)
+            return
+        self.dialogue.choose(pending.question, chosen)
+        if pending.plan is None:
+            self._queue.appendleft(pending.command)
+        elif pending.command.awaits_word:
+            request = self._request(pending.command)
+            self.dialogue.hold(PlannedCommand(pending.command, request, pending.answer))
         else:
-            self.dialogue.choose(pending.question, chosen)
-            if pending.plan is None:
-                self._queue.appendleft(pending.command)
-            elif pending.command.awaits_word:
-                request = self._request(pending.command)
-                done = PlannedCommand(pending.command, request, pending.answer)
-                self.dialogue.hold(done, pending.plan)
-            else:
-                self._run_confirmed(pending, pending.plan)
-
-    def _replace(self, command: UserCommand) -> None:
-        """Begin anew with the command that an answer has made of the one that waited."""
-        self.dialogue.settle()
-        self._queue.appendleft(command)
+            self._run_confirmed(pending, pending.plan)
 
     def _corrected(self, pending: PendingQuestion, text: str) -> UserCommand | None:
         """Return the command that waits with what a correction puts in the place of something."""
-        command, request = pending.command, self._request(pending.command)
-        proposal = pending.answer.proposal
-        if pending.plan is None or proposal is None:
-            told = corrected_text(pending.question, text, request.world.places)
-            return None if told is None else replace(command, text=told, corrected=None)
-        plan = corrected_by(proposal.plan, text, request.world.places)
-        if plan is None:
+        command, request, plan = pending.command, self._request(pending.command), pending.plan
+        told = _correction(command.text, text, plan, request, pending.question.expression)
+        if told is None:
             return None
-        # "The other one" is another than what was asked about.
-        asked = mentions_of(pending.plan, request.scene)
-        turn = Turn(said=command.text, command_id=command.command_id, mentioned=asked)
-        self.dialogue.remember(replace(turn, outcome=Outcome.ASKED))
-        return replace(command, corrected=plan)
+        if plan is not None:  # "the other one" is another than what was asked about
+            mentioned = mentions_of(plan, request.scene)
+            self.dialogue.remember(command, Outcome.ASKED, mentioned=mentioned)
+        return _with_words(command, told)
 
-    def _correction_of_last(self, command: UserCommand, request: Request) -> Plan | None:
-        """Return what a command makes of the one before it, which ends where it is under way.
-
-        What is under way ends by a no, too, of which nothing can be made: "no, the banana".
-        """
-        last, plan = last_done(request), None
-        if last is not None and not command.is_doubted:
-            plan = corrected_by(asked_for(last), command.text, request.world.places)
-        if (plan is not None or rejects(command.text)) and self._is_moving:
-            self._cancel_all(f"{command.command_id}-corrects")
-        return plan
-
-    def _begin_corrected(self, command: UserCommand, request: Request, plan: Plan) -> None:
-        """Read a plan back that takes the place of the one that was asked about or has begun."""
-        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0, is_unsure=True)
-        try:
-            answer = PlanningResult(plan=self.planner.check(plan, request), proposal=proposal)
-        except PlanningError as error:
-            answer = PlanningResult(error=error)
-        corrected = replace(command, corrected=plan)
-        self.dialogue.conclude(PlannedCommand(corrected, request, answer))
+    def _correction_of_last(self, command: UserCommand) -> UserCommand | None:
+        """Return a command as it changes the one before it, None where it does not."""
+        if command.is_doubted or command.plan is not None:
+            return None
+        request = self._request(command)
+        waits = self._queue[-1] if self._queue else self._async.command
+        last, told = last_done(request), None
+        if waits is not None:
+            told = _correction(waits.text, command.text, None, request)
+        elif last is not None:
+            told = _correction(last.said, command.text, last.plan, request)
+        return None if told is None else _with_words(command, told)
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought.
@@ -483,3 +416,17 @@ def _stands_still(done: PlannedCommand) -> bool:
     """Tell whether what was planned begins with standing still, now."""
     plan = done.answer.plan
     return plan is not None and plan.actions[0].skill == "stop" and not done.awaits_word
+
+
+def _correction(
+    command: str, text: str, plan: Plan | None, request: Request, unclear: str = ""
+) -> str | None:
+    """Return a command as an utterance corrects its plan, or what was unclear of it."""
+    asked = () if plan is None else asked_for(plan)
+    about = [one.parameters.get("object") for one in asked] or [unclear]
+    return corrected(command, text, about, request.world.places)
+
+
+def _with_words(command: UserCommand, text: str) -> UserCommand:
+    """Return a command in corrected words, of which no other readings are known."""
+    return replace(command, text=text, others=(), is_corrected=True)

@@ -33,7 +33,7 @@ from vla_deploy.planning.understanding import (
     Verdict,
     judge_answer,
 )
-from vla_deploy.planning.understanding.conversation import mentions_of
+from vla_deploy.planning.understanding.conversation import ANSWER_LIMIT_S, mentions_of
 
 MOST_ASKED: Final = 3
 HELD_S: Final = 3600.0
@@ -110,6 +110,9 @@ class Dialogue:
     def conclude(self, done: PlannedCommand) -> None:
         """Dispatch a command's plan where it may run at once; else ask, or say what forbids it."""
         command, answer = done.command, done.answer
+        if command.is_corrected and not command.recovers and answer.proposal is not None:
+            answer = replace(answer, proposal=replace(answer.proposal, is_unsure=True))
+            done = replace(done, answer=answer)
         self.metrics.note(answer.attempts)
         self.settle()  # what was chosen concerned this command alone
         try:
@@ -119,7 +122,7 @@ class Dialogue:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
             self._events.check_length(answer.plan)
             if done.awaits_word and not command.recovers:  # the word has been said
-                self.hold(done, answer.plan)
+                self.hold(done)
                 return
             agreed = self._active.agreed(command)
             question = confirmation_of(answer.plan, done.request, answer.proposal, agreed)
@@ -130,7 +133,7 @@ class Dialogue:
             if command.recovers:  # the robot stands in the middle of it: it does not wait
                 self.refuse(command, unclear, answer)
             else:
-                self._ask(done, unclear)
+                self.pending = self._asked(done, unclear)
         except PlanningError as error:
             self.refuse(command, error, answer)
 
@@ -146,15 +149,13 @@ class Dialogue:
         self.metrics.planned += 1
         self._remember_plan(done, plan, Outcome.UNDER_WAY)
 
-    def hold(self, done: PlannedCommand, plan: Plan) -> None:
+    def hold(self, done: PlannedCommand) -> None:
         """Read a plan back, and hold it until the person says go; one that was held is dropped."""
         self.drop(self.take_held(), Says.REPLACED)
-        asked = Says.HELD.format(question=question_about(plan, done.request, done.answer.proposal))
-        now_ns, text = self._clock.now_ns(), done.command.text
-        question = Question(text=asked, asked_ns=now_ns, command_text=text, limit_s=HELD_S)
-        self.held = PendingQuestion(command=done.command, answer=done.answer, question=question)
-        self.metrics.asked += 1
-        self._events.asked(done.command, question, plan, choices=("go",))
+        plan = done.answer.plan
+        assert plan is not None, "only plans are held"
+        asks = Says.HELD.format(question=question_about(plan, done.request, done.answer.proposal))
+        self.held = self._asked(done, Ambiguous(asks), limit_s=HELD_S, choices=("go",))
         # "No, the blue one" means this plan, not what was done before it.
         self._remember_plan(done, plan, Outcome.ASKED)
 
@@ -171,21 +172,12 @@ class Dialogue:
             return
         self.metrics.refused += 1
         self._events.refused(command, str(reason), answer)
-        if command.is_doubted and command.may_ask_again:
-            self._events.say(command, Says.HEARD_BADLY)
-        elif not command.is_doubted and (
-            outcome is not Outcome.CANCELLED or isinstance(reason, Says)
-        ):
+        if command.is_doubted:
+            if command.may_ask_again:
+                self._events.say(command, Says.HEARD_BADLY)
+        elif outcome is not Outcome.CANCELLED or isinstance(reason, Says):
             self._events.say(command, spoken_refusal(reason))
-        self.remember(
-            Turn(
-                said=command.text,
-                command_id=command.command_id,
-                told_ns=command.told_ns,
-                outcome=outcome,
-                answer=str(reason),
-            )
-        )
+        self.remember(command, outcome, answer=str(reason))
 
     def drop(self, pending: PendingQuestion | None, why: Says) -> None:
         """Say that what waits for an answer, if anything does, is left."""
@@ -194,7 +186,14 @@ class Dialogue:
 
     # --- what waits for an answer ---------------------------------------------------------------
 
-    def _ask(self, done: PlannedCommand, unclear: Ambiguous) -> None:
+    def _asked(
+        self,
+        done: PlannedCommand,
+        unclear: Ambiguous,
+        limit_s: float = ANSWER_LIMIT_S,
+        choices: tuple[str, ...] = (),
+    ) -> PendingQuestion:
+        """Ask, and return what waits for the answer."""
         question = Question(
             text=unclear.question,
             asked_ns=self._clock.now_ns(),
@@ -202,10 +201,11 @@ class Dialogue:
             expression=unclear.expression,
             candidates=unclear.candidates,
             choices=done.request.conversation.choices,
+            limit_s=limit_s,
         )
-        self.pending = PendingQuestion(command=done.command, answer=done.answer, question=question)
         self.metrics.asked += 1
-        self._events.asked(done.command, question, done.answer.plan)
+        self._events.asked(done.command, question, done.answer.plan, choices)
+        return PendingQuestion(command=done.command, answer=done.answer, question=question)
 
     def ask_again(self, pending: PendingQuestion) -> None:
         """Ask once more in other words, or leave it when that was enough."""
@@ -256,24 +256,16 @@ class Dialogue:
 
     # --- what was said and done -----------------------------------------------------------------
 
-    def remember(self, turn: Turn) -> None:
-        """Add a turn to the conversation."""
+    def remember(self, command: UserCommand, outcome: Outcome, **known: Any) -> None:
+        """Add a turn to the conversation: a command, what came of it, and what else is known."""
+        text, command_id, told_ns = command.text, command.command_id, command.told_ns
+        turn = Turn(said=text, command_id=command_id, told_ns=told_ns, outcome=outcome, **known)
         self.conversation = self.conversation.after(turn)
 
     def _remember_plan(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
-        command, request = done.command, done.request
-        self.remember(
-            Turn(
-                said=command.text,
-                command_id=command.command_id,
-                told_ns=command.told_ns,
-                understood=plan.summary,
-                mentioned=mentions_of(plan, request.scene),
-                plan=plan,
-                outcome=outcome,
-                here=request.here,
-            )
-        )
+        mentioned, here = mentions_of(plan, done.request.scene), done.request.here
+        told = {"understood": plan.summary, "mentioned": mentioned, "plan": plan, "here": here}
+        self.remember(done.command, outcome, **told)
 
     def ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how a command ended that was carried out."""

@@ -4,14 +4,15 @@ Every sentence that a person hears or reads from the planner stands in one table
 word: the robot would take a person's for its own.
 """
 
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from itertools import zip_longest
 from typing import Any, Final
 
 from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanningError
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.plan import PUT_IN, Plan
 
 _MOST_STEPS: Final = 6
 _MOST_SPOKEN_CHARACTERS: Final = 160
@@ -47,11 +48,11 @@ _SPOKEN: Final[Mapping[type[PlanningError], Says]] = {
     NotReady: Says.NOT_READY,
 }
 Parameters = Mapping[str, Any]
-# What each skill is called when it is proposed; what only leads up to it is left out.
+# What each skill is called when it is proposed.
 _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "navigate_to": lambda given: _going(given),
     "move": lambda given: _driving(float(given["distance_m"])),
-    "turn": lambda given: "turn right" if float(given["angle_rad"]) < 0 else "turn left",
+    "turn": lambda given: _turning(math.degrees(float(given["angle_rad"]))),
     "look_at": lambda given: f"look {given.get('direction') or 'at ' + _the(given['object'])}",
     "find_object": lambda given: f"look for {_the(given['object'])}",
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
@@ -82,28 +83,27 @@ def first_part(reason: str) -> str:
     return said.strip(" .")[:_MOST_SPOKEN_CHARACTERS]
 
 
-def steps_in_words(plan: Plan) -> str:
-    """Return a plan as a person would say it: "go to the kitchen and pick up the red cup"."""
-    steps = list(_steps(plan))
+def steps_in_words(plan: Plan, called: Mapping[str, str]) -> str:
+    """Return a plan as a person would say it: "go to the kitchen and pick up the red cup".
+
+    Ways that were put in, or lead to a person, are left out. `called` maps ids, which a person does
+    not know, to words.
+    """
+    told = [
+        one
+        for one, then in zip_longest(plan.actions, plan.actions[1:])
+        if one.skill not in ("find_object", "navigate_to")
+        or not (one.description == PUT_IN or (then and then.skill == "hand_over"))
+    ]
+    steps = [
+        _PHRASES[one.skill](
+            {name: called.get(str(value), value) for name, value in one.parameters.items()}
+        )
+        for one in told or plan.actions
+    ]
     if len(steps) > _MOST_STEPS:
         steps = [*steps[:_MOST_STEPS], f"do {len(steps) - _MOST_STEPS} things more"]
     return listed(steps)
-
-
-def _steps(plan: Plan) -> Iterator[str]:
-    """Yield the steps that matter: a way to a thing is meant by what is done with it there."""
-    handled = {
-        str(action.parameters.get(name))
-        for action in plan.actions
-        for name in ("object", "destination")
-        if action.skill in ("pick_up", "place")
-    }
-    for action, then in zip_longest(plan.actions, plan.actions[1:]):
-        leads_up = action.skill in ("find_object", "navigate_to")
-        where = action.parameters.get("object", action.parameters.get("place"))
-        comes_back = "x_m" in action.parameters and then and then.skill == "hand_over"
-        if not (leads_up and (str(where) in handled or comes_back)):
-            yield _PHRASES[action.skill](action.parameters)
 
 
 def listed(steps: Sequence[str]) -> str:
@@ -122,6 +122,10 @@ def _going(given: Parameters) -> str:
 def _driving(distance_m: float) -> str:
     way = "back" if distance_m < 0 else "forward"
     return f"drive {abs(distance_m):g} metres {way}"
+
+
+def _turning(angle_deg: float) -> str:
+    return f"turn {'right' if angle_deg < 0 else 'left'} by {abs(angle_deg):.0f} degrees"
 
 
 def _the(name: object) -> str:

@@ -14,7 +14,7 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.planning.dialogue.command import READ_BACK, UserCommand
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.interfaces import Aid, Request
 from vla_deploy.planning.knowledge import world_of
@@ -49,7 +49,7 @@ class Situation:
     ) -> None:
         self._clock = clock
         self._robot = robot
-        self._recall = Recall(memory) if memory is not None else None
+        self._memory = memory
         self._is_free = base_planner(robot).is_free
         self._pose: CellReader = space.cell_reader("pose")
         self._scene: CellReader = space.cell_reader("scene")
@@ -66,9 +66,10 @@ class Situation:
         of_use: frozenset[Aid] = frozenset(),
     ) -> Request:
         """Return the request for a command with what is known now, and what aids are of use."""
-        here, recall = self._here(), self._recall
+        here = self._here()
         scene = self._snapshot(here)
-        recalls = recall is not None and Aid.MEMORY in of_use
+        recalls = command.text if Aid.MEMORY in of_use else None
+        recollections, last_seen = recalled(self._memory, recalls)
         return Request(
             command_id=command.command_id,
             text=command.text,
@@ -76,10 +77,10 @@ class Situation:
             scene=scene,
             here=here,
             conversation=conversation,
-            heard_confidence=_heard_confidence(command),
+            heard_confidence=command.heard_confidence,
             image=self._image() if Aid.IMAGE in of_use else None,
-            recollections=recall.sentences(command.text) if recall and recalls else (),
-            last_seen=recall.things() if recall else (),
+            recollections=recollections,
+            last_seen=last_seen,
         )
 
     @property
@@ -149,36 +150,21 @@ class Situation:
         return sample if is_fresh else None
 
 
-class Recall:
-    """Read the memory; one that cannot be read is done without."""
+def recalled(
+    store: MemoryStore | None, text: str | None
+) -> tuple[tuple[str, ...], tuple[LastSeen, ...]]:
+    """Return what is remembered that fits a text, a sentence each, and where things were of late.
 
-    def __init__(self, store: MemoryStore) -> None:
-        self._store = store
-
-    def sentences(self, text: str) -> tuple[str, ...]:
-        """Return what is remembered that fits a command, a sentence each."""
-        now_s = unix_s()
-        try:
-            found = self._store.recall(text, MOST_SENTENCES)
-        except MemoryUnusable as error:
-            _log.warning("%s", error)
-            return ()
-        return tuple(sentence_of(one.episode, now_s) for one in found)
-
-    def things(self) -> tuple[LastSeen, ...]:
-        """Return things with where they were in the last weeks, the newest first."""
-        oldest_s = unix_s() - OLDEST_S
-        try:
-            seen = self._store.last_seen(count=MOST_THINGS)
-        except MemoryUnusable as error:
-            _log.warning("%s", error)
-            return ()
-        return tuple(one for one in seen if one.seen_s > oldest_s)
-
-
-def _heard_confidence(command: UserCommand) -> float | None:
-    """Return how sure the words are; with unsure words so little that they are read back."""
-    sure = command.heard_confidence
-    if not command.has_unsure_words:
-        return sure
-    return READ_BACK if sure is None else min(sure, READ_BACK)
+    The newest comes first. A memory that cannot be read is done without.
+    """
+    if store is None:
+        return (), ()
+    now_s = unix_s()
+    try:
+        found = [] if text is None else store.recall(text, MOST_SENTENCES)
+        seen = store.last_seen(count=MOST_THINGS)
+    except MemoryUnusable as error:
+        _log.warning("%s", error)
+        return (), ()
+    sentences = tuple(sentence_of(one.episode, now_s) for one in found)
+    return sentences, tuple(one for one in seen if one.seen_s > now_s - OLDEST_S)

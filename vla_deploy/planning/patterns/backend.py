@@ -1,5 +1,6 @@
 """Plan the commonest commands at once: each clause fits a whole pattern, or nothing is planned."""
 
+from string import digits
 from typing import Final
 
 from vla_deploy.action_words import skill_words
@@ -8,11 +9,11 @@ from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.patterns.follow_up import follow_up
+from vla_deploy.planning.knowledge import World, match_place
+from vla_deploy.planning.patterns.follow_up import repeated
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, intent_of, is_place, is_thing
-from vla_deploy.planning.plan import Plan, Priority, Skill, chained
+from vla_deploy.planning.patterns.table import PATTERNS, is_thing
+from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
@@ -52,23 +53,17 @@ def pattern_plan(request: Request) -> Plan:
         PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
     """
     said = clauses(request.text)
-    plan = follow_up(said[0], request) if len(said) == 1 else None
+    plan = repeated(said[0], request) if len(said) == 1 else None
     if plan is not None:
         return plan
     if not said:
         raise Declined("no clause that a pattern covers")
-    skills: list[Skill] = []
-    intents: list[str] = []
-    for clause in said:
-        step = _fitting(clause, request)
-        built = Steps(clause.split(), request).skills(step)
-        skills += built
-        intents += [intent_of(step)] * len(built)
-    return Plan(
-        goal=request.text.strip(),
-        summary=f"{', '.join(dict.fromkeys(intents))}: {skill_words(skills)}",
-        actions=chained(skills, [PRIORITIES.get(one, Priority.MEDIUM) for one in intents]),
-    )
+    skills = [
+        skill
+        for clause in said
+        for skill in Steps(clause.split(), request).skills(_fitting(clause, request))
+    ]
+    return Plan(goal=request.text.strip(), summary=skill_words(skills), actions=chained(skills))
 
 
 def plan_command(text: str, world: World, here: tuple[float, float, float] | None = None) -> Plan:
@@ -88,23 +83,21 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
 
 
 def _fitting(clause: str, request: Request) -> Step:
-    unknown: Step = {}
+    unknown = ""
     for pattern, given in PATTERNS:
         found = pattern.fullmatch(clause)
-        if found is not None:
-            said = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
-            step = {**given, **said}
-            if _are_known(said, request):
-                return step
-            unknown = unknown or step
-    if "what" not in unknown and "where" in unknown and not scope_words(clause):
-        raise UnknownPlace(unknown["where"], set(request.world.places.values()))
+        if found is None:
+            continue
+        said = {name.rstrip(digits): text for name, text in found.groupdict().items() if text}
+        named = [said[name] for name in ("where", "from") if name in said]
+        if all(_is_known(one, request) for one in named):
+            return {**given, **said}
+        unknown = unknown or ("" if "what" in said else said.get("where", ""))
+    if unknown and not scope_words(clause):
+        raise UnknownPlace(unknown, set(request.world.places.values()))
     raise Declined(f'no pattern covers "{clause[:60]}"')
 
 
-def _are_known(said: Step, request: Request) -> bool:
-    """Tell whether each place of a step is one, or a thing, or "there"."""
-    named = (said[name] for name in ("where", "from") if name in said)
-    return all(
-        one in _THERE or is_place(one, request.world.places) or is_thing(one) for one in named
-    )
+def _is_known(name: str, request: Request) -> bool:
+    """Tell whether words name a place, or a thing, or are "there"."""
+    return name in _THERE or is_thing(name) or match_place(name, request.world.places) is not None

@@ -29,9 +29,10 @@ _STOP_DOING: Final = re.compile(
 _DO_NOT: Final = (
     "(?:do not|don't|dont|not the|you (?:must not|mustn't|should not|shouldn't|may not))"
 )
+_NO_THING: Final = r"(?:no|nope|wrong) (?:the|my|your|that|an?)\b"
 # "Don't stop" is no objection; "don't worry" and "don't drop it" are idioms.
 _DENIES: Final = re.compile(
-    rf"(?:i said )?(?:{_DO_NOT}\b(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b).*"
+    rf"(?:i said )?(?:{_DO_NOT}\b(?! (?:stop|you)\b)|(?:stop|halt|freeze)\b|{_NO_THING}).*"
 )
 _OBJECTS: Final = re.compile(
     rf"{_ALONE}{_DENIES.pattern}|no(?: no)*|nope|"
@@ -57,8 +58,9 @@ def is_stop(text: str) -> bool:
 
 
 def objects(text: str) -> bool:
-    """Return whether words object to what the robot does: "no!", "wait", "don't pick it up"."""
-    return denies(text) or only_objects(text)
+    """Return whether words begin by an objection: "no!", "wait", "don't pick it up", "no, that"."""
+    pieces = _objecting(text)
+    return denies(text) or (bool(pieces) and _OBJECTS.fullmatch(pieces[0]) is not None)
 
 
 def denies(text: str) -> bool:
@@ -76,7 +78,9 @@ def only_objects(text: str) -> bool:
 def _objecting(text: str) -> list[str]:
     said = IDIOMS.sub(" ", text.lower().replace("\u2019", "'"))
     bare = (courtesy_off(part) for part in _SENTENCE.split(said[:MOST_CHARACTERS]))
-    without = (re.sub(r"^(?:(?:no|oh|and|but|hey) )+(?=\w)", "", part) for part in bare)
+    without = (
+        re.sub(rf"^(?!{_NO_THING})(?:(?:no|oh|and|but|hey) )+(?=\w)", "", part) for part in bare
+    )
     return [part for part in without if part]
 
 

@@ -8,8 +8,6 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from vla_deploy.planning.knowledge import match_place
-from vla_deploy.planning.plan import Priority
 from vla_deploy.planning.understanding.quantities import NUMBER
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
@@ -23,6 +21,8 @@ _ONE: Final = (
     rf"(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}|(?:the|that|this) (?:{_LOOK} ){{1,2}}one|"
     "it|that|this|that one|this one|them|those|these"
 )
+NAMED: Final = re.compile(rf"\b(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{_KIND}\b")
+"""What names a thing, anywhere in a text."""
 # A word for a thing that the robot has not learnt: grounding asks what it is.
 _UNKNOWN: Final = (
     rf"(?:the|a|an|my|that|this) (?:{_LOOK} ){{0,2}}"
@@ -38,126 +38,76 @@ _BARE: Final = rf"(?:{_ONE}|{_SEVERAL}|{_UNKNOWN})"
 THING: Final = rf"(?:{_KNOWN}|{_UNKNOWN})"
 _SEVERAL_THINGS: Final = rf"{THING}(?:(?:,| and|, and) {THING})*"
 WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
-_METRES: Final = (
-    rf"{NUMBER}(?: of a| an?)? ?(?:m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|steps?)"
-)
+_METRES: Final = rf"{NUMBER}(?: of a| an?)? ?(?:m|met(?:er|re)s?|cm|centimet(?:er|re)s?)"
 _ANGLE: Final = rf"{NUMBER} ?(?:degrees?|deg|°|rad|radians?)"
 _SECONDS: Final = rf"{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment)"
-_HAND: Final = (
-    r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|claw|fingers|hands|grippers)"
-)
+_HAND: Final = r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|hands|grippers)"
 _IS_THING: Final = re.compile(_KNOWN)
 _THINGS: Final = rf"(?P<what>{_SEVERAL_THINGS})"
 _THING: Final = rf"(?P<what>{THING})"
 # What is moved where: a thing that is told by where it stands leaves it open what goes where.
 _MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
 _WHERE: Final = rf"(?P<where>{WORDS})"
-_WITH: Final = rf"(?: (?:with|in) {_HAND})?"
 _INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
-_TAKE: Final = "(?:pick up|grab|take|get|lift|grasp|hold|collect|take hold of|grab hold of)"
-_PUT: Final = "(?:put|place|set|lay|drop|leave|stick|pop)"
+_TAKE: Final = "(?:pick up|grab|take|get|lift|hold)"
+_PUT: Final = "(?:put|place|set|lay|drop|leave)"
 _CARRY: Final = "(?:put|place|set|take|bring|carry|move|get)"
+_GO: Final = "(?:go|drive|move|roll|come)"
 _WAY: Final = "(?P<way>forwards?|ahead|straight ahead|backwards?|back)"
 _SIDE: Final = "(?P<way>left|right|around|round)"
-_LITTLE: Final = "(?:a (?:little|bit|little bit)|slightly)"
-
-
-# What commands are for, by what their steps do or answer; where it is not listed, a question.
-_INTENTS: Final[Mapping[str, str]] = {
-    "stop": "stop",
-    **dict.fromkeys(("go", "move", "turn"), "navigation"),
-    **dict.fromkeys(("pick", "put", "bring", "give", "open", "close", "pose"), "manipulation"),
-    **dict.fromkeys(("find", "look"), "search"),
-    **dict.fromkeys(("say", "wait", "able", "ready", "thanks"), "assist"),
-    **dict.fromkeys(("tidy", "patrol"), "cleaning"),
-}
-# What is urgent comes first where the order is free.
-PRIORITIES: Final = {
-    "stop": Priority.HIGH,
-    "assist": Priority.HIGH,
-    "cleaning": Priority.LOW,
-}
-
-
-def intent_of(step: Mapping[str, str]) -> str:
-    """Return what a step is for."""
-    return _INTENTS.get(step.get("about", step["do"]), "question")
-
+_LITTLE: Final = "a (?:little|bit|little bit)"
 
 # A clause that fits a row whole is a step to do; its named groups are fields, beside those given.
 _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     ("stop|halt|freeze|stand still", "stop", {}),
-    # --- go
-    (r"(?:go|drive|come) back|return", "go", {"where": "back"}),
+    # --- go, turn
+    ("(?:go|drive|come) back|return", "go", {"where": "back"}),
     (r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
-    (r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?", "go",
-     {"where": "charging station"}),
-    # --- go straight, turn
-    (rf"(?:move|drive|go|roll|come|step)(?: (?P<by>{_LITTLE}))? {_WAY}"
-     rf"(?:(?: by| for)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
-    (rf"(?:move|drive|go|roll|step) (?P<by>{_METRES}) {_WAY}", "move", {}),
-    (rf"(?:turn|rotate|spin)(?: (?P<by>{_LITTLE}))?(?: to the)? {_SIDE}"
-     rf"(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?", "turn", {}),
-    (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?:(?: to the)? {_SIDE})?", "turn",
-     {}),
-    (rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
-     rf"(?: to| into)? {_WHERE}", "go", {}),
-    ("(?:turn|spin) (?:all the way )?(?:a?round once|in a circle|all the way a?round)",
-     "turn", {"by": "360 degrees"}),
+    (r"dock|recharge|(?:go )?charge(?: yourself)?", "go", {"where": "charging station"}),
+    (rf"(?:{_GO}|step) {_WAY}(?:(?: by)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
+    (rf"(?:turn|rotate|spin)(?: to the)? {_SIDE}(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?",
+     "turn", {}),
+    (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?: (?:to the )?{_SIDE})?", "turn", {}),
+    (rf"(?:{_GO}|head|navigate|return)(?: back| over)?(?: to| into)? {_WHERE}", "go", {}),
+    ("(?:turn|spin) (?:a?round once|in a circle)", "turn", {"by": "360 degrees"}),
     # --- look
-    ("look a?round|have a look a?round", "look", {"way": "around"}),
-    (r"look(?: to the| to your)? (?P<way>left|right|up|down|ahead|straight ahead)|"
-     "look at the (?P<way>floor|ceiling)", "look", {}),
+    ("look a?round", "look", {"way": "around"}),
+    (r"look(?: to the)? (?P<way>left|right|up|down|ahead)", "look", {}),
     (rf"look at {_THING}", "look", {}),
-    (rf"(?:find|look for|search for|locate) {_THINGS}"
-     rf"(?: in (?:the )?(?P<from>{WORDS}))?", "find", {}),
+    (rf"(?:find|look for|search for|locate) {_THINGS}(?: in (?:the )?(?P<from>{WORDS}))?",
+     "find", {}),
     # --- hands
     (rf"open {_HAND}", "open", {}),
     (rf"close {_HAND}", "close", {}),
-    (r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose",
-     {"name": "tuck"}),
-    (rf"(?:put|set) {_THING} down|put down {_THINGS}|drop {_THING}", "put", {}),
-    (rf"{_CARRY} {_THING} back(?: where it was)?", "put", {"where": "back"}),
-    (rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
-    (rf"{_PUT} {_THING} (?P<where>here|there|over there)", "put", {}),
-    (r"empty (?:both )?(?:your )?hands", "put", {"what": "everything you are holding"}),
-    (rf"empty {_HAND}", "put", {}),
+    (r"tuck(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", "pose", {"name": "tuck"}),
+    (rf"{_PUT} {_THING} down|put down {_THINGS}|drop {_THING}|"
+     rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
+    (rf"{_CARRY} {_THING} back", "put", {"where": "back"}),
     # --- give, bring
-    (rf"(?:give|hand|pass|bring|fetch|get) (?:me|us) {_THINGS}", "bring", {}),
-    (rf"(?:give|hand|pass) {_THINGS} to me|hand over {_THINGS}|hand {_THING} over",
-     "bring", {}),
-    (rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|"
-     rf"(?:fetch|bring) {_THINGS}|(?:can|could|may) i have {_THINGS}", "bring", {}),
-    (r"let go(?: of (?:it|that|them))?|release (?:it|that|them)", "give", {}),
+    (rf"(?:give|hand|bring|fetch|get) me {_THINGS}|(?:give|hand) {_THINGS} to me|"
+     rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|(?:fetch|bring) {_THINGS}|"
+     rf"(?:can|could) i have {_THINGS}|hand over {_THINGS}", "bring", {}),
+    (r"let go(?: of (?:it|that|them))?", "give", {}),
     # --- put, take
     (rf"{_PUT} {_MOVED}(?: down)? {_INTO} {_WHERE}", "put", {}),
     # What is taken "beside the ball" or "on the table" stands there.
     (rf"{_CARRY} {_MOVED} (?P<how>to|into|onto) {_WHERE}", "put", {}),
-    (rf"{_TAKE} {_THINGS}{_WITH}|(?:pick|lift) {_THINGS} up", "pick", {}),
+    (rf"{_TAKE} {_THINGS}(?: with {_HAND})?|(?:pick|lift) {_THINGS} up", "pick", {}),
     # --- tidy
-    (r"(?:clean|tidy|clear)(?: up)?", "tidy", {}),
-    (rf"(?:clean|tidy|clear)(?: up| off)? {_WHERE}", "tidy", {}),
-    (rf"(?:patrol|inspect) {_WHERE}", "patrol", {}),
+    (rf"(?:clean|tidy|clear)(?: up)?(?: {_WHERE})?", "tidy", {}),
+    (rf"patrol {_WHERE}", "patrol", {}),
     # --- say, wait, answer
-    (r"(?:say|announce) (?P<text>[^,;:]+)|"
-     r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", "say", {}),
+    (r"say (?P<text>[^,;:]+)|(?P<text>hello|hi|good (?:morning|evening)|goodbye|bye)", "say", {}),
     (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
-    (r"(?:many )?thanks(?: a lot| so much)?|thank you(?: very much| so much)?|"
-     r"good (?:job|robot)", "ask", {"about": "thanks"}),
-    (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
-     {"about": "ready"}),
     (r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
-     r"(?:how is|what is|how's) your battery(?: level)?", "ask", {"about": "battery"}),
-    (r"help(?: me)?|what can you do|who are you|what are you", "ask", {"about": "able"}),
-    (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
-     rf"where did i (?:leave|put) {_THING}", "where", {}),
-    (rf"what (?:do|can) you see|what is there|what(?:'s| is) on (?:the )?{_WHERE}", "ask",
-     {"about": "seeing"}),
+     r"how is your battery", "ask", {"about": "battery"}),
+    (r"help(?: me)?|what can you do|who are you", "ask", {"about": "able"}),
+    (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}", "where", {}),
+    (rf"what (?:do|can) you see|what(?:'s| is) on (?:the )?{_WHERE}", "ask", {"about": "seeing"}),
     (r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",
      {"about": "holding"}),
     ("where are you", "ask", {"about": "place"}),
-    (rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask",
-     {"about": "whether"}),
+    (rf"(?:do you see|is there|are there) (?:any )?{_THING}", "ask", {"about": "whether"}),
 )  # fmt: skip
 
 
@@ -173,11 +123,6 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 
 PATTERNS: Final = tuple((_compiled(pattern), {"do": do, **given}) for pattern, do, given in _ROWS)
-
-
-def is_place(text: str, places: Mapping[str, str]) -> bool:
-    """Return whether a text is the whole name of a place."""
-    return match_place(text, places) is not None
 
 
 def is_thing(text: str) -> bool:

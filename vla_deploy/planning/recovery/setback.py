@@ -1,15 +1,11 @@
 """Read what the executor publishes of a plan that failed, and hold what was tried before."""
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any
 
 from vla_deploy.planning.plan import Action, Plan, execution_order
-
-_ID_CHARACTERS: Final = 64
-_BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
 
 class FailureCause(StrEnum):
@@ -24,34 +20,41 @@ class FailureCause(StrEnum):
 class Setback:
     """Hold which action of a plan failed, why, and which had succeeded by then, in order.
 
-    `left` are the relative motions that had begun, with what is left of them; where that is not
-    known, without parameters.
+    `left` has, by the ids of the relative motions that had begun, the parameters of what is left of
+    them, none where that is not known. `answered_by` is the strategy that was tried then, "" where
+    it was a planner.
     """
 
     action: Action
     error: str
     done: tuple[Action, ...]
     cause: FailureCause = FailureCause.SKILL
-    left: tuple[Action, ...] = ()
+    left: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    answered_by: str = ""
 
     @property
     def is_clear(self) -> bool:
         """Return whether it is known of everything that had begun how much is left."""
-        return all(one.parameters for one in self.left)
+        return all(self.left.values())
+
+    @property
+    def rest(self) -> Action:
+        """Return what is left of the action that failed."""
+        return self.rest_of(self.action)
 
     def rest_of(self, action: Action) -> Action:
         """Return what is left of an action: all of it, unless it is a motion that had begun."""
-        return next((one for one in self.left if one.id == action.id), action)
+        parameters = {**action.parameters, **self.left.get(action.id, {})}
+        return action.model_copy(update={"parameters": parameters})
 
     def __str__(self) -> str:
         parts = [f"{_words(self.action)} failed: {self.error}"]
-        parts += [f"left of it: {_words(one)}" for one in self.left if one.parameters]
-        parts += [
-            f"nobody knows how much was left of it: {one.skill}"
-            for one in self.left
-            if not one.parameters
-        ]
+        if not self.is_clear:
+            parts.append("nobody knows how much was left of it")
+        elif self.left:
+            parts.append(f"left of it: {_words(self.rest)}")
         parts += [f"done before: {', '.join(map(_words, self.done))}"] if self.done else []
+        parts += [f"then tried: {self.answered_by}"] if self.answered_by else []
         return "; ".join(parts)
 
 
@@ -59,29 +62,23 @@ class Setback:
 class Carried:
     """Hold a command's plan that is being carried out, and what failed before it.
 
-    `used` are the strategies that answered each setback, "" where a planner did. A plan that came
-    `given` is not changed. `agreed` is what the person has said yes to.
+    A plan that came `given` is not changed. `agreed` is what the person has said yes to.
     """
 
     plan: Plan
     given: bool = False
     agreed: frozenset[str] = frozenset()
     setbacks: tuple[Setback, ...] = ()
-    used: tuple[str, ...] = ()
 
     @property
     def history(self) -> tuple[str, ...]:
         """Return a sentence for each plan that failed, for planners that read."""
-        return tuple(
-            f"{setback}; then tried: {used}" if used else str(setback)
-            for setback, used in zip(self.setbacks, (*self.used, ""), strict=False)
-        )
+        return tuple(map(str, self.setbacks))
 
     @property
     def failed(self) -> Action:
         """Return what the last setback has left of the action that failed."""
-        setback = self.setbacks[-1]
-        return setback.rest_of(setback.action)
+        return self.setbacks[-1].rest
 
     @property
     def left(self) -> list[Action]:
@@ -93,12 +90,9 @@ class Carried:
     def tried(self, strategy: str) -> bool:
         """Return whether a strategy has answered the same action's failure before."""
         failed = self.setbacks[-1].action
-        return any(
-            used == strategy
-            and (rest := setback.rest_of(setback.action)).skill == failed.skill
-            and rest.parameters == failed.parameters
-            for setback, used in zip(self.setbacks, self.used, strict=False)
-        )
+        before = (one.rest for one in self.setbacks if one.answered_by == strategy)
+        same = (failed.skill, failed.parameters)
+        return any((one.skill, one.parameters) == same for one in before)
 
     def after(self, setback: Setback) -> "Carried":
         """Return it with one setback more."""
@@ -106,15 +100,13 @@ class Carried:
 
     def going_on(self, plan: Plan, strategy: str) -> "Carried":
         """Return it with the plan that shall mend the last setback."""
-        return replace(self, plan=plan, used=(*self.used, strategy))
+        last = replace(self.setbacks[-1], answered_by=strategy)
+        return replace(self, plan=plan, setbacks=(*self.setbacks[:-1], last))
 
 
 def numbered(plan: Plan, number: int) -> Plan:
     """Return a recovery's plan with ids that none of the plans before it has."""
-    short = {one.id: _BEFORE.sub("", one.id) for one in plan.actions}
-    names = {name: f"r{number}_{own}"[:_ID_CHARACTERS] for name, own in short.items()}
-    if len(set(names.values())) < len(names):
-        names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
+    names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
     actions = tuple(
         one.model_copy(
             update={"id": names[one.id], "depends_on": tuple(names[it] for it in one.depends_on)}
@@ -130,19 +122,13 @@ def read_setback(event: Mapping[str, Any], plan: Plan) -> Setback | None:
     if action is None:
         return None
     done = frozenset(str(one) for one in event.get("done", ()))
-    left: Mapping[str, Mapping[str, float]] = event.get("left", {})
     return Setback(
         action=action,
         error=str(event.get("error") or "no reason told"),
         done=tuple(one for one in execution_order(plan.actions) if one.id in done),
         cause=FailureCause(event.get("cause", FailureCause.SKILL)),
-        left=tuple(_rest(one, left[one.id]) for one in plan.actions if one.id in left),
+        left=event.get("left", {}),
     )
-
-
-def _rest(action: Action, left: Mapping[str, float]) -> Action:
-    parameters = {**action.parameters, **left} if left else {}
-    return action.model_copy(update={"parameters": parameters})
 
 
 def _words(action: Action) -> str:

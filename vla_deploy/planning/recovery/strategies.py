@@ -4,7 +4,6 @@ A strategy returns the actions to go on with, in order, or none where it has not
 is missing between them, such as driving there, grounding puts in; the validator judges the result.
 """
 
-import re
 from collections.abc import Callable, Mapping
 from typing import Final
 
@@ -16,14 +15,11 @@ from vla_deploy.planning.recovery.setback import Carried, FailureCause
 from vla_deploy.planning.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
-# What a command is about does not depend on these.
-INESSENTIAL: Final = frozenset({"look_at", "speak", "wait"})
 BLOCKED_BY_OTHERS: Final = frozenset({"navigate_to", "move", "turn"})
 WAIT_S: Final = 5.0
 OBJECT_PARAMETERS: Final = ("object", "destination")
 _CONFIDENCE: Final = 0.8
 _UNCLEAR: Final = "nobody knows how much of the way was done"
-_ANY: Final = r"\b(?:a|an|any|some|one)\s+(?:\w+\s+){0,2}"
 Steps = list[Action]
 Strategy = Callable[[Carried, Request], Steps]
 
@@ -51,12 +47,6 @@ def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
             refusals.append(f"{name}: {refused}")
     why = "; ".join(refusals) or "nothing else is left to try"
     return PlanningResult(error=CannotBeDone(f"{error} ({why})"))
-
-
-def skip(carried: Carried, _: Request) -> Steps:
-    """Go on without an action that does not matter."""
-    failed = carried.failed
-    return [one for one in carried.left if one != failed] if failed.skill in INESSENTIAL else []
 
 
 def put_in(carried: Carried, _: Request) -> Steps:
@@ -102,35 +92,20 @@ def other_hand(carried: Carried, request: Request) -> Steps:
     if carried.failed.skill != "pick_up" or used not in hands or len(hands) != 2:
         return []
     other = next(hand for hand in hands if hand != used)
-    return [_exchanged(action, ("arm",), str(used), other) for action in carried.left]
-
-
-def other_thing(carried: Carried, request: Request) -> Steps:
-    """Take another thing of the same kind and colour, where any was asked for."""
-    name, scene = _object_of(carried.failed), request.scene
-    if name is None or scene is None:
-        return []
-    subject = subject_of(name, scene)
-    if not re.search(_ANY + re.escape(subject.kind), request.text.lower()):
-        return []
-    colour = subject.thing.colour if subject.thing is not None else ""
-    for one in scene.things:
-        is_like = one.kind == subject.kind and colour in ("", one.colour)
-        if is_like and one.thing_id != subject.key and not one.held_by:
-            return [
-                _exchanged(action, OBJECT_PARAMETERS, name, one.thing_id) for action in carried.left
-            ]
-    return []
+    return [
+        one.model_copy(update={"parameters": {**one.parameters, "arm": other}})
+        if one.parameters.get("arm") == used
+        else one
+        for one in carried.left
+    ]
 
 
 STRATEGIES: Final[Mapping[str, Strategy]] = {
-    "skip": skip,
     "put in": put_in,
     "take again": take_again,
     "look again": look_again,
     "wait": wait,
     "other hand": other_hand,
-    "other thing": other_thing,
 }
 
 
@@ -146,14 +121,6 @@ def _object_of(action: Action) -> str | None:
 def _looked_for(action: Action) -> Action:
     name = _object_of(action)
     return Action(id=f"{action.id[:40]}_again", skill="find_object", parameters={"object": name})
-
-
-def _exchanged(action: Action, names: tuple[str, ...], old: str, new: str) -> Action:
-    parameters = {
-        name: new if name in names and value == old else value
-        for name, value in action.parameters.items()
-    }
-    return action.model_copy(update={"parameters": parameters})
 
 
 def _in_turn(steps: Steps) -> tuple[Action, ...]:

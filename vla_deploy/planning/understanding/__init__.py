@@ -1,6 +1,6 @@
 """Understand what a command refers to: by the conversation, the scene and the robot's places."""
 
-from vla_deploy.planning.understanding.answers import Verdict, described, guess, judge_answer
+from vla_deploy.planning.understanding.answers import Verdict, judge_answer
 from vla_deploy.planning.understanding.conversation import (
     Candidate,
     Conversation,
@@ -20,7 +20,5 @@ __all__ = [
     "Role",
     "Turn",
     "Verdict",
-    "described",
-    "guess",
     "judge_answer",
 ]

@@ -1,23 +1,19 @@
 """Ask which of several things was meant, by what tells them apart in the fewest words.
 
-colour, kind, what it stands on or in, left or right, nearer or farther, size, then their ids
+colour, kind, what it stands on or in, left or right, then their ids
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.understanding.conversation import Candidate, Mention
 from vla_deploy.planning.understanding.names import Match
-from vla_deploy.planning.understanding.phrases import EXTREMES, ORDINALS
-from vla_deploy.planning.understanding.selection import MEASURES, by_distance, in_a_row, most
+from vla_deploy.planning.understanding.selection import in_a_row
 from vla_deploy.world import Thing, Viewpoint
 
 # More than these are no short question.
 MOST_CHOICES: Final = 4
-# What is not that much nearer than another is not "the nearer one".
-LEAST_DISTANCE_M: Final = 0.05
 
 
 def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str) -> Ambiguous:
@@ -46,7 +42,7 @@ def which_hand(held: Mapping[str, Mention], expression: str) -> Ambiguous:
         Candidate(
             name=f"what is in your {hand} hand",
             words=f"the {one.said} in my {hand} hand",
-            features=frozenset((hand, *one.said.split())),
+            features=frozenset((hand, "hand", *one.said.split())),
         )
         for hand, one in held.items()
     ]
@@ -107,8 +103,6 @@ def _contrasts(things: Sequence[Thing], view: Viewpoint | None) -> Iterator[list
         [f"the {one.kind}" for one in things],
         [f"the one {where}" for where in there] if all(there) else [],
         _by_side(things, view),
-        _by_distance(things, view),
-        _by_size(things),
         [f"{words} {where}" for words, where in zip(coloured, there, strict=True)]
         if all(there) and len(kinds) == 1
         else [],
@@ -129,60 +123,14 @@ def _by_side(things: Sequence[Thing], view: Viewpoint | None) -> list[str]:
     return [sides[row.index(one)] for one in things]
 
 
-def _by_distance(things: Sequence[Thing], view: Viewpoint | None) -> list[str]:
-    if view is None or len(things) != 2:
-        return []
-    near, far = (math.dist(one.xy_m, (view.x_m, view.y_m)) for one in things)
-    if abs(near - far) < LEAST_DISTANCE_M:
-        return []
-    return ["the nearer one", "the farther one"][:: 1 if near < far else -1]
-
-
-def _by_size(things: Sequence[Thing]) -> list[str]:
-    big = most(things, "big")
-    if len(things) != 2 or len(big) != 1:
-        return []
-    return ["the big one" if one is big[0] else "the small one" for one in things]
-
-
 def _features(
     thing: Thing, said: str, things: Sequence[Thing], view: Viewpoint | None
 ) -> frozenset[str]:
     """Return every word that is true of a thing, whichever way the question was put."""
-    at = things.index(thing) if thing in things else None
-    told = [] if at is None else [words[at] for words in _contrasts(things, view)]
+    told = [words[things.index(thing)] for words in _contrasts(things, view)] if things else []
     words = {*" ".join((said, _support(thing), *told)).split()}
     words |= {thing.kind, thing.colour, thing.thing_id}
-    words |= {word for word in MEASURES if most(things, word) == [thing]}
-    words |= {word for word, measure in EXTREMES.items() if most(things, measure) == [thing]}
-    words |= {"large"} if "big" in words else set()
-    words |= {"little"} if "small" in words else set()
-    words |= {*_by_nearness(thing, things, view), *_in_row(thing, things, view)}
+    row = in_a_row(things, view)
+    words |= {"left", "leftmost"} if row and row[0] == thing else set()
+    words |= {"right", "rightmost"} if row and row[-1] == thing else set()
     return frozenset(word for word in words if word)
-
-
-def _by_nearness(thing: Thing, things: Sequence[Thing], view: Viewpoint | None) -> Iterator[str]:
-    """Yield "nearest" and the like for what clearly is that."""
-    if view is None or len(things) < 2:
-        return
-    here = (view.x_m, view.y_m)
-    away_m = [math.dist(one.xy_m, here) for one in by_distance(things, here)]
-    own_m = math.dist(thing.xy_m, here)
-    if own_m == away_m[0] and away_m[1] - own_m >= LEAST_DISTANCE_M:
-        yield from ("nearest", "closest", "nearer", "closer")
-    if own_m == away_m[-1] and own_m - away_m[-2] >= LEAST_DISTANCE_M:
-        yield from ("farthest", "furthest", "farther", "further")
-
-
-def _in_row(thing: Thing, things: Sequence[Thing], view: Viewpoint | None) -> Iterator[str]:
-    """Yield "leftmost" for the end of a row, and "second_from_left" for every place in it."""
-    row = in_a_row(things, view) or []
-    for side, counted in (("left", row), ("right", row[::-1])):
-        place = counted.index(thing) + 1 if row else 0
-        yield from (side, f"{side}most") if place == 1 else ()
-        yield from (from_side(word, side) for word, at in ORDINALS.items() if at == place)
-
-
-def from_side(ordinal: str, side: str) -> str:
-    """Return the word by which candidates go by their place in a row."""
-    return f"{ordinal}_from_{side}"

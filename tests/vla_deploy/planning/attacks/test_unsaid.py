@@ -48,6 +48,21 @@ def test_it_does_not_move_at_once(sentence: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "said",
+    [
+        "a bit more", "turn a little further", "the other way", "twice as far", "turn back again",
+        "now the same but backwards", "back again", "much further", "a bit less",
+        "the other one too",
+    ],
+)  # fmt: skip
+def test_more_or_less_of_what_was_done_is_not_done_at_once(said: str) -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["tidy"].world(home()))
+        desk.say("turn left 30 degrees")
+        assert desk.say(said)[1].outcome in ("ask", "refuse")
+
+
+@pytest.mark.parametrize(
     "sentence",
     [
         "bring me the rightmost book, the purple one I have read",
@@ -82,10 +97,9 @@ def test_an_answer_that_excludes_or_asks_picks_nothing(answer: str) -> None:
     assert said.outcome != "plan", said
 
 
-def test_an_answer_with_more_words_is_read_back() -> None:
+def test_an_answer_with_more_words_is_asked_for_again() -> None:
     with fresh_desk() as desk:
         desk.tell(scenes()["cups"].world(home()))
         desk.say("bring me the cup from the coffee table")
         said = desk.say("the red fella, it suits my mood")[1]
-    assert said.outcome == "ask"
-    assert said.plan is not None
+    assert (said.outcome, said.plan) == ("ask", None)

@@ -70,15 +70,15 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
         (plan,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
         assert "plan" in plan
     (end,) = set_back(desk, plan)
-    assert end["give_up"] == f"{NOT_BOUNDED.further_plans} other plans failed, too"
+    assert f"allows {NOT_BOUNDED.further_plans} other plans" in end["give_up"]
     assert any("the way is blocked" in one for one in model.asked[-1].failed)
 
 
 @pytest.mark.parametrize(
     ("further_plans", "words"),
     [
-        (0, "this robot makes no other plan: [planning] further_plans is 0"),
-        (1, "1 other plan failed, too"),
+        (0, "[planning] further_plans of the robot file allows 0 other plans"),
+        (1, "[planning] further_plans of the robot file allows 1 other plans"),
     ],
 )
 def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str) -> None:
@@ -171,6 +171,17 @@ def test_what_has_begun_at_a_word_waits_for_none_after_a_failure(open_desk):
     (first,) = desk.plans()
     (second,) = set_back(desk, first)
     assert second["command_id"] == "c1"
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+
+
+def test_what_was_corrected_and_agreed_to_is_mended_without_another_yes(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.give(command_id="c2", text="no, the bedroom")
+    assert desk.answers()[-1]["question"] == "Shall I go to the bedroom?"
+    desk.give(command_id="c3", text="yes")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[-1])
     assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
 
 

@@ -2,14 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.understanding import (
-    Candidate,
-    Question,
-    Verdict,
-    described,
-    guess,
-    judge_answer,
-)
+from vla_deploy.planning.understanding import Candidate, Question, Verdict, judge_answer
 
 RED = Candidate(name="cup_1", words="the red one", features=frozenset({"red", "cup", "left"}))
 BLUE = Candidate(name="cup_2", words="the blue one", features=frozenset({"blue", "cup", "right"}))
@@ -28,10 +21,20 @@ SURE = Question(text="Shall I?", asked_ns=0, command_text="throw the cup away")
     ("said", "verdict", "chosen"),
     [
         ("Oh, sorry, the red one then.", Verdict.CHOSEN, RED),
-        ("I see. The blue one is what I meant.", Verdict.ANEW, None),
-        ("Red. Keep the blue one.", Verdict.CHOSEN, RED),
-        ("you can leave the red one where it is", Verdict.CHOSEN, BLUE),
-        ("number two", Verdict.CHOSEN, BLUE),
+        ("I see. The blue one is what I meant.", Verdict.MIXED, None),
+        ("Red. Keep the blue one.", Verdict.MIXED, None),
+        ("you can leave the red one where it is", Verdict.MIXED, None),
+        ("the red one is what I don't want", Verdict.MIXED, None),
+        ("the red one or the blue one", Verdict.MIXED, None),
+        ("what about the red one", Verdict.MIXED, None),
+        ("the red book", Verdict.MIXED, None),
+        ("go to the kitchen", Verdict.ANEW, None),
+        ("the one next to the book", Verdict.ANEW, None),
+        ("the bigger one", Verdict.UNCLEAR, None),
+        ("the one on the right", Verdict.CHOSEN, BLUE),
+        ("right", Verdict.CHOSEN, BLUE),
+        ("yes", Verdict.UNCLEAR, None),
+        ("the second", Verdict.CHOSEN, BLUE),
         ("cup_2", Verdict.CHOSEN, BLUE),
         ("either one", Verdict.CHOSEN, RED),
         ("never mind", Verdict.NO, None),
@@ -58,15 +61,15 @@ def test_an_answer_to_yes_or_no(said: str, verdict: Verdict) -> None:
 
 LEFT = Candidate(
     name="ball_1", words="the pink one",
-    features=frozenset({"pink", "ball", "left", "desk", "bigger", "first_from_left"}),
+    features=frozenset({"pink", "ball", "left", "desk"}),
 )  # fmt: skip
 MIDDLE = Candidate(
     name="ball_2", words="the grey one",
-    features=frozenset({"grey", "ball", "middle", "shelf", "second_from_left"}),
+    features=frozenset({"grey", "ball", "middle", "shelf"}),
 )  # fmt: skip
 LAST = Candidate(
     name="ball_3", words="the green one",
-    features=frozenset({"green", "ball", "right", "shelf", "third_from_left"}),
+    features=frozenset({"green", "ball", "right", "shelf"}),
 )  # fmt: skip
 BALLS = Question(text="Which ball?", asked_ns=0, candidates=(LEFT, MIDDLE, LAST))
 
@@ -75,11 +78,12 @@ BALLS = Question(text="Which ball?", asked_ns=0, candidates=(LEFT, MIDDLE, LAST)
     ("said", "verdict", "chosen"),
     [
         ("the third ball", Verdict.CHOSEN, LAST),
-        ("the second one from the left, please", Verdict.CHOSEN, MIDDLE),
+        ("the second one from the left, please", Verdict.UNCLEAR, None),
+        ("the last one", Verdict.CHOSEN, LAST),
         ("neither of them", Verdict.NO, None),
         ("not the pink one", Verdict.UNCLEAR, None),
-        ("not the pink one, the grey one", Verdict.CHOSEN, MIDDLE),
-        ("not the ball", Verdict.NO, None),
+        ("not the pink one, the grey one", Verdict.UNCLEAR, None),
+        ("not the ball", Verdict.UNCLEAR, None),
         ("not that one", Verdict.UNCLEAR, None),
         ("the other one", Verdict.UNCLEAR, None),
         ("not the grey one", Verdict.UNCLEAR, None),
@@ -92,31 +96,15 @@ def test_an_answer_may_count_compare_and_leave_out(
     assert judge_answer(BALLS, said) == (verdict, chosen)
 
 
-@pytest.mark.parametrize("said", ["the other one", "not the red one", "not the red one, the other"])
+@pytest.mark.parametrize("said", ["the other one", "not the red one", "but not the red one"])
 def test_of_two_what_is_not_the_one_is_the_other(said: str) -> None:
-    assert judge_answer(WHICH, said)[1] == (BLUE if said.startswith("not") else None)
+    assert judge_answer(WHICH, said)[1] == (BLUE if "not" in said else None)
 
 
 @pytest.mark.parametrize("said", ["yes", "right", "Yes, please.", "the red one"])
 def test_a_yes_picks_the_only_candidate(said: str) -> None:
     question = replace(WHICH, candidates=(RED,))
     assert judge_answer(question, said) == (Verdict.CHOSEN, RED)
-
-
-@pytest.mark.parametrize(
-    ("said", "full"),
-    [
-        ("the one next to the book", "pick up the cup next to the book now"),
-        ("the cup on the shelf", "pick up the cup on the shelf now"),
-        ("the one", None),
-    ],
-)
-def test_an_answer_by_another_thing_makes_the_command_whole(said: str, full: str | None) -> None:
-    which = replace(WHICH, command_text="pick up the cup now")
-    assert described(which, said) == full
-    assert described(replace(which, expression="mug"), said) is None
-    assert described(replace(which, command_text="put the cup by the other cup"), said) is None
-    assert described(SURE, said) is None
 
 
 @pytest.mark.parametrize(
@@ -130,23 +118,3 @@ def test_an_answer_by_another_thing_makes_the_command_whole(said: str, full: str
 )
 def test_a_yes_that_is_taken_back_is_none(said: str) -> None:
     assert judge_answer(SURE, said)[0] is not Verdict.YES
-
-
-@pytest.mark.parametrize(
-    ("said", "chosen"),
-    [
-        ("I see. The blue one is what I meant.", BLUE),
-        ("the red, my darling", RED),
-        ("Red. Keep the blue one.", None),
-        ("the red one is what I don't want", None),
-        ("what about the red one", None),
-        ("is it the red one?", None),
-        ("the red book", None),
-        ("the red one or the blue one", None),
-        ("go to the kitchen", None),
-    ],
-)
-def test_a_guess_is_made_of_what_one_candidate_alone_is_called(
-    said: str, chosen: Candidate | None
-) -> None:
-    assert guess(WHICH, said) == chosen
