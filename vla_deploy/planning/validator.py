@@ -22,7 +22,6 @@ from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import (
     bounds_faults,
     first_broken,
-    sharing_faults,
     symbolic_faults,
 )
 from vla_deploy.planning.symbolic.state import Pose
@@ -52,7 +51,7 @@ def check_plan(
     faults, advice = _form_faults(plan, world), ""
     if not faults:
         # A plan whose actions are all right one by one is gone through symbol by symbol.
-        faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
+        faults = bounds_faults(plan.actions, world)
         faults += symbolic_faults(plan.actions, world, scene, here)
         advice = _instead_of(plan, world, scene, here) if faults else ""
     if faults:

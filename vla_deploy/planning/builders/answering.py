@@ -11,9 +11,7 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.symbolic.state import Point
-from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
-from vla_deploy.planning.understanding.questions import did_you_mean
+from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
 from vla_deploy.world.thing import FLOOR
@@ -93,17 +91,13 @@ def _places_of(things: Sequence[Thing], request: Request) -> str:
 def _known(text: str, request: Request) -> list[Thing]:
     if request.scene is None:
         return []
-    setting = Setting(request)
-    read = read_expression(text, setting.furniture)
-    read = read_expression(request.conversation.choices.get(read.said, text), setting.furniture)
-    if read.doubts:
-        raise did_you_mean(read.doubts[0], read.said)
-    return fitting(read, Use.SEE, setting)
+    context = CommandContext(request)
+    return fitting(context.read(text), Use.SEE, context)
 
 
 def _remembered(text: str, request: Request) -> list[Skill]:
     """Say where such a thing was in earlier runs, if that is remembered."""
-    query = read_expression(text, Setting(request).furniture).query
+    query = CommandContext(request).read(text).query
     for seen in request.last_seen:
         if seen.kind == query.kind and query.colour in ("", seen.colour):
             return _say(place_words(seen, unix_s()) + " I will look for it.")

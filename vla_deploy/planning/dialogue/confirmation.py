@@ -11,7 +11,7 @@ from typing import Final
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
 from vla_deploy.planning.interfaces import Proposal, Request
-from vla_deploy.planning.plan import PUT_IN, Action, Plan
+from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.scope import quoted
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s
@@ -166,11 +166,6 @@ def _mass_kg(action: Action, request: Request) -> float | None:
     return None if subject is None else subject.mass_kg
 
 
-def _puts_down_first(plan: Plan, _: Request) -> str:
-    first = any(one.skill == "place" and one.description == PUT_IN for one in plan.actions)
-    return "My hands are full: I would put something down first" if first else ""
-
-
 def _goes_back_far(plan: Plan, _: Request) -> str:
     ways_m = [float(one.parameters["distance_m"]) for one in plan.actions if one.skill == "move"]
     back_m = min(ways_m, default=0.0)
@@ -183,7 +178,6 @@ _RISKS: Final[Mapping[str, Risk]] = {
     "long": _is_long,
     "many": _moves_many,
     "heavy": _is_heavy,
-    "put down first": _puts_down_first,
     "far back": _goes_back_far,
 }
 # A yes to one of these is none to another one.

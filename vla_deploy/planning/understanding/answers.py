@@ -22,8 +22,8 @@ from vla_deploy.planning.understanding.phrases import (
     ORDER_WORDS,
     ORDINALS,
     SIDES,
+    from_side,
 )
-from vla_deploy.planning.understanding.questions import from_side
 from vla_deploy.world.query import ORDERS
 from vla_deploy.world.vocabulary import ARTICLES, KIND_WORDS
 

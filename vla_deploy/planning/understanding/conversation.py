@@ -166,20 +166,7 @@ def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     for action in plan.actions:
         for mention in (*_put_from_hand(action, plan, scene), *_mentions(action, plan, scene)):
             found.setdefault((mention.means, mention.thing_id), mention)
-    return tuple(found.values()) or _told(plan, scene)
-
-
-def _told(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
-    """Return what a plan that only answers is about: the one thing that it tells of, if it does."""
-    asked = tuple(_spoken(plan.goal, scene))
-    told = {
-        one.thing_id: one
-        for action in plan.actions
-        if isinstance(action.parameters.get("text"), str)
-        for one in _spoken(str(action.parameters["text"]), scene)
-        if one.thing_id
-    }
-    return tuple(told.values()) if len(told) == 1 else asked
+    return tuple(found.values()) or tuple(_spoken(plan.goal, scene))
 
 
 def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
