@@ -12,7 +12,7 @@ from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.symbolic.state import Point
 from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
-from vla_deploy.world import Thing
+from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.memory import place_of, seen_words
 from vla_deploy.world.thing import FLOOR
 
@@ -65,7 +65,9 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
     if not found or request.scene is None:
         look: Skill = ("find_object", {"object": fields["what"]})
         return [*_remembered(fields["what"], request), look]
-    return _say(_places_of(found, request))
+    sites = request.world.sites.values()
+    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
+    return _say(" ".join(_where(one, places, request.scene) for one in found[:MOST_TOLD]))
 
 
 def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
@@ -79,13 +81,6 @@ def _things(things: Sequence[Thing]) -> str:
     words = [_a(str(one)) for one in things[:MOST_TOLD]]
     more = len(things) - len(words)
     return listed([*words, f"{more} more"] if more > 0 else words)
-
-
-def _places_of(things: Sequence[Thing], request: Request) -> str:
-    """Return where things are, a sentence each."""
-    sites = request.world.sites.values()
-    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
-    return " ".join(_where(one, places, request) for one in things[:MOST_TOLD])
 
 
 def _known(text: str, request: Request) -> list[Thing]:
@@ -104,12 +99,10 @@ def _remembered(text: str, request: Request) -> list[Skill]:
     return []
 
 
-def _where(thing: Thing, places: Mapping[str, Point], request: Request) -> str:
-    unseen_s = request.scene.unseen_s(thing) if request.scene is not None else 0.0
-    rests = None if thing.held_by else thing.rests
-    on_something = rests is not None and rests.of != FLOOR
-    where = rests.words if rests and on_something else at_words(place_of(thing, places))
-    return f"The {thing} is {where}, {seen_words(unseen_s)}."
+def _where(thing: Thing, places: Mapping[str, Point], scene: Snapshot) -> str:
+    rests = None if thing.held_by or thing.rests is None or thing.rests.of == FLOOR else thing.rests
+    where = at_words(place_of(thing, places)) if rests is None else rests.words
+    return f"The {thing} is {where}, {seen_words(scene.unseen_s(thing))}."
 
 
 def _a(words: str) -> str:

@@ -11,12 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.builders import answering
-from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, put_back, tidy
+from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import (
     CannotBeDone,
     Declined,
+    NotAble,
     PlanInvalid,
     UnknownObject,
     UnknownPlace,
@@ -172,10 +173,10 @@ def _put(spoken: Steps, step: Step) -> list[Skill]:
     relation = step.get("how", "to")
     if relation != "to" and relation not in _RELATIONS:
         raise CannotBeDone(f"I can put things in, on or next to something, not {relation} it")
+    if step.get("where") == "back":
+        raise NotAble("I do not remember where it was: say where I shall put it")
     way, things = spoken.things(step) if "what" in step else ([], [""])
     arm = _arm(step)
-    if step.get("where") == "back":
-        return way + [one for thing in things for one in put_back(thing, spoken.request)]
     if "where" not in step:
         where = {"destination": STORE, "relation": "in"} if "away" in spoken.command else {}
     else:

@@ -1,4 +1,4 @@
-"""Clean with what there is: put things away or back, and drive over the floor around a place."""
+"""Clean with what there is: put things away, and drive over the floor around a place."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -9,7 +9,6 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
-from vla_deploy.planning.understanding.resolver import Resolver
 from vla_deploy.world import Thing
 
 STORE: Final = "box"
@@ -78,7 +77,7 @@ def look_around(place: str | None = None) -> list[Skill]:
 
 
 def patrol(place: str, request: Request) -> list[Skill]:
-    """Drive to the corners of the square around a place, as far as they are free floor.
+    """Drive towards the corners of the square around a place, as far as the floor is free.
 
     Raises:
         NotAble: no map is at hand, or no floor is free there.
@@ -89,29 +88,13 @@ def patrol(place: str, request: Request) -> list[Skill]:
         raise NotAble(f'I do not know the area "{place}"')
     if is_free is None:
         raise NotAble("without a map I cannot drive over an area")
-    corners = [
-        (round(site.pose.x_m + right * REACH_M, 3), round(site.pose.y_m + up * REACH_M, 3))
-        for right, up in ((-1, -1), (-1, 1), (1, 1), (1, -1))
-    ]
-    free = [corner for corner in corners if is_free(*corner)]
-    if not free:
+    steps: list[Skill] = []
+    for right, up in ((-1, -1), (-1, 1), (1, 1), (1, -1)):
+        for reach_m in (REACH_M, 0.5 * REACH_M):
+            x_m, y_m = site.pose.x_m + right * reach_m, site.pose.y_m + up * reach_m
+            if is_free(x_m, y_m):
+                steps.append(("navigate_to", {"x_m": round(x_m, 3), "y_m": round(y_m, 3)}))
+                break
+    if not steps:
         raise NotAble(f"the map shows no free floor around the {site.name}")
-    return [("navigate_to", {"x_m": x_m, "y_m": y_m}) for x_m, y_m in free]
-
-
-def put_back(said: str, request: Request) -> list[Skill]:
-    """Put a thing where it was when this talk came to it.
-
-    Raises:
-        NotAble: nobody has spoken of it before, or it was on nothing that takes things.
-        PlanningError: it is not known which thing is meant.
-    """
-    thing = Resolver(request).thing(said, Use.PUT).thing
-    for one in request.conversation.mentions():
-        if thing is None or one.thing_id != thing.thing_id or not one.rested:
-            continue
-        is_in = request.scene is not None and request.scene.thing(one.rested) is not None
-        if is_in or one.rested in request.world.furniture:
-            relation = "in" if is_in else "on"
-            return [("place", {"object": said, "destination": one.rested, "relation": relation})]
-    raise NotAble("I do not remember where it was; say where it shall go")
+    return steps

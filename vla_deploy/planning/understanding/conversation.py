@@ -44,8 +44,7 @@ class Mention:
     """Hold one thing or place that a turn was about.
 
     `said` is how it was called, `means` the words or the place that plans use for it, and
-    `thing_id` the thing of the scene that was meant, "" where the scene does not tell. `rested` is
-    what it was on or in at that time: a place, or the id of a thing.
+    `thing_id` the thing of the scene that was meant, "" where the scene does not tell.
     """
 
     said: str
@@ -54,7 +53,6 @@ class Mention:
     thing_id: str = ""
     kind: str = ""
     colour: str = ""
-    rested: str = ""
 
     @classmethod
     def of(cls, thing: Thing, said: str = "", role: Role = Role.OBJECT) -> "Mention":
@@ -66,7 +64,6 @@ class Mention:
             thing_id=thing.thing_id,
             kind=thing.kind,
             colour=thing.colour,
-            rested="" if thing.rests is None else thing.rests.of,
         )
 
 

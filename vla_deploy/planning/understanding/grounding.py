@@ -1,7 +1,7 @@
 """Ground a plan: referring expressions become ids, words or places, what is missing is put in.
 
 One function for every planner: patterns, the command parser, language models, a person's own JSON.
-Each may say "pick up it" and leave the way there out; what is doubled is left out.
+Each may say "pick up it" and leave the way there out.
 """
 
 from collections.abc import Iterator, Mapping
@@ -44,10 +44,6 @@ from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.planning.validator import action_faults
 
 LONGEST_ID: Final = 48
-# Doing these a second time at once changes nothing.
-IDEMPOTENT: Final = frozenset(
-    {"navigate_to", "look_at", "find_object", "open_gripper", "close_gripper", "move_arm", "stop"}
-)
 # These skills want the robot before the thing, those only want it known.
 FROM_CLOSE: Final = frozenset({"pick_up", "place"})
 OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
@@ -122,8 +118,6 @@ class _Grounder:
 
     def _append(self, action: Action, needed: tuple[str, ...]) -> tuple[str, ...]:
         """Add an action behind those that it needs; return what comes next needs."""
-        if self._is_needless(action):
-            return needed
         name, number = action.id, 1
         while name in self._taken:
             number += 1
@@ -134,13 +128,6 @@ class _Grounder:
         if action.skill in LOGIC and not action_faults(action, self._request.world):
             self._state = after(action, self._state, self._request.world, self._request.scene)
         return (name,)
-
-    def _is_needless(self, action: Action) -> bool:
-        """Tell whether the action before it has just done the same."""
-        if action.skill not in IDEMPOTENT or not self.done:
-            return False
-        before = self.done[-1]
-        return (before.skill, before.parameters) == (action.skill, action.parameters)
 
     # --- what the parameters of each skill refer to ---------------------------------------------
 
@@ -308,7 +295,6 @@ def _completed(action: Action) -> Action:
         update={
             "resources": spec.resources,
             "preconditions": action.preconditions or tuple(logic.needs),
-            "effects": action.effects or logic.leaves,
             "estimated_duration_s": action.estimated_duration_s or spec.estimated_duration_s,
         }
     )

@@ -266,7 +266,3 @@ def test_unordered_actions_are_put_in_turn_by_priority() -> None:
 
 def test_every_skill_of_the_catalogue_has_its_logic() -> None:
     assert set(LOGIC) == set(SKILLS)
-
-
-def test_every_skill_says_what_it_leaves() -> None:
-    assert all(logic.leaves for logic in LOGIC.values())
