@@ -27,13 +27,6 @@ class CommandContext:
 
     request: Request
     mentions: list[Mention] = field(default_factory=list)
-    furniture: dict[str, str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Gather what furniture may be called."""
-        world = self.request.world
-        named = world.furniture or frozenset(world.places.values())
-        self.furniture = {name: one for name, one in world.places.items() if one in named}
 
     @property
     def scene(self) -> Snapshot:
@@ -54,11 +47,13 @@ class CommandContext:
         Raises:
             UnknownObject: it says nothing that the robot knows.
         """
-        read = read_expression(text, self.furniture)
+        places, named = self.request.world.places, self.request.world.furniture
+        furniture = {name: one for name, one in places.items() if not named or one in named}
+        read = read_expression(text, furniture)
         answer = self.request.conversation.choices.get(read.said)
         if answer is None:
             return read
-        return replace(read_expression(answer, self.furniture), scope=Scope.ONE)
+        return replace(read_expression(answer, furniture), scope=Scope.ONE)
 
     def spoken_of(self) -> tuple[Mention, ...]:
         """Return what was mentioned, in this command first, the newest first."""

@@ -3,11 +3,11 @@
 colour, kind, what it stands on or in, left or right, then their ids
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.understanding.conversation import Candidate, Mention
+from vla_deploy.planning.understanding.conversation import Candidate
 from vla_deploy.planning.understanding.fitting import in_a_row
 from vla_deploy.world import Thing, Viewpoint
 
@@ -38,21 +38,9 @@ def _features(thing: Thing, called: Sequence[str], row: Sequence[Thing]) -> froz
 
 
 def _support(thing: Thing) -> str:
+    if thing.held_by:
+        return f"in my {thing.held_by} hand"
     return "" if thing.rests is None else thing.rests.words
-
-
-def which_hand(held: Mapping[str, Mention], expression: str) -> Ambiguous:
-    """Return the question which of the things in the hands was meant; `held` names them by hand."""
-    candidates = [
-        Candidate(
-            name=f"what is in your {hand} hand",
-            words=f"the {one.said} in my {hand} hand",
-            features=frozenset((hand, "hand", *one.said.split())),
-        )
-        for hand, one in held.items()
-    ]
-    return Ambiguous(f"Which one, {either([one.words for one in candidates])}?", candidates,
-                     expression)  # fmt: skip
 
 
 def which_place(places: Sequence[str], expression: str) -> Ambiguous:

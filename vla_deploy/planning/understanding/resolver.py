@@ -16,7 +16,7 @@ from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import Expression, Scope
 from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
-from vla_deploy.planning.understanding.questions import which_hand, which_thing
+from vla_deploy.planning.understanding.questions import which_thing
 from vla_deploy.world import Thing
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
@@ -31,15 +31,9 @@ class Referent:
 
     name: str
     kind: str
-    colour: str = ""
     thing: Thing | None = None
     look_at: str = ""
     hand: str = ""
-
-    @property
-    def words(self) -> str:
-        """Return the words for it, also where it goes by its id."""
-        return self.name if self.thing is None else str(self.thing)
 
 
 class Resolver:
@@ -121,8 +115,9 @@ class Resolver:
         look_at = query.anchor.surface if query.anchor is not None else ""
         words = replace(query, relation="", anchor=None) if look_at else query
         kind = query.thing_id.rpartition("_")[0] or query.kind
-        referent = Referent(name=str(words), kind=kind, colour=query.colour, look_at=look_at)
-        return self._taken(read, referent, use, referent.name, "not seen yet")
+        mention = Mention(said=read.said, means=str(words), kind=kind, colour=query.colour)
+        self._remember(mention, use, str(words), "not seen yet")
+        return Referent(name=str(words), kind=kind, look_at=look_at)
 
     def _seen(
         self, read: Expression, thing: Thing, use: Use, why: str, by_id: bool = False
@@ -131,8 +126,8 @@ class Resolver:
         held = [one for one in self.context.scene.things if one.held_by]
         fits_held = use is Use.TAKE and any(map(read.query.fits, held))
         name = thing.thing_id if by_id or _needs_id(read) or fits_held else str(read.query)
-        referent = Referent(name=name, kind=thing.kind, colour=thing.colour, thing=thing)
-        return self._taken(read, referent, use, f"{thing.thing_id} ({thing})", why)
+        self._remember(Mention.of(thing, read.said), use, f"{thing.thing_id} ({thing})", why)
+        return Referent(name=name, kind=thing.kind, thing=thing)
 
     # --- what points back -----------------------------------------------------------------------
 
@@ -162,9 +157,8 @@ class Resolver:
         meant = next(iter((*first, *spoken, *last)), None)
         if meant is not None:
             return (self._again(read, meant, use, "the latest that can be meant"),)
-        if use is Use.PUT and holding:
-            raise which_hand(holding, read.said)
         known = fitting(Expression(said=read.said), use, context)
+        known = [one for one in known if one.held_by and use is Use.PUT] or known
         if not known:
             raise UnknownObject(read.said, OBJECT_CLASSES)
         if len(known) > 1:
@@ -175,16 +169,15 @@ class Resolver:
         """Return what the hands hold, or the hand that is named.
 
         Raises:
-            NotAble: nothing; the message says what the other hand holds.
+            NotAble: they hold nothing.
+            Ambiguous: only the speaker can tell which one is meant.
         """
         holding = {hand: one for hand, one in self.context.holding() if hand in read.held_by}
         if len(holding) > 1 and not {"thing", "one"}.isdisjoint(words_of(read.said)):
-            raise which_hand(holding, read.said)
+            return self._described(Expression(said=read.said, held_by=read.held_by), use)
         if not holding:
-            others = [f"the {hand} one holds the {it.said}" for hand, it in self.context.holding()]
             hand = "".join(read.held_by) if len(read.held_by) == 1 else ""
-            nothing = f"my {hand} hand holds nothing" if hand else "I hold nothing"
-            raise NotAble("; ".join((nothing, *others)))
+            raise NotAble(f"my {hand} hand holds nothing" if hand else "I hold nothing")
         return tuple(
             replace(self._again(read, one, use, f"it is in my {hand} hand"), hand=hand)
             for hand, one in holding.items()
@@ -202,22 +195,14 @@ class Resolver:
         """Return what was mentioned before; by its id where it is still in the scene."""
         thing = self.context.scene.thing(one.thing_id) if one.thing_id else None
         name = thing.thing_id if thing is not None else one.means
-        referent = Referent(name=name, kind=one.kind, colour=one.colour, thing=thing)
-        return self._taken(read, referent, use, name, why)
+        self._remember(replace(one, said=read.said), use, name, why)
+        return Referent(name=name, kind=one.kind, thing=thing)
 
-    def _taken(
-        self, read: Expression, referent: Referent, use: Use, chosen: str, why: str
-    ) -> Referent:
+    def _remember(self, mention: Mention, use: Use, chosen: str, why: str) -> None:
         """Log what an expression was taken for, and remember that it was mentioned."""
-        self.note(read.said, chosen, why)
+        self.note(mention.said, chosen, why)
         role = Role.DESTINATION if use is Use.ONTO else Role.OBJECT
-        thing, kind, colour = referent.thing, referent.kind, referent.colour
-        self.context.mentions.append(
-            Mention(said=read.said, means=referent.words, role=role, kind=kind, colour=colour)
-            if thing is None
-            else Mention.of(thing, read.said, role)
-        )
-        return referent
+        self.context.mentions.append(replace(mention, role=role))
 
 
 def _can_move(one: Mention, use: Use) -> bool:

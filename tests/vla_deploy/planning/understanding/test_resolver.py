@@ -105,15 +105,27 @@ def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> No
     )
 
 
-def test_a_hand_that_holds_nothing_says_so_and_what_the_other_one_holds(home: "Home") -> None:
+def test_a_hand_that_holds_nothing_says_so(home: "Home") -> None:
     cup = replace(home.things["cup_1"], held_by="right")
     request = home.ask(cup)
     assert name(request, "what is in your right hand", Use.PUT) == "cup_1"
     assert name(home.ask(cup, "cup_2"), "the cup that you hold", Use.PUT) == "cup_1"
-    with pytest.raises(NotAble, match="my left hand holds nothing; the right one holds the red"):
+    with pytest.raises(NotAble, match="my left hand holds nothing"):
         name(request, "what is in your left hand", Use.PUT)
     with pytest.raises(NotAble, match=r"^I hold nothing$"):
         name(home.ask(), "what you are holding", Use.PUT)
+
+
+def test_which_hand_is_meant_is_asked(home: "Home") -> None:
+    held = [
+        replace(home.things["cup_1"], held_by="right", rests=None),
+        replace(home.things["cup_4"], held_by="left", rests=None, colour="red"),
+    ]
+    for text in ("it", "the thing in your hand"):
+        with pytest.raises(Ambiguous) as asked:
+            name(home.ask(*held, "ball_1"), text, Use.PUT)
+        assert "the one in my right hand" in asked.value.question
+        assert ["right" in one.features for one in asked.value.candidates].count(True) == 1
 
 
 def test_what_is_held_is_not_what_shall_be_taken(home: "Home") -> None:
