@@ -8,7 +8,7 @@ answer. What nothing singles out is asked back.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.planning.catalogue import ARMS, GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownObject
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import words_of
@@ -172,11 +172,12 @@ class Resolver:
             NotAble: they hold nothing.
             Ambiguous: only the speaker can tell which one is meant.
         """
-        holding = {hand: one for hand, one in self.context.holding() if hand in read.held_by}
+        hands = read.held_by or ARMS
+        holding = {hand: one for hand, one in self.context.holding() if hand in hands}
         if len(holding) > 1 and not {"thing", "one"}.isdisjoint(words_of(read.said)):
             return self._described(Expression(said=read.said, held_by=read.held_by), use)
         if not holding:
-            hand = "".join(read.held_by) if len(read.held_by) == 1 else ""
+            hand = "".join(hands) if len(hands) == 1 else ""
             raise NotAble(f"my {hand} hand holds nothing" if hand else "I hold nothing")
         return tuple(
             replace(self._again(read, one, use, f"it is in my {hand} hand"), hand=hand)

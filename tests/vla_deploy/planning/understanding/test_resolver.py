@@ -116,6 +116,14 @@ def test_a_hand_that_holds_nothing_says_so(home: "Home") -> None:
         name(home.ask(), "what you are holding", Use.PUT)
 
 
+@pytest.mark.parametrize("text", ["them", "both", "what you are holding"])
+def test_both_hands_are_meant(home: "Home", text: str) -> None:
+    held = [replace(home.things["cup_1"], held_by="right"),
+            replace(home.things["ball_1"], held_by="left")]  # fmt: skip
+    found = Resolver(home.ask(*held, "cup_2")).things(text, Use.PUT)
+    assert [(one.name, one.hand) for one in found] == [("cup_1", "right"), ("ball_1", "left")]
+
+
 def test_which_hand_is_meant_is_asked(home: "Home") -> None:
     held = [
         replace(home.things["cup_1"], held_by="right", rests=None),
