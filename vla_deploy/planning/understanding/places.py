@@ -10,7 +10,7 @@ from vla_deploy.planning.symbolic.conditions import PUT_INTO
 from vla_deploy.planning.symbolic.state import Pose, State
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.understanding.fitting import CommandContext, Use
 from vla_deploy.planning.understanding.questions import where, which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.world.relations import NEXT_TO
@@ -28,10 +28,11 @@ def resolve_place(text: str, resolver: Resolver) -> str:
         UnknownPlace: no place is called so.
         Ambiguous: several are.
     """
-    place, why = _place(_key(text), text, resolver)
-    said = text.strip()
-    resolver.note(said, place, why)
-    resolver.context.mentions.append(Mention(said=said, means=place, role=Role.PLACE))
+    context, key, said = resolver.context, _key(text), text.strip()
+    answer = context.request.conversation.choices.get(key, key)
+    place = match_place(answer, context.request.world.places) or _meant(key, said, context)
+    resolver.note(said, place, "a place")
+    context.mentions.append(Mention(said=said, means=place, role=Role.PLACE))
     return place
 
 
@@ -49,42 +50,29 @@ def _named(key: str, places: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(named)) if key else ()
 
 
-def _place(key: str, text: str, resolver: Resolver) -> tuple[str, str]:
-    """Return the place that a text means, and why."""
-    context = resolver.context
-    known = context.request.world.places
-    answer = match_place(context.request.conversation.choices.get(key, ""), known)
-    if answer is not None:
-        return answer, "you said so"
-    exact = match_place(key, known)
-    if exact is not None:
-        return exact, "its name"
-    if phrases.PRONOUNS.get(key) in (phrases.THERE, phrases.IT):
-        for one in context.spoken_of():
-            if one.role is Role.PLACE:
-                return one.means, "spoken of last"
-        raise where(tuple(sorted(set(known.values()))), key)
-    named = _named(key, known)
-    if not named:
-        raise UnknownPlace(text[:MOST_LETTERS], set(known.values()))
-    return _one_of(key, named, resolver), "part of its name"
+def _meant(key: str, said: str, context: CommandContext) -> str:
+    """Return the place that a part of a name means, or "there".
 
-
-def _one_of(key: str, named: tuple[str, ...], resolver: Resolver) -> str:
-    """Choose among places with a common name: in the room named before, here, or spoken of."""
-    context = resolver.context
+    Of places with a common name it is that in the room named before, here, or spoken of last.
+    """
     world, view = context.request.world, context.view
-
-    def is_here(name: str) -> bool:
-        site = world.sites.get(name)
-        if site is None or view is None:
-            return False
-        return math.dist((site.pose.x_m, site.pose.y_m), (view.x_m, view.y_m)) <= AT_PLACE_M
-
-    said = [world.surface_of(one.means) for one in reversed(context.mentions)]
-    here = [name for name in named if is_here(name)]
-    before = [one.means for one in context.spoken_of() if one.role is Role.PLACE]
-    meant = named if len(named) == 1 else (*said, *here, *before)
+    known = {*world.places.values()}
+    spoken = [one.means for one in context.spoken_of() if one.role is Role.PLACE]
+    if phrases.PRONOUNS.get(key) in (phrases.THERE, phrases.IT):
+        if not spoken:
+            raise where(sorted(known), key)
+        return spoken[0]
+    named = _named(key, world.places)
+    if not named:
+        raise UnknownPlace(said[:MOST_LETTERS], known)
+    poses = {name: world.sites[name].pose for name in named if name in world.sites}
+    in_room = [world.surface_of(one.means) for one in reversed(context.mentions)]
+    here = [
+        name
+        for name, pose in poses.items()
+        if view and math.dist((pose.x_m, pose.y_m), (view.x_m, view.y_m)) <= AT_PLACE_M
+    ]
+    meant = named if len(named) == 1 else (*in_room, *here, *spoken)
     place = next((one for one in meant if one in named), None)
     if place is None:
         raise which_place(named, key)
