@@ -167,7 +167,7 @@ def _with_exceptions(
     start = next((n for n, one in enumerate(words) if one not in {*_EXCEPT, "for"}), len(words))
     parts = _OR.split(" ".join(words[start:]))
     pronouns = {PRONOUNS[part] for part in parts if part in PRONOUNS}
-    if not pronouns <= {IT}:
+    if not pronouns <= {IT} or "one" in parts:
         raise UnknownWord(read.said, " ".join(parts), OBJECT_CLASSES)
     others = (_description(part.split(), furniture) for part in parts if part not in PRONOUNS)
     return replace(read, besides=tuple(others), is_other=read.is_other or bool(pronouns))

@@ -105,6 +105,8 @@ def fitting(read: Expression, use: Use, context: CommandContext) -> list[Thing]:
             found = [one for one in scene.things if one.held_by] or found
         spoken = (one for one in context.spoken_of() if query.kind in (ANY_CLASS, one.kind))
         before = next((one.thing_id for one in spoken if one.thing_id), "")
+        if not before and read.scope is Scope.ALL:
+            return []  # than which one?
         found = [one for one in found if not before or not one.is_called(before)]
     found = [one for one in found if _suits(one, use, query, context)]
     if read.held_by:

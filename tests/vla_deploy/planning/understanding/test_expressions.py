@@ -139,7 +139,7 @@ def test_a_generic_word_for_furniture_means_all_that_are_called_so() -> None:
      "a couple of cups", "one of the two cups", "the bigger of the two balls", "the tallest cup",
      "the cup nearest to the box", "the one nearest the book", "the cup closest to me",
      "the cup on the left table", "the cup next to the other cup", "all cups but the one you hold",
-     "all but them", "everything but", "all the cups over there"],
+     "all but them", "all cups but one", "everything but", "all the cups over there"],
 )  # fmt: skip
 def test_what_is_not_known_is_refused(text: str) -> None:
     with pytest.raises(UnknownObject):

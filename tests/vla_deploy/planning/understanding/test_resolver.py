@@ -253,6 +253,7 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
         ("the biggest book", 'I see nothing that is "biggest book"$'),
         ("any cup but the blue one", 'nothing that is "any cup but blue one"$'),
         ("the other can", 'nothing that is "other can", only the pink can'),
+        ("all books but it", 'nothing that is "all books but it"$'),
     ],
 )
 def test_what_is_not_there_is_said_to_be_not(home: "Home", text: str, says: str) -> None:
@@ -264,6 +265,11 @@ def test_what_is_not_there_is_said_to_be_not(home: "Home", text: str, says: str)
     )
     with pytest.raises(NotAble, match=says):
         name(home.ask(*BOTTLES, CAN, conversation=talk), text)
+
+
+def test_all_but_what_nobody_has_spoken_of_are_none(home: "Home") -> None:
+    with pytest.raises(NotAble):
+        Resolver(home.ask("cup_1", "cup_2")).things("everything but that", Use.PUT)
 
 
 def test_the_big_one_is_of_the_kind_spoken_of_that_can_be_taken(home: "Home") -> None:
