@@ -120,21 +120,17 @@ def _tell_doing(_: Fields, request: Request) -> list[Skill]:
     return _say(f"The last that I was told is: {turns[-1].said}." if turns else READY)
 
 
-def _told(text: str) -> Callable[[Fields, Request], list[Skill]]:
-    return lambda _fields, _request: _say(text)
-
-
 ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
     "holding": _tell_hands,
     "seeing": _tell_sight,
     "place": _tell_place,
     "whether": _tell_whether,
     "doing": _tell_doing,
-    "able": _told(ABILITIES),
+    "able": lambda _fields, _request: _say(ABILITIES),
     # One that may not move refuses every plan before.
-    "ready": _told(READY),
-    "thanks": _told("You are welcome."),
+    "ready": lambda _fields, _request: _say(READY),
+    "thanks": lambda _fields, _request: _say("You are welcome."),
     # No board or drive measures the charge.
-    "battery": _told("I cannot measure how full my battery is."),
+    "battery": lambda _fields, _request: _say("I cannot measure how full my battery is."),
 }
 """What each subject of a question is answered by."""

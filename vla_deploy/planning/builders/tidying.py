@@ -48,26 +48,20 @@ def _lying(place: str, request: Request) -> list[Thing]:
     Raises:
         UnknownPlace: the place is none that the robot knows.
     """
-    things = () if request.scene is None else request.scene.things
-    surfaces = _surfaces(place, request)
+    surfaces: frozenset[str] = frozenset()
+    if " ".join(words_of(place)) not in EVERYWHERE:
+        name = match_place(place, request.world.places)
+        if name is None:
+            raise UnknownPlace(place, set(request.world.places.values()))
+        surfaces = request.world.surfaces_of(name)
     return [
         one
-        for one in things
+        for one in (() if request.scene is None else request.scene.things)
         if one.kind in GRASPABLE_CLASSES
         and not one.held_by
         and (one.rests is None or one.rests.relation != "in")
         and (not surfaces or (one.rests is not None and one.rests.of in surfaces))
     ]
-
-
-def _surfaces(place: str, request: Request) -> frozenset[str]:
-    """Return the furniture of a place, or nothing where everywhere is meant."""
-    if " ".join(words_of(place)) in EVERYWHERE:
-        return frozenset()
-    name = match_place(place, request.world.places)
-    if name is None:
-        raise UnknownPlace(place, set(request.world.places.values()))
-    return request.world.surfaces_of(name)
 
 
 def look_around(place: str | None = None) -> list[Skill]:

@@ -147,12 +147,8 @@ def _kind_spoken_of(query: Query, use: Use, context: CommandContext) -> str:
 def _in_room(query: Query, context: CommandContext) -> list[Thing]:
     """Return what stands on the furniture of a room, where "in the kitchen" names no furniture."""
     room = query.anchor.surface if query.anchor is not None and query.relation == IN else ""
-    table = context.request.world.surface_of(room) if room else ""
-    if table in ("", room):
-        return []
-    things = context.scene.things
-    there = {table, *(one.thing_id for one in things if _rests_on(one, {table}))}
-    alone = find(replace(query, relation="", anchor=None, order=""), context.scene)
+    there = context.request.world.surfaces_of(room) if room else ()
+    alone = find(replace(query, relation="", anchor=None, order=""), context.scene, context.view)
     return [one for one in alone if _rests_on(one, there)]
 
 

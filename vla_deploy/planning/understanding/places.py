@@ -11,7 +11,7 @@ from vla_deploy.planning.symbolic.state import Pose, State
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.fitting import CommandContext, Use
-from vla_deploy.planning.understanding.questions import where, which_place
+from vla_deploy.planning.understanding.questions import which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.world.relations import NEXT_TO
 
@@ -60,7 +60,7 @@ def _meant(key: str, said: str, context: CommandContext) -> str:
     spoken = [one.means for one in context.spoken_of() if one.role is Role.PLACE]
     if phrases.PRONOUNS.get(key) in (phrases.THERE, phrases.IT):
         if not spoken:
-            raise where(sorted(known), key)
+            raise which_place(sorted(known), key, "Where do you mean?")
         return spoken[0]
     named = _named(key, world.places)
     if not named:

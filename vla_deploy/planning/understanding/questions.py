@@ -43,25 +43,16 @@ def _support(thing: Thing) -> str:
     return "" if thing.rests is None else thing.rests.words
 
 
-def which_place(places: Sequence[str], expression: str) -> Ambiguous:
+def which_place(places: Sequence[str], expression: str, question: str = "") -> Ambiguous:
     """Return the question which of these places was meant."""
-    candidates = _places(places)
-    words = [one.words for one in candidates[:MOST_CHOICES]]
-    return Ambiguous(f"Which one, {either(words)}?", candidates, expression)
-
-
-def where(places: Sequence[str], expression: str) -> Ambiguous:
-    """Return the question where "there" is when nobody has spoken of a place."""
-    return Ambiguous("Where do you mean?", _places(places), expression)
-
-
-def _places(names: Sequence[str]) -> list[Candidate]:
-    return [
+    candidates = [
         Candidate(
             name=name, words=f"the {name.replace('_', ' ')}", features=frozenset(name.split("_"))
         )
-        for name in names
+        for name in places
     ]
+    words = either([one.words for one in candidates[:MOST_CHOICES]])
+    return Ambiguous(question or f"Which one, {words}?", candidates, expression)
 
 
 def either(words: Sequence[str]) -> str:

@@ -5,7 +5,6 @@ goes by its id where only the moment of the command singles it out: a side, an o
 answer. What nothing singles out is asked back.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from vla_deploy.planning.catalogue import ARMS, GRASPABLE_CLASSES
@@ -108,8 +107,10 @@ class Resolver:
         """Go by words for what is not in the scene; what only points at things needs it there."""
         query = read.query
         if read.is_compared:
-            alike = replace(read, besides=(), side="", is_other=False)
-            raise _not_there(read, fitting(alike, use, self.context))
+            alike = replace(read, besides=(), side="", is_other=False, held_by=frozenset())
+            known = [f"the {one}" for one in fitting(alike, use, self.context)]
+            only = f", only {' and '.join(dict.fromkeys(known))}" if known else ""
+            raise NotAble(f'I see nothing that is "{read.said}"{only}')
         if not query.is_named and not query.colour and query.anchor is None:
             raise UnknownObject(read.said, OBJECT_CLASSES)
         look_at = query.anchor.surface if query.anchor is not None else ""
@@ -216,9 +217,3 @@ def _needs_id(read: Expression) -> bool:
     pointed = read.is_compared or read.support or query.order or not query.is_named
     related = query.sizes or query.anchor is not None
     return bool(pointed or related or read.scope is Scope.ALL)
-
-
-def _not_there(read: Expression, things: Sequence[Thing]) -> NotAble:
-    """Return why nothing fits; `things` are those that would, if they were not compared."""
-    known = " and ".join(dict.fromkeys(f"the {one}" for one in things))
-    return NotAble(f'I see nothing that is "{read.said}"' + (f", only {known}" if known else ""))
