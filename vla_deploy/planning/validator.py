@@ -9,7 +9,6 @@ from vla_deploy.planning.knowledge import World, match_place, parse_object
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
 from vla_deploy.planning.symbolic.simulation import (
     bounds_faults,
-    sharing_faults,
     symbolic_faults,
 )
 from vla_deploy.planning.symbolic.state import Pose
@@ -29,7 +28,7 @@ def check_plan(
     faults = _form_faults(plan, world)
     if not faults:
         # A plan whose actions are all right one by one is gone through symbol by symbol.
-        faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
+        faults = bounds_faults(plan.actions, world)
         faults += symbolic_faults(plan.actions, world, scene, here)
     if faults:
         raise PlanInvalid(faults)

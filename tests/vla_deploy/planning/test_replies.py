@@ -13,8 +13,8 @@ from benchmarks.planner_desk import fresh_desk
         ("How much battery do you have left?", "plan", "I cannot measure how full my battery is."),
         ("bring me my glasses", "refuse", 'the object "my glasses"; I can handle: ball, book'),
         ("put the glasses in the box", "refuse", 'the object "the glasses"; I can handle: ball'),
-        ("where is my cap", "ask", "Did you mean the cup?"),
-        ("pick up the cap", "ask", "Did you mean the cup?"),
+        ("where is my cap", "refuse", 'the object "my cap"; I can handle: ball, book'),
+        ("pick up the cap", "refuse", 'the object "the cap"; I can handle: ball, book'),
         ("pick up the vase", "refuse", 'the object "the vase"; I can handle: ball, book'),
         ("bring me a cushion", "refuse", 'the object "a cushion"; I can handle: ball, book'),
         ("bring me something to drink", "refuse", "but I can look for things, bring them"),
@@ -28,11 +28,3 @@ def test_what_is_said_gets_a_true_answer(text: str, outcome: str, said: str) -> 
         told = [one["parameters"].get("text", "") for one in (answer.plan or {}).get("actions", ())]
         assert answer.outcome == outcome, answer
         assert said in " ".join([answer.text, *told])
-
-
-def test_a_yes_to_what_was_meant_goes_on() -> None:
-    with fresh_desk() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        desk.say("where is my cap")
-        plan = desk.say("yes")[1].plan or {}
-        assert plan["actions"][0]["parameters"]["text"].startswith("The red cup is on the coffee")

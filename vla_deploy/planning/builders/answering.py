@@ -11,10 +11,8 @@ from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.symbolic.state import Point
-from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
-from vla_deploy.planning.understanding.questions import did_you_mean
-from vla_deploy.world import Thing
+from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
+from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.memory import place_of, seen_words
 from vla_deploy.world.thing import FLOOR
 
@@ -67,7 +65,9 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
     if not found or request.scene is None:
         look: Skill = ("find_object", {"object": fields["what"]})
         return [*_remembered(fields["what"], request), look]
-    return _say(_places_of(found, request))
+    sites = request.world.sites.values()
+    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
+    return _say(" ".join(_where(one, places, request.scene) for one in found[:MOST_TOLD]))
 
 
 def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
@@ -83,39 +83,26 @@ def _things(things: Sequence[Thing]) -> str:
     return listed([*words, f"{more} more"] if more > 0 else words)
 
 
-def _places_of(things: Sequence[Thing], request: Request) -> str:
-    """Return where things are, a sentence each."""
-    sites = request.world.sites.values()
-    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
-    return " ".join(_where(one, places, request) for one in things[:MOST_TOLD])
-
-
 def _known(text: str, request: Request) -> list[Thing]:
     if request.scene is None:
         return []
-    setting = Setting(request)
-    read = read_expression(text, setting.furniture)
-    read = read_expression(request.conversation.choices.get(read.said, text), setting.furniture)
-    if read.doubts:
-        raise did_you_mean(read.doubts[0], read.said)
-    return fitting(read, Use.SEE, setting)
+    context = CommandContext(request)
+    return fitting(context.read(text), Use.SEE, context)
 
 
 def _remembered(text: str, request: Request) -> list[Skill]:
     """Say where such a thing was in earlier runs, if that is remembered."""
-    query = read_expression(text, Setting(request).furniture).query
+    query = CommandContext(request).read(text).query
     for seen in request.last_seen:
         if seen.kind == query.kind and query.colour in ("", seen.colour):
             return _say(place_words(seen, unix_s()) + " I will look for it.")
     return []
 
 
-def _where(thing: Thing, places: Mapping[str, Point], request: Request) -> str:
-    unseen_s = request.scene.unseen_s(thing) if request.scene is not None else 0.0
-    rests = None if thing.held_by else thing.rests
-    on_something = rests is not None and rests.of != FLOOR
-    where = rests.words if rests and on_something else at_words(place_of(thing, places))
-    return f"The {thing} is {where}, {seen_words(unseen_s)}."
+def _where(thing: Thing, places: Mapping[str, Point], scene: Snapshot) -> str:
+    rests = None if thing.held_by or thing.rests is None or thing.rests.of == FLOOR else thing.rests
+    where = at_words(place_of(thing, places)) if rests is None else rests.words
+    return f"The {thing} is {where}, {seen_words(scene.unseen_s(thing))}."
 
 
 def _a(words: str) -> str:
@@ -133,18 +120,17 @@ def _tell_doing(_: Fields, request: Request) -> list[Skill]:
     return _say(f"The last that I was told is: {turns[-1].said}." if turns else READY)
 
 
-def _told(text: str) -> Callable[[Fields, Request], list[Skill]]:
-    return lambda _fields, _request: _say(text)
-
-
 ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
     "holding": _tell_hands,
     "seeing": _tell_sight,
     "place": _tell_place,
     "whether": _tell_whether,
     "doing": _tell_doing,
-    "able": _told(ABILITIES),
+    "able": lambda _fields, _request: _say(ABILITIES),
+    # One that may not move refuses every plan before.
+    "ready": lambda _fields, _request: _say(READY),
+    "thanks": lambda _fields, _request: _say("You are welcome."),
     # No board or drive measures the charge.
-    "battery": _told("I cannot measure how full my battery is."),
+    "battery": lambda _fields, _request: _say("I cannot measure how full my battery is."),
 }
 """What each subject of a question is answered by."""

@@ -11,13 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.builders import answering
-from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, put_back, tidy
-from vla_deploy.planning.catalogue import ARMS
+from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import (
     CannotBeDone,
     Declined,
+    NotAble,
     PlanInvalid,
     UnknownObject,
     UnknownPlace,
@@ -25,17 +25,10 @@ from vla_deploy.planning.errors import (
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Setting, Use, fitting
-from vla_deploy.planning.understanding.normaliser import RELATIONS
+from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
 from vla_deploy.planning.understanding.places import pose_parameters
-from vla_deploy.planning.understanding.quantities import (
-    UNITS,
-    amount_of,
-    amount_words,
-    is_silent,
-    quantity_words,
-)
+from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 DEFAULT_MOVE_M: Final = 0.5
@@ -46,16 +39,18 @@ MOST_WORDS_ALONE: Final = 4
 _SPEAKERS: Final = frozenset({"me", "us", "here", "over here"})
 # What poses are called besides their names in robot files.
 _POSES: Final[Mapping[str, str]] = {
-    "tucked": "tuck", "fold": "tuck", "folded": "tuck", "stow": "tuck", "stowed": "tuck",
-    "pull": "tuck", "carry": "tuck", "driving": "tuck", "travel": "tuck", "safe": "tuck",
-    "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
+    "tucked": "tuck", "fold": "tuck", "folded": "tuck", "stow": "tuck", "pull": "tuck",
+    "resting": "rest", "relax": "rest", "lower": "rest",
 }  # fmt: skip
-_CAN_PUT: Final = frozenset((*RELATIONS, *RELATIONS.values()))
+_DIRECTIONS: Final = {"straight ahead": "ahead", "floor": "down", "ceiling": "up"}
+_RELATIONS: Final[Mapping[str, str]] = {
+    "in": "in", "into": "in", "inside": "in", "on": "on", "onto": "on", "on top of": "on",
+    "next to": NEXT_TO, "beside": NEXT_TO, "near": NEXT_TO,
+}  # fmt: skip
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
-_POSSESSIVES: Final = re.compile(r"\b(?:his|her|their|its)\b")
 # What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
 _BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
 Handler = Callable[["Steps", Step], list[Skill]]
@@ -79,51 +74,33 @@ class Steps:
         """
         return _HANDLERS[step["do"]](self, step)
 
-    @property
-    def is_alone(self) -> bool:
-        """Return whether the command has few words, and so one step."""
-        return len(self.request.text.split()) <= MOST_WORDS_ALONE
-
     def spoken(self, step: Step, field: str) -> str:
         """Return the words of a field, with the articles that were said among them."""
         words = step[field].split()
         span = find_span(words, self.command)
-        text = " ".join(words if span is None else span.spoken)
-        text = _BESIDE.sub("", _POSSESSIVES.sub("the", text))
-        return re.sub(
-            r"\b(on|to|at|in) (left|right|middle|back|front)\b(?! of)", r"\1 the \2", text
-        )
+        return _BESIDE.sub("", " ".join(words if span is None else span.spoken))
 
     def fields(self, step: Step, *names: str) -> dict[str, str]:
         """Return the words of those of some fields that a step has."""
         return {name: self.spoken(step, name) for name in names if name in step}
 
-    def source(self, step: Step) -> tuple[list[Skill], str]:
-        """Return the way to the room where things are, or words that say what they are on or in."""
-        where = self._where_from(step)
-        if not where:
-            return [], ""
-        world = self.request.world
-        place = match_place(where, world.places)
-        if place is not None and not world.is_surface(place):
-            there = f" in {where}"
-            if all(is_seen(one + there, self.request) for one in self.parts(step)):
-                return [], there
-            return [("navigate_to", {"place": place})], ""
-        kinds = {SYNONYMS.get(word, word) for word in where.split()}
-        return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"
-
     def things(self, step: Step) -> tuple[list[Skill], list[str]]:
         """Return the way to what a step is about, and that, with where it is to be taken from."""
-        way, behind = self.source(step)
-        return way, [part + behind for part in self.parts(step)]
-
-    def parts(self, step: Step) -> list[str]:
-        """Return each thing that a step is about, without where it is to be taken from."""
-        spoken, _, _ = self._chosen(step).partition(" from ")
+        what, _, inner = self._chosen(step).partition(" from ")
+        parts = _parts_of(what)
         if "except" in step:
-            return [f"{spoken} but {self.spoken(step, 'except')}"]
-        return _parts_of(spoken)
+            parts = [f"{what} but {self.spoken(step, 'except')}"]
+        where = self.spoken(step, "from") if "from" in step else inner
+        if not where:
+            return [], parts
+        place = match_place(where, self.request.world.places)
+        is_room = place is not None and not self.request.world.is_surface(place)
+        kinds = {SYNONYMS.get(word, word) for word in where.split()}
+        relation = "in" if is_room or kinds & CONTAINERS else "on"
+        there = [f"{part} {relation} {where}" for part in parts]
+        if is_room and not all(is_seen(one, self.request) for one in there):
+            return [("navigate_to", {"place": place})], parts
+        return [], there
 
     def _chosen(self, step: Step) -> str:
         """Return what a step is about: of two choices the second where only that is seen."""
@@ -132,12 +109,6 @@ class Steps:
         is_second = bool(second) and not is_seen(first, self.request)
         return second if is_second and is_seen(second, self.request) else first
 
-    def _where_from(self, step: Step) -> str:
-        """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""
-        if "from" in step:
-            return self.spoken(step, "from")
-        return self.spoken(step, "what").partition(" from ")[2] if "what" in step else ""
-
     def amount(self, step: Step, dimension: str, default: float) -> float:
         """Return the amount of a step in SI units; a bare number is one of degrees, not radians.
 
@@ -145,25 +116,23 @@ class Steps:
             PlanInvalid: its words are no amount.
         """
         words = quantity_words(step["by"]) if "by" in step else []
-        units = UNITS[dimension]
-        bare = units["degree"] if dimension == "rad" else 1.0
-        # More may have been copied than the amount.
-        for told in (words, amount_words(words, units)):
-            if told and (value := amount_of(told, units, bare)) is not None:
-                return value
-        if is_silent(words):
+        if not words:
             return default
-        raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
+        units = UNITS[dimension]
+        value = amount_of(words, units, units["degree"] if dimension == "rad" else 1.0)
+        if value is None:
+            raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
+        return value
 
 
 def is_seen(text: str, request: Request) -> bool:
     """Tell whether something in the scene fits what shall be put."""
-    setting = Setting(request)
+    context = CommandContext(request)
     try:
-        read = read_expression(text, setting.furniture)
+        read = context.read(text)
     except UnknownObject:  # a place
         return False
-    return bool(read.pronoun or fitting(read, Use.PUT, setting))
+    return bool(read.pronoun or fitting(read, Use.PUT, context))
 
 
 def way_back(request: Request) -> Skill:
@@ -187,7 +156,7 @@ def _go(spoken: Steps, step: Step) -> list[Skill]:
     if "else" in step:
         raise CannotBeDone("every place that I know is there: say to which one I shall go")
     where = step["where"]
-    if where == "back" and spoken.is_alone:
+    if where == "back" and len(spoken.request.text.split()) <= MOST_WORDS_ALONE:
         return [way_back(spoken.request)]
     if where == "back" or where in _SPEAKERS:
         return [("navigate_to", {"place": "here"})]
@@ -202,57 +171,37 @@ def _pick(spoken: Steps, step: Step) -> list[Skill]:
 
 def _put(spoken: Steps, step: Step) -> list[Skill]:
     relation = step.get("how", "to")
-    if relation not in _CAN_PUT:
+    if relation != "to" and relation not in _RELATIONS:
         raise CannotBeDone(f"I can put things in, on or next to something, not {relation} it")
+    if step.get("where") == "back":
+        raise NotAble("I do not remember where it was: say where I shall put it")
     way, things = spoken.things(step) if "what" in step else ([], [""])
     arm = _arm(step)
-    if step.get("where") == "back":
-        return way + [one for thing in things for one in put_back(thing, spoken.request)]
     if "where" not in step:
         where = {"destination": STORE, "relation": "in"} if "away" in spoken.command else {}
     else:
         where = {"destination": spoken.spoken(step, "where")}
-        where |= {} if relation == "to" else {"relation": RELATIONS.get(relation, relation)}
+        where |= {} if relation == "to" else {"relation": _RELATIONS[relation]}
         bare = match_place(where["destination"], spoken.request.world.places)
         if relation == "to" and bare and bare not in spoken.request.world.furniture:
-            return way + _carried(things, where["destination"])
+            go: Skill = ("navigate_to", {"place": where["destination"]})
+            return way + [one for it in things for one in (("pick_up", {"object": it}), go)]
     return way + [("place", {**({"object": one} if one else {}), **where, **arm}) for one in things]
 
 
-def _carried(things: Sequence[str], place: str) -> list[Skill]:
-    """Return the steps that take things to a place where nothing can be put down."""
-    go: Skill = ("navigate_to", {"place": place})
-    return [skill for one in things for skill in (("pick_up", {"object": one}), go)]
-
-
 def _bring(spoken: Steps, step: Step) -> list[Skill]:
-    """Give each thing to who speaks, or take it to a place, where it is put down on what is there.
+    """Give each thing to who speaks, or take it to a place.
 
     Raises:
         UnknownPlace: it is to go to a person, of whom nobody knows where they are.
     """
+    if step.get("to", "me") not in _SPEAKERS:
+        places = spoken.request.world.places
+        if match_place(step["to"], places) is None:
+            raise UnknownPlace(spoken.spoken(step, "to"), set(places.values()))
+        return _put(spoken, {**step, "where": step["to"]})
     way, things = spoken.things(step)
-    if step.get("to", "me") in _SPEAKERS:
-        return way + _handed_over(things, spoken.request)
-    to, world = spoken.spoken(step, "to"), spoken.request.world
-    place = match_place(to, world.places)
-    if place is None:
-        raise UnknownPlace(to, set(world.places.values()))
-    if place in world.furniture:
-        return way + [("place", {"object": one, "destination": to}) for one in things]
-    return way + _carried(things, to)
-
-
-def _handed_over(things: Sequence[str], request: Request) -> list[Skill]:
-    """Return the steps that give things to who asked; grounding puts in the ways there and back.
-
-    Two are fetched on one way, a hand each.
-    """
-    give: list[Skill] = [("hand_over", {"object": one}) for one in things]
-    if len(things) != len(ARMS) or request.here is None:
-        return give
-    fetch: list[Skill] = [("pick_up", {"object": one}) for one in things]
-    return [*fetch, ("navigate_to", {"place": "here"}), *give]
+    return way + [("hand_over", {"object": one}) for one in things]
 
 
 def _find(spoken: Steps, step: Step) -> list[Skill]:
@@ -270,7 +219,7 @@ def _look(spoken: Steps, step: Step) -> list[Skill]:
     if step.get("way") == "around":
         return look_around()
     if "way" in step:
-        return [("look_at", {"direction": step["way"]})]
+        return [("look_at", {"direction": _DIRECTIONS.get(step["way"], step["way"])})]
     if step.get("what", "me") in _SPEAKERS:
         return [("look_at", {"direction": "ahead"})]
     return [("look_at", {"object": spoken.spoken(step, "what")})]

@@ -10,7 +10,7 @@ from typing import Final
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
 from vla_deploy.planning.interfaces import Proposal, Request
-from vla_deploy.planning.plan import PUT_IN, Plan
+from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import quoted
 from vla_deploy.planning.symbolic.state import subject_of
 from vla_deploy.robots.plan_bounds import Confirm
@@ -94,8 +94,6 @@ def _risks(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
         mass_kg = subject.mass_kg
         if mass_kg is not None and mass_kg > HEAVY_RATIO * request.world.bounds.payload_kg:
             yield f"{name} is heavy", f"{name.capitalize()} may weigh {mass_kg:.1f} kg"
-    if any(one.skill == "place" and one.description == PUT_IN for one in plan.actions):
-        yield "put down first", "My hands are full: I would put something down first"
     ways_m = [float(one.parameters["distance_m"]) for one in plan.actions if one.skill == "move"]
     if min(ways_m, default=0.0) < FAR_BACK_M:
         yield "far back", f"I would drive {-min(ways_m):g} m backward"

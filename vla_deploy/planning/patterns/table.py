@@ -101,6 +101,10 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
     (r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
      r"how is your battery", "ask", {"about": "battery"}),
+    (r"(?:many )?thanks(?: a lot)?|thank you(?: very much)?|good (?:job|robot)", "ask",
+     {"about": "thanks"}),
+    (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
+     {"about": "ready"}),
     (r"help(?: me)?|what can you do|who are you", "ask", {"about": "able"}),
     (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}", "where", {}),
     (rf"what (?:do|can) you see|what(?:'s| is) on (?:the )?{_WHERE}", "ask", {"about": "seeing"}),

@@ -112,11 +112,10 @@ def stays(state: State, _: Setting) -> State:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Logic:
-    """Hold a skill's preconditions by name, its effect, and the effect in words."""
+    """Hold a skill's preconditions by name, and its effect."""
 
     needs: Mapping[str, Condition]
     effect: Effect = stays
-    leaves: tuple[str, ...] = ()
 
 
 KNOWN: Final = "object known"
@@ -135,7 +134,6 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 "speed allowed": conditions.is_slow_enough,
             },
             effect=goes,
-            leaves=("robot at goal",),
         ),
         "move": Logic(
             needs={
@@ -143,11 +141,10 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 "speed allowed": conditions.is_slow_enough,
             },
             effect=moves,
-            leaves=("robot moved",),
         ),
-        "turn": Logic(needs={}, effect=turns, leaves=("robot turned",)),
-        "look_at": Logic(needs={KNOWN: conditions.is_known}, leaves=("head turned",)),
-        "find_object": Logic(needs={}, effect=finds, leaves=("object known",)),
+        "turn": Logic(needs={}, effect=turns),
+        "look_at": Logic(needs={KNOWN: conditions.is_known}),
+        "find_object": Logic(needs={}, effect=finds),
         "pick_up": Logic(
             needs={
                 KNOWN: conditions.is_known,
@@ -158,7 +155,6 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 "payload": conditions.is_light_enough,
             },
             effect=takes,
-            leaves=("object held",),
         ),
         "place": Logic(
             needs={
@@ -170,22 +166,12 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 BEFORE: conditions.is_before,
             },
             effect=puts,
-            leaves=("object at destination", "hand free"),
         ),
         "hand_over": Logic(
             needs={HOLDING: conditions.holds_something, WHICH_HAND: conditions.knows_which},
             effect=lets_go,
-            leaves=("hand free",),
         ),
-        "open_gripper": Logic(
-            needs={"nothing dropped": conditions.opens_empty},
-            effect=lets_go,
-            leaves=("gripper open",),
-        ),
-        "close_gripper": Logic(needs={}, leaves=("gripper closed",)),
-        "move_arm": Logic(needs={}, leaves=("arm at pose",)),
-        "speak": Logic(needs={}, leaves=("text said",)),
-        "wait": Logic(needs={}, leaves=("time passed",)),
-        "stop": Logic(needs={}, leaves=("robot at rest",)),
+        "open_gripper": Logic(needs={"nothing dropped": conditions.opens_empty}, effect=lets_go),
+        **dict.fromkeys(("close_gripper", "move_arm", "speak", "wait", "stop"), Logic(needs={})),
     }
 )

@@ -11,7 +11,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import Pose, Subject, subject_of, subject_or_none
+from vla_deploy.planning.symbolic.state import Pose, subject_or_none
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS
 
@@ -44,8 +44,7 @@ class Mention:
     """Hold one thing or place that a turn was about.
 
     `said` is how it was called, `means` the words or the place that plans use for it, and
-    `thing_id` the thing of the scene that was meant, "" where the scene does not tell. `rested` is
-    what it was on or in at that time: a place, or the id of a thing.
+    `thing_id` the thing of the scene that was meant, "" where the scene does not tell.
     """
 
     said: str
@@ -54,7 +53,6 @@ class Mention:
     thing_id: str = ""
     kind: str = ""
     colour: str = ""
-    rested: str = ""
 
     @classmethod
     def of(cls, thing: Thing, said: str = "", role: Role = Role.OBJECT) -> "Mention":
@@ -66,7 +64,6 @@ class Mention:
             thing_id=thing.thing_id,
             kind=thing.kind,
             colour=thing.colour,
-            rested="" if thing.rests is None else thing.rests.of,
         )
 
 
@@ -157,29 +154,22 @@ class Conversation:
 # --- what a plan is about, so that the next command can say "it", "there" and "the other one" -----
 
 MOST_LETTERS: Final = 400
-_ROLES: Final = {"object": Role.OBJECT, "destination": Role.DESTINATION, "place": Role.PLACE}
 
 
 def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     """Return what a grounded plan names, in its order, each once."""
     found: dict[tuple[str, str], Mention] = {}
+    put_to = {action.parameters.get("destination") for action in plan.actions}
     for action in plan.actions:
-        for mention in (*_put_from_hand(action, plan, scene), *_mentions(action, plan, scene)):
+        values = (action.parameters.get(name) for name in ("object", "destination", "place"))
+        named = [
+            _mention(value, Role.DESTINATION if value in put_to else Role.OBJECT, scene)
+            for value in values
+            if isinstance(value, str)
+        ]
+        for mention in (*_put_from_hand(action, plan, scene), *named):
             found.setdefault((mention.means, mention.thing_id), mention)
-    return tuple(found.values()) or _told(plan, scene)
-
-
-def _told(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
-    """Return what a plan that only answers is about: the one thing that it tells of, if it does."""
-    asked = tuple(_spoken(plan.goal, scene))
-    told = {
-        one.thing_id: one
-        for action in plan.actions
-        if isinstance(action.parameters.get("text"), str)
-        for one in _spoken(str(action.parameters["text"]), scene)
-        if one.thing_id
-    }
-    return tuple(told.values()) if len(told) == 1 else asked
+    return tuple(found.values()) or tuple(_spoken(plan.goal, scene))
 
 
 def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
@@ -188,22 +178,8 @@ def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
     for word in words_of(goal[:MOST_LETTERS]):
         name = SYNONYMS.get(word, word)
         if name in OBJECT_CLASSES and name != ANY_CLASS:
-            subject = subject_of(f"{colour} {name}", scene)
-            yield _mention(word, subject, Role.OBJECT)
+            yield _mention(f"{colour} {name}", Role.OBJECT, scene)
         colour = name if name in COLOURS else ""
-
-
-def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
-    for name, role in _ROLES.items():
-        value = action.parameters.get(name)
-        if not isinstance(value, str):
-            continue
-        role = _role(value, role, plan)
-        subject = subject_or_none(value, scene)
-        if subject is None:
-            yield Mention(said=value, means=value, role=Role.PLACE)
-        else:
-            yield _mention(value, subject, role)
 
 
 def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
@@ -217,13 +193,11 @@ def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterat
         yield Mention.of(held[0], held[0].thing_id)
 
 
-def _mention(said: str, subject: Subject, role: Role) -> Mention:
+def _mention(said: str, role: Role, scene: Snapshot | None) -> Mention:
+    """Return the mention of a thing, or of a place; what is driven to, to put there, is put to."""
+    subject = subject_or_none(said, scene)
+    if subject is None:
+        return Mention(said=said, means=said, role=Role.PLACE)
     if subject.thing is not None:
         return Mention.of(subject.thing, said, role)
     return Mention(said=said, means=subject.words, role=role, kind=subject.kind)
-
-
-def _role(value: str, role: Role, plan: Plan) -> Role:
-    """Return the part that a name plays in the whole plan: what is driven to, to put, is put to."""
-    put_to = any(one.parameters.get("destination") == value for one in plan.actions)
-    return Role.DESTINATION if put_to else role

@@ -1,27 +1,33 @@
 """Read a referring expression: "the other red one", "both cups", "the ball on the left", "it".
 
-    expression  = pronoun | what a hand holds | description [but expression] [nearest to expression]
-    description = [all | both | any | a | the] [second] [other] [side] [extreme] query [on the side]
+    expression  = pronoun | what a hand holds | description [but description {or description}]
+    description = [all | both | two | any | a | the] [other] [side] query [on the side]
 
 What remains of a description is a query of the world's own grammar (`vla_deploy.world.query`). A
-word that it does not have is compared with those that it has; one that is like none of them, and
-says nothing that is listed in `phrases`, is refused: nothing is passed over.
+word that it does not have is refused: nothing is passed over, and nothing is guessed.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import cache, lru_cache
-from typing import Any, Final
+from functools import lru_cache
+from typing import Final
 
+from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.errors import DependsOnView, UnknownObject
-from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.names import Match, closest
+from vla_deploy.planning.understanding.phrases import (
+    EXTREMES,
+    HELD,
+    IT,
+    MODIFIERS,
+    ORDER_WORDS,
+    PRONOUNS,
+    SIDES,
+)
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.query import ORDERS, PHRASES
-from vla_deploy.world.vocabulary import ARTICLES, COLOURS, FILLERS, OBJECT_CLASSES, SYNONYMS
-from vla_deploy.world.words import COMPARED, FORMS
+from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES, SYNONYMS
 
 MOST_LETTERS: Final = 200
 
@@ -39,10 +45,9 @@ class Expression:
     """Hold what an expression says; `said` is its words, in lower case and without articles.
 
     `side` is left, right or middle, as the robot looks. `support` names the furniture that a
-    generic word such as "table" stands for. `nth` is its place in a row, from 1, -1 for the end, 0
-    for none; one begins to count at the `side`. `besides` is what it is not, `near` what it is the
-    nearest to, or the farthest from, as `order` says. `among` is of how many things it is one.
-    `doubts` are words that are only like a known one.
+    generic word such as "table" stands for. `besides` is what it is not. It is a `superlative`
+    where its size is compared with that of others. `count` is 0 where it is not told. What is in a
+    hand is `held_by` that, or one of those.
     """
 
     said: str
@@ -50,334 +55,199 @@ class Expression:
     pronoun: str = ""
     scope: Scope = Scope.ONE
     count: int = 0
-    hand: str = ""
+    held_by: frozenset[str] = frozenset()
     side: str = ""
-    extreme: str = ""
+    is_superlative: bool = False
     is_other: bool = False
     support: frozenset[str] = frozenset()
-    nth: int = 0
     besides: "tuple[Expression, ...]" = ()
-    near: "Expression | None" = None
-    order: str = ""
-    among: int = 0
-    doubts: tuple[Match, ...] = ()
 
     @property
-    def is_relative(self) -> bool:
-        """Tell whether only the things around tell which one it is: a row, or what it is not."""
-        return bool(self.nth or self.besides or self.near)
+    def is_compared(self) -> bool:
+        """Tell whether only the things around tell which one it is."""
+        pointed = self.side or self.is_other or self.held_by
+        return bool(pointed or self.is_superlative or self.besides)
 
 
 def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Expression:
     """Read an expression; `furniture` maps the spoken names of furniture to surfaces.
 
     Raises:
-        UnknownObject: a word of it is like nothing that is known.
+        UnknownObject: a word of it is not known.
         DependsOnView: it is said as the speaker sees it.
     """
     if len(text) > MOST_LETTERS:
         raise UnknownObject(f"{text[:40]}...", OBJECT_CLASSES)
-    return _read(text.strip(), tuple((furniture or {}).items()))
-
-
-@cache
-def known_words() -> frozenset[str]:
-    """Return every word that a query is made of."""
-    groups = (OBJECT_CLASSES, COLOURS, SYNONYMS, ARTICLES, FILLERS, COMPARED, FORMS, ORDERS)
-    return frozenset(word for group in groups for word in group) | _relation_words()
-
-
-# Plurals that mean another thing than several of one.
-_OF_THEIR_OWN: Final = frozenset({"glasses"})
-_TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
-_SHORTENED: Final = (
-    (re.compile(r"\b(is|are)n'?t\b"), r"\1 not"),
-    (re.compile(r"\b(that|which|who|one|what|whatever)'s\b"), r"\1 is"),
-    (re.compile(r"'s\b|-(?!colou?red)"), ""),
-)
-_MINE: Final = re.compile(
-    r"\b(?:on|to|at|from) my (?:left|right)\b|"
-    r"\b(?:nearest|closest|nearer|closer|farthest|furthest) (?:to|from) me\b"
-)
-_HELD: Final = re.compile(
-    r"(?P<own>.+?)(?: that| which)?(?:"
-    r" you (?:(?:are|re) (?:holding|carrying)|hold|carry|have got|have|ve got|ve|got)"
-    r"(?: in (?:your|the)(?: (?P<hand>left|right))? hands?)?"
-    r"|(?: is| are| s| you have)? (?:in|from) your(?: (?P<hand2>left|right))? hands?"
-    r"|(?: is| are| s| you have)? in the (?P<hand3>left|right) hand)"
-)
-_HELD_ALONE: Final = frozenset({"what", "whatever", "everything", "thing", "one", "object", "item"})
-_FAR: Final = "farthest|furthest|farther|further"
-# Other words for the same, so that what follows need know one of them only.
-_SAME: Final = tuple(
-    (re.compile(pattern), plain)
-    for pattern, plain in (
-        (r"^(?:what|whatever|something|things) (?:(?:that )?(?:is|are) )?"
-         r"(?:lying |standing |sitting )?(?=(?:on|in|inside|under|next to|behind|beside)\b)",
-         "the thing "),
-        # "Everything else" is less than everything, and only an exception tells by how much.
-        (r"^(?:everything|anything)(?: else(?= (?:but|except)\b))?\b", "all objects"),
-        (r"^(?:those|these) (?!two\b|three\b|four\b|\d)(?=(?:[a-z]+ ){0,2}(?!keys)[a-z]+s\b)",
-         "all the "),
-        (r"\b(\w+) colou?red\b", r"\1"),
-        (r"\b(?:far|very|extreme) (?=(?:left|right)\b)", ""),
-        (rf"\b(?:{_FAR}|most) (?:to|on) the (?=(?:left|right)\b)", "on the "),
-        (rf"\b(?:{_FAR})\b(?: (?:away|off))?(?: from)?", "farthest"),
-        (r"\b(nearest|closest|nearer|closer|farthest)(?: to)? "
-         r"(?:you|yourself|robot|the robot|here|where you are)\b", r"\1"),
-        (r"^(that|this|.+ (?:on|in|inside|next to) .+?|th(?:at|is) .+?)(?: over)? (?:there|here)$",
-         r"\1"),
-        (r"\b(?:from|off(?: of)?) (?!(?:the )?(?:left|right)\b)", "on "),
-        (r"\bout of ", "in "),
-        (r"\b(?:set|bunch) of (?=keys\b)", ""),
-        (r"\bremote control(?:ler)?\b", "remote"),
-        (r"\b(glass|cup|bottle|can) of (?:water|tea|coffee|coke)\b", r"\1"),
-    )
-)  # fmt: skip
-_BY: Final = re.compile(r"(?P<own>.+?)(?: over| just| right)? by (?P<other>(?:the|my|your) .+)")
-_BESIDES: Final = re.compile(
-    r"(?P<own>.+?) (?:(?:that|which|who) (?:is|are) not|(?:is|are) not|but not|not|but|except for|"
-    r"except|other than|apart from|aside from|besides|excluding|without) (?P<not>.+)"
-)
-_OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
-_NEAR: Final = re.compile(
-    r"(?P<own>.+?) (?:(?:that|which) (?:is|are|stands) |(?:is|are) |the )?"
-    r"(?P<order>nearest|closest|nearer|closer|farthest)(?: to)? "
-    r"(?P<near>(?:the|my|your|that|this) .+)"
-)
-_DETERMINER: Final = r"(?:(?:the|my|your|that|this|our) )?"
-_COUNT: Final = "two|three|four|2|3|4"
-_ONE_OF: Final = re.compile(
-    rf"{_DETERMINER}(?P<pick>\w+(?: \w+)??)(?: one)?(?: out)? of (?:all )?"
-    rf"(?:the|these|those|my|your)(?: (?P<count>{_COUNT}))? (?P<own>.+)"
-)
-_PICKS: Final = frozenset(
-    {*phrases.SIDES, *phrases.EXTREMES, *ORDERS, *phrases.ORDER_WORDS, *phrases.ORDINALS, *COLOURS,
-     *COMPARED, "other"}
-)  # fmt: skip
-_COUNTING: Final = re.compile(
-    r"(?: counting| counted| starting)? (?P<how>from|on|to|at) the (?P<side>left|right)"
-    r"(?: hand)?(?: side| end)?(?! of\b)(?= |$)"
-)
-_NTH: Final = re.compile(
-    rf"{_DETERMINER}(?P<nth>{'|'.join(phrases.ORDINALS)})(?: (?P<own>.+))?"
-    rf"|(?P<own2>.+) number (?P<nth2>{'|'.join(phrases.NUMBERS)})"
-)
-_QUANTITIES: Final = tuple(
-    (re.compile(pattern), scope)
-    for pattern, scope in (
-        (r"(?P<count>both)(?: of)?(?: the| my| your| these| those)? (?P<own>.+)", Scope.ALL),
-        (r"(?:all|every|each)(?: one)?(?: of)?(?: the| my| your| these| those)?"
-         rf"(?: (?P<count>{_COUNT}))? (?P<own>.+)", Scope.ALL),
-        (rf"(?:the|my|your|these|those) (?P<count>{_COUNT}) (?P<own>.+)", Scope.ALL),
-        (rf"(?P<count>{_COUNT}|(?:an? )?(?:couple|pair)(?= of))"
-         r"(?: of(?: the| my| your| these| those)?)? (?P<own>.+)", Scope.ANY),
-        (r"(?:(?:any|one|either) of(?: the| my| those| these)?|any|either|an?|some) (?P<own>.+)",
-         Scope.ANY),
-    )
-)  # fmt: skip
-_SIDE: Final = re.compile(
-    r"(?P<own>.*?) ?(?:(?:that|which) is )?(?:(?:on|to|at) (?:the|your|its) (?P<side>left|right)"
-    r"(?: hand)?(?: side)?|(?:in|at) the (?P<middle>middle|centre|center))"
-)
-
-
-@lru_cache(maxsize=1024)
-def _read(text: str, named: tuple[tuple[str, str], ...], is_part: bool = False) -> Expression:
-    """Read an expression; one that `is_part` of another may leave out what it is about."""
-    plain = text.lower().replace("\u2019", "'")
-    for pattern, full in _SHORTENED:
-        plain = pattern.sub(full, plain)
-    said = " ".join(_TOKEN.findall(plain))
-    key = " ".join(word for word in said.split() if word not in ARTICLES) or said
-    pronoun = phrases.PRONOUNS.get(said) or phrases.PRONOUNS.get(key, "")
-    if pronoun:
-        return Expression(said=key, pronoun=pronoun)
-    if _MINE.search(said):
-        raise DependsOnView(text)
-    held = _HELD.fullmatch(said)
-    if held and held["own"].removeprefix("the ").removeprefix("that ") in _HELD_ALONE:
-        hand = held["hand"] or held["hand2"] or held["hand3"] or ""
-        return Expression(said=key, pronoun=phrases.HELD, hand=hand)
-    own = held["own"] if held else said
-    for pattern, same in _SAME:
-        own = pattern.sub(same, own).strip()
     try:
-        return _compared(own, key, named, is_part)
+        return _read(text.strip(), tuple((furniture or {}).items()))
     except UnknownWord as error:
         raise UnknownObject(text, OBJECT_CLASSES) from error
 
 
-def _compared(own: str, key: str, named: tuple[tuple[str, str], ...], is_part: bool) -> Expression:
-    """Read a description with the things that it is compared with."""
-    besides: tuple[str, ...] = ()
-    if found := _BESIDES.fullmatch(own):
-        own, besides = found["own"], tuple(_OR.split(found["not"].removeprefix("not ")))
-    one_of = _ONE_OF.fullmatch(own)
-    is_one_of = one_of is not None and _PICKS.issuperset(one_of["pick"].split())
-    if one_of is not None and is_one_of:
-        own = f"the {one_of['pick']} {one_of['own']}"
-    near = _NEAR.fullmatch(own)
-    if near:
-        own = "the one" if near["own"] in ARTICLES else near["own"]
-    own, nth, side = _in_row(own)
-    read = _description(own, Expression(said=key, nth=nth, side=side), dict(named), is_part)
-    others = [_part(one, named) for one in besides]
-    anchor = _part(near["near"], named) if near else None
-    doubts = (one.doubts for one in (read, *others, *(() if anchor is None else (anchor,))))
-    count = one_of["count"] if one_of is not None and is_one_of else None
-    return replace(
-        read,
-        besides=tuple(one for one in others if not one.pronoun),
-        near=anchor,
-        order=phrases.ORDER_WORDS.get(near["order"], near["order"]) if near else "",
-        is_other=read.is_other or any(one.pronoun for one in others),
-        scope=Scope.ONE if is_one_of else read.scope,
-        among=phrases.COUNTS.get(count or "", 0),
-        doubts=tuple(match for some in doubts for match in some),
+_TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
+# "That's", "a bottle of water".
+_SAYS_NOTHING: Final = re.compile(rf"'s\b| of (?:{'|'.join(MODIFIERS)})\b")
+_RELATION_WORDS: Final = frozenset(word for phrase in PHRASES for word in phrase.split())
+_POINTING: Final = frozenset({"there", "here", "over"})
+# "What is in your left hand", "the thing that you are holding".
+_HANDS: Final = frozenset({"hand", "hands"})
+_HOLDING: Final = frozenset({"hold", "holding", "carrying"})
+_OF_HANDS: Final = frozenset(
+    {*_HANDS, *_HOLDING, *ARMS, "that", "you", "your", "the", "are", "is", "have", "got", "in"}
+)
+_WHAT: Final = frozenset({"what", "whatever", "everything", "thing", "one", "the", "that"})
+_EXCEPT: Final = frozenset({"but", "except", "excluding", "besides", "not"})
+_OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
+# Words of a thing and where it stands, which say nothing.
+_SILENT: Final = frozenset(
+    {"is", "are", "which", "standing", "lying", "sitting", "resting", "please", "lies", "stands",
+     "coloured", "colored", "control", "his", "her", "their", "its"}
+)  # fmt: skip
+# How many of them are meant; two of more than two are not told apart.
+_QUANTITIES: Final[Mapping[str, tuple[Scope, int]]] = {
+    **dict.fromkeys(("all", "every", "each", "everything"), (Scope.ALL, 0)),
+    **dict.fromkeys(("both", "two", "2"), (Scope.ALL, 2)),
+    **dict.fromkeys(("any", "a", "an", "some", "another"), (Scope.ANY, 0)),
+}
+_STANDS_FOR: Final = {
+    "another": ["other"], "everything": ["object"], "what": ["object"], "whatever": ["object"]
+}  # fmt: skip
+_DETERMINERS: Final = frozenset({*_QUANTITIES, *_STANDS_FOR, *ARTICLES, "these", "those"})
+_BEFORE_SIDE: Final[tuple[list[str], ...]] = (["on"], ["to"], ["at"], ["in"])
+_AFTER_SIDE: Final[tuple[list[str], ...]] = ([], ["side"], ["hand", "side"])
+# Plurals that mean another thing than several of one.
+_OF_THEIR_OWN: Final = frozenset({"glasses"})
+
+
+@lru_cache(maxsize=1024)
+def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression:
+    plain = text.lower().replace("\u2019", "'").replace("n't", " not")
+    words = _TOKEN.findall(_SAYS_NOTHING.sub("", plain))
+    while len(words) > 1 and words[0] in ("that", "this") and words[-1] in _POINTING:
+        words.pop()
+    said = " ".join(words)
+    key = " ".join(word for word in words if word not in ARTICLES) or said
+    if pronoun := PRONOUNS.get(said) or PRONOUNS.get(key):
+        return Expression(said=key, pronoun=pronoun)
+    if "my left" in said or "my right" in said:
+        raise DependsOnView(text)
+    words, held_by = _held(words)
+    if held_by and _WHAT.issuperset(words):
+        return Expression(said=key, pronoun=HELD, held_by=held_by)
+    at = next((n for n, word in enumerate(words) if word in _EXCEPT), len(words))
+    read = replace(_description(words[:at], dict(named)), said=key, held_by=held_by)
+    if at == len(words):
+        return read
+    if held_by:  # of the exception, or of the rest?
+        raise UnknownWord(text, words[at], OBJECT_CLASSES)
+    return _with_exceptions(read, words[at:], dict(named))
+
+
+def _held(words: list[str]) -> tuple[list[str], frozenset[str]]:
+    """Take "that you are holding", "in your left hand" off the end; return which hands that are."""
+    for at in range(1, len(words)):
+        told = {*words[at:]}
+        if told <= _OF_HANDS and (told & _HOLDING or ("in" in told and told & _HANDS)):
+            return words[:at], frozenset(told & {*ARMS} or ARMS)
+    return words, frozenset()
+
+
+def _with_exceptions(
+    read: Expression, words: Sequence[str], furniture: Mapping[str, str]
+) -> Expression:
+    """Return an expression with what it is not: "but the red ones", "not it"."""
+    start = next((n for n, one in enumerate(words) if one not in {*_EXCEPT, "for"}), len(words))
+    parts = _OR.split(" ".join(words[start:]))
+    pronouns = {PRONOUNS[part] for part in parts if part in PRONOUNS}
+    if not pronouns <= {IT} or "one" in parts:
+        raise UnknownWord(read.said, " ".join(parts), OBJECT_CLASSES)
+    others = (_description(part.split(), furniture) for part in parts if part not in PRONOUNS)
+    return replace(read, besides=tuple(others), is_other=read.is_other or bool(pronouns))
+
+
+def _description(spoken: Sequence[str], furniture: Mapping[str, str]) -> Expression:
+    """Return what a description says.
+
+    Raises:
+        UnknownWord: a word of it is not known, or it is about no thing.
+    """
+    said = " ".join(spoken)
+    words, scope, count = _quantity(spoken)
+    words, side = _side([ORDER_WORDS.get(one, one) for one in words if one not in _SILENT])
+    own = next((n for n, word in enumerate(words) if word in _RELATION_WORDS), len(words))
+    kept = list[str]()
+    for at, word in enumerate(words):
+        is_first = at == 0 or words[at - 1] in _RELATION_WORDS
+        if word in ORDERS and not is_first and at < len(words) - 1:
+            # "The one nearest the book" is no "nearest book".
+            raise UnknownWord(said, word, OBJECT_CLASSES)
+        is_modifier = word in MODIFIERS and any(map(_is_kind, words[at + 1 : own]))
+        if not is_modifier and not (at < own and word in ("other", "ones")):
+            kept.append(EXTREMES.get(word, _single(word)))
+    is_plural = any(word == "ones" or word != _single(word) for word in words[:own])
+    kept, support = _generic_support(kept, furniture)
+    query = parse_query(" ".join(kept), furniture)
+    read = Expression(
+        said=said,
+        query=query,
+        scope=Scope.ALL if is_plural and scope is Scope.ONE else scope,
+        count=count,
+        side=side,
+        is_superlative=not EXTREMES.keys().isdisjoint(words),
+        is_other="other" in words[:own],
+        support=support,
     )
-
-
-def _part(text: str, named: tuple[tuple[str, str], ...]) -> Expression:
-    """Read what something is compared with: "it" is one thing, "them" are not."""
-    read = _read(text, named, is_part=True)
-    if read.pronoun not in ("", phrases.IT) or read.is_relative:
-        raise UnknownObject(text, OBJECT_CLASSES)
+    # "A little closer" is about no thing, "the little one" is.
+    tells = query != Query() or side or support or read.is_other
+    stands_alone = "one" in spoken or "ones" in spoken or spoken[:1] == ["the"]
+    if not (query.is_named or query.colour or (tells and stands_alone)):
+        raise UnknownWord(said, said, OBJECT_CLASSES)
     return read
 
 
-def _in_row(own: str) -> tuple[str, int, str]:
-    """Return a description without its place in a row, that, and from where one counts.
-
-    "First" before an article is no such.
-    """
-    spaced = f" {own}"
-    counting = _COUNTING.search(spaced)
-    if counting:
-        spaced = spaced[: counting.start()] + spaced[counting.end() :]
-    found = _NTH.fullmatch(spaced.strip())
-    if found is None or (found["own"] or "one").split()[0] in ARTICLES:
-        return own, 0, ""
-    number = {**phrases.ORDINALS, **phrases.NUMBERS}[found["nth"] or found["nth2"]]
-    if number < 0 and counting and counting["how"] != "from":
-        number = 1  # "The last one on the right" is where the right ends.
-    side = counting["side"] if counting else ""
-    return found["own"] or found["own2"] or "one", number, side
+def _quantity(spoken: Sequence[str]) -> tuple[list[str], Scope, int]:
+    """Return what is meant without articles and without how many, and how many."""
+    words, scope, count = list(spoken), Scope.ONE, 0
+    if words[:2] == ["one", "of"]:
+        words[0] = "any"
+    while words and (words[0] in _DETERMINERS or (words[0] == "of" and scope is not Scope.ONE)):
+        if scope is Scope.ANY and words[0] in _QUANTITIES:
+            break  # "one of two" is neither any nor both
+        word = words.pop(0)
+        scope, count = _QUANTITIES.get(word, (scope, count))
+        words = [*_STANDS_FOR.get(word, ()), *words]
+    return [word for word in words if word not in ARTICLES], scope, count
 
 
-def _description(
-    own: str, read: Expression, furniture: Mapping[str, str], is_part: bool
-) -> Expression:
-    """Return what a description says by itself.
-
-    Raises:
-        UnknownWord: a word of it is like nothing that is known.
-    """
-    rest, scope, count = _quantity(own)
-    if by := _BY.fullmatch(rest):
-        relation = "on" if by["other"].split(maxsplit=1)[-1] in furniture else "next to"
-        rest = f"{by['own']} {relation} {by['other']}"
-    if side := _SIDE.fullmatch(rest):
-        rest = side["own"] or "one"
-        read = replace(read, side=side["side"] or "middle")
-    words, told = _pointing(rest.split(), scope)
-    read = replace(read, **({"scope": scope} | told), count=count)
-    words, support = _generic_support(words, furniture)
-    words, doubts = _spelt(words, furniture)
-    query = parse_query(" ".join(words), furniture)
-    if not is_part and not _means_things(query, own):
-        raise UnknownWord(own, own, OBJECT_CLASSES)
-    return replace(read, query=query, support=support, doubts=doubts)
-
-
-def _quantity(said: str) -> tuple[str, Scope, int]:
-    """Return what is meant without how many, and how many."""
-    for pattern, scope in _QUANTITIES:
-        found = pattern.fullmatch(said)
-        if found:
-            counted = (found.groupdict().get("count") or "").split()
-            return found["own"], scope, phrases.COUNTS.get(counted[-1], 0) if counted else 0
-    return said, Scope.ONE, 0
-
-
-def _pointing(words: list[str], scope: Scope) -> tuple[list[str], dict[str, Any]]:
-    """Take side, extreme, "other", plural and modifiers out of words; return what they tell."""
-    kept: list[str] = []
-    told: dict[str, Any] = {}
-    several = Scope.ALL if scope is Scope.ONE else scope
+def _side(words: list[str]) -> tuple[list[str], str]:
+    """Take "left", or "on the left side" at the end, out of words; return it, too."""
     for at, word in enumerate(words):
-        one = _single(word)
-        if word in phrases.SIDES and words[at + 1 : at + 2] != ["of"]:
-            told["side"] = phrases.SIDES[word]
-        elif word in phrases.EXTREMES:
-            told["extreme"] = phrases.EXTREMES[word]
-        elif word in ("other", "another", "different"):
-            told |= {"is_other": True, **({"scope": Scope.ANY} if word == "another" else {})}
-        elif word == "ones":
-            told.setdefault("scope", several)
-        elif word in phrases.MODIFIERS and _begin_with_kind(words[at + 1 :]):
+        before, after = words[:at], words[at + 1 :]
+        if word not in SIDES or after[:1] == ["of"]:
             continue
-        elif word not in phrases.SILENT:
-            if one != word and not any(before in _relation_words() for before in kept):
-                told.setdefault("scope", several)
-            kept.append(phrases.ORDER_WORDS.get(one, one))
-    return kept, told
-
-
-def _begin_with_kind(words: list[str]) -> bool:
-    """Tell whether words name a kind of thing before they say where it is."""
-    for word in words:
-        if word in _relation_words() or _is_kind(_single(word)):
-            return word not in _relation_words()
-    return False
+        if before[-1:] in _BEFORE_SIDE and after in _AFTER_SIDE:
+            return before[:-1], SIDES[word]
+        if _RELATION_WORDS.isdisjoint(before):
+            return [*before, *after], SIDES[word]
+    return words, ""
 
 
 def _generic_support(
     words: list[str], furniture: Mapping[str, str]
 ) -> tuple[list[str], frozenset[str]]:
     """Let "on the table" mean any furniture whose name ends in "table"."""
-    words = [word for word in words if word not in ARTICLES]
-    for at in range(len(words) - 1, 0, -1):
-        if words[at - 1] != "on" or " ".join(words[at:]) in furniture:
-            continue
-        named = {place for name, place in furniture.items() if name.split()[-1:] == words[at:]}
-        if named:
-            return words[: at - 1], frozenset(named)
-    return words, frozenset()
-
-
-def _spelt(words: list[str], furniture: Mapping[str, str]) -> tuple[list[str], tuple[Match, ...]]:
-    """Put known words in the place of misspelt ones; note those that are only like one."""
-    known = known_words() | {word for name in furniture for word in name.split()}
-    # Short words are like too many others.
-    likely = (*OBJECT_CLASSES, *COLOURS, *(word for word in SYNONYMS if len(word) > 4))
-    matches = [
-        None if word in known or re.fullmatch(r"[a-z]+_\d+", word) else closest(word, likely)
-        for word in words
-    ]
-    spelt = [match.known[0] if match else word for word, match in zip(words, matches, strict=True)]
-    return spelt, tuple(one for one in matches if one and not one.is_sure)
-
-
-def _means_things(query: Query, said: str) -> bool:
-    """Tell whether it is about things: "a little closer" is not, "the closer one" is."""
-    if query.is_named or query.colour:
-        return True
-    words = said.split()
-    return "one" in words or "ones" in words or (words[:1] == ["the"] and len(words) > 1)
+    if words[-2:-1] != ["on"] or words[-1] in furniture:
+        return words, frozenset()
+    named = {one for called, one in furniture.items() if called.split()[-1:] == words[-1:]}
+    return (words[:-2] if named else words), frozenset(named)
 
 
 def _single(word: str) -> str:
     """Return the singular of a plural of a known kind, else the word."""
-    if word in known_words() | _OF_THEIR_OWN or not word.endswith("s"):
+    if not word.endswith("s") or _is_kind(word) or word in _OF_THEIR_OWN:
         return word
     return next((one for one in (word[:-2], word[:-1]) if _is_kind(one)), word)
 
 
 def _is_kind(word: str) -> bool:
     return SYNONYMS.get(word, word) in OBJECT_CLASSES
-
-
-@cache
-def _relation_words() -> frozenset[str]:
-    return frozenset(word for phrase in PHRASES for word in phrase.split())

@@ -1,35 +1,32 @@
 """Find the things of a scene that an expression fits, and that can play the part asked of them."""
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from itertools import pairwise
+from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.planning.understanding.expressions import Expression, Scope
-from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
+from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.resting import IN
 from vla_deploy.world.vocabulary import ANY_CLASS
 
+LEAST_BEARING_RAD: Final = 0.03
+"""Things whose bearings differ by less stand one behind the other, not side by side."""
+
 
 @dataclass(slots=True)
-class Setting:
+class CommandContext:
     """Remember, over one command, what has been mentioned; everything else is the request's."""
 
     request: Request
     mentions: list[Mention] = field(default_factory=list)
-    furniture: dict[str, str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Gather what furniture may be called."""
-        world = self.request.world
-        named = world.furniture or frozenset(world.places.values())
-        self.furniture = {name: one for name, one in world.places.items() if one in named}
 
     @property
     def scene(self) -> Snapshot:
@@ -44,6 +41,20 @@ class Setting:
             return Viewpoint(x_m=here[0], y_m=here[1], yaw_rad=here[2])
         return self.scene.robot
 
+    def read(self, text: str) -> Expression:
+        """Read an expression, or in its place what the speaker has answered that it means.
+
+        Raises:
+            UnknownObject: it says nothing that the robot knows.
+        """
+        places, named = self.request.world.places, self.request.world.furniture
+        furniture = {name: one for name, one in places.items() if not named or one in named}
+        read = read_expression(text, furniture)
+        answer = self.request.conversation.choices.get(read.said)
+        if answer is None:
+            return read
+        return replace(read_expression(answer, furniture), scope=Scope.ONE)
+
     def spoken_of(self) -> tuple[Mention, ...]:
         """Return what was mentioned, in this command first, the newest first."""
         return (*reversed(self.mentions), *self.request.conversation.mentions())
@@ -57,18 +68,13 @@ class Setting:
                 return tuple(dict.fromkeys(objects))
         return ()
 
-    def held(self) -> Mention | None:
-        """Return what a hand holds, None where that is nothing or more than one thing."""
-        found = list(self.holding())
-        return found[0][1] if len(found) == 1 else None
-
     def holding(self) -> Iterator[tuple[str, Mention]]:
         """Yield each hand that holds something, with what it holds."""
-        seen = [one for one in self.scene.things if one.held_by]
-        for thing in seen:
-            yield thing.held_by, Mention.of(thing)
+        seen = {one.held_by: one for one in self.scene.things if one.held_by}
+        for hand, thing in seen.items():
+            yield hand, Mention.of(thing)
         for hand, kind in self.request.world.holding.items():
-            if kind and not any(one.held_by == hand for one in seen):
+            if kind and hand not in seen:
                 yield hand, Mention(said=kind, means=kind, kind=kind)
 
 
@@ -82,51 +88,43 @@ class Use(StrEnum):
     ONTO = "onto"
 
 
-def fitting(read: Expression, use: Use, setting: Setting) -> list[Thing]:
+def fitting(read: Expression, use: Use, context: CommandContext) -> list[Thing]:
     """Return the things that fit, the nearest first.
 
     Raises:
         DependsOnView: it says left, right, in front or behind, and nobody knows who looks at what.
     """
-    found = _told_apart(read, alike(read, use, setting), setting)
-    return [one for one in found if suits(one, use, _query(read, use, setting), setting)]
-
-
-def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
-    """Return what fits but for what compares things: a side, a place in a row, an extreme.
-
-    Raises:
-        DependsOnView: as `fitting`.
-    """
-    query, view = _query(read, use, setting), setting.view
-    if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
+    query, scene, view = read.query, context.scene, context.view
+    if not (query.is_named or query.thing_id):
+        query = replace(query, kind=_kind_spoken_of(query, use, context))
+    if query.relation in FROM_A_VIEW and (view is None or context.request.scene is None):
         raise DependsOnView(read.said)
-    found = find(replace(query, order=""), setting.scene, view)
-    found = found or _in_room(query, setting)
-    if read.is_other and use is Use.PUT and not read.query.is_named:
-        found = [one for one in setting.scene.things if one.held_by] or found
-    if not read.nth:
-        found = [one for one in found if suits(one, use, query, setting)]
-    else:  # what cannot be taken is counted all the same
-        found = [one for one in found if not one.held_by]
-    if read.support:
-        found = [one for one in found if _rests_on(one, read.support)]
+    found = find(replace(query, order=""), scene, view) or _in_room(query, context)
     if read.is_other:
-        spoken = (one for one in setting.spoken_of() if query.kind in (ANY_CLASS, one.kind))
+        if use is Use.PUT and not read.query.is_named:
+            found = [one for one in scene.things if one.held_by] or found
+        spoken = (one for one in context.spoken_of() if query.kind in (ANY_CLASS, one.kind))
         before = next((one.thing_id for one in spoken if one.thing_id), "")
+        if not before and read.scope is Scope.ALL:
+            return []  # than which one?
         found = [one for one in found if not before or not one.is_called(before)]
+    found = [one for one in found if _suits(one, use, query, context)]
+    if read.held_by:
+        found = [one for one in found if one.held_by in read.held_by]
     for other in read.besides:
-        meant = _described_by(other, found, setting)
+        known = find(replace(other.query, order=""), scene, view)
+        there = [one for one in _supported(read, found) if one in known]
+        meant = _told_apart(other, there, view)
         found = [one for one in found if one not in meant]
-    return found
+    return _told_apart(read, found, view)
 
 
-def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
+def _suits(thing: Thing, use: Use, query: Query, context: CommandContext) -> bool:
     """Tell whether a thing can play its part: what is held is not taken, nor put upon."""
     may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
     match use:
         case Use.ONTO:
-            moved = [one.thing_id for one in setting.mentions if one.role is Role.OBJECT]
+            moved = [one.thing_id for one in context.mentions if one.role is Role.OBJECT]
             return not thing.held_by and thing.thing_id not in moved
         case Use.TAKE:
             return may_move and (not thing.held_by or bool(query.thing_id))
@@ -136,33 +134,21 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
             return True
 
 
-def _query(read: Expression, use: Use, setting: Setting) -> Query:
-    query = read.query
-    is_first_of_what = bool(read.nth) and not read.side
-    if query.is_named or query.thing_id or is_first_of_what:
-        return query
-    return replace(query, kind=_kind_spoken_of(query, use, setting))
-
-
-def _kind_spoken_of(query: Query, use: Use, setting: Setting) -> str:
+def _kind_spoken_of(query: Query, use: Use, context: CommandContext) -> str:
     """Return the kind that "the red one" means after "the cups": the last of which one is red."""
-    for one in setting.spoken_of():
+    for one in context.spoken_of():
         if not one.kind or (use in (Use.TAKE, Use.PUT) and one.kind not in GRASPABLE_CLASSES):
             continue
-        if find(replace(query, kind=one.kind), setting.scene, setting.view):
+        if find(replace(query, kind=one.kind), context.scene, context.view):
             return one.kind
     return ANY_CLASS
 
 
-def _in_room(query: Query, setting: Setting) -> list[Thing]:
+def _in_room(query: Query, context: CommandContext) -> list[Thing]:
     """Return what stands on the furniture of a room, where "in the kitchen" names no furniture."""
-    world = setting.request.world
     room = query.anchor.surface if query.anchor is not None and query.relation == IN else ""
-    table = world.surface_of(room) if room else ""
-    if table in ("", room):
-        return []
-    there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}
-    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
+    there = context.request.world.surfaces_of(room) if room else ()
+    alone = find(replace(query, relation="", anchor=None, order=""), context.scene, context.view)
     return [one for one in alone if _rests_on(one, there)]
 
 
@@ -173,41 +159,39 @@ def _rests_on(thing: Thing, names: Collection[str]) -> bool:
 # --- what tells things apart that are alike -----------------------------------------------------
 
 
-def _told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[Thing]:
-    """Return of things that are alike the one at a side, a place in a row, or an extreme."""
-    view = setting.view
-    if read.among and len(found) not in (1, read.among):
-        return found
-    if read.near is not None:
-        return _by_nearness(read, read.near, found, setting)
-    if read.nth:
-        return in_place(found, read.nth, read.side, view)
+def _told_apart(read: Expression, things: list[Thing], view: Viewpoint | None) -> list[Thing]:
+    """Return of things that are alike those on a support, at a side, or the nearest."""
+    found = _supported(read, things)
     if read.side:
-        found = on_side(found, read.side, view)
-    if read.extreme:
-        return most(found, read.extreme)
+        found = _on_side(found, read.side, view)
     if read.query.order and view is not None:
-        found = by_distance(found, (view.x_m, view.y_m))
-        return found[:1] if ORDERS[read.query.order] > 0 else found[-1:]
+        found = found[:1] if ORDERS[read.query.order] > 0 else found[-1:]
     return found
 
 
-def _described_by(read: Expression, things: list[Thing], setting: Setting) -> list[Thing]:
-    """Return those of some things that a part such as "the red one" describes."""
-    known = find(replace(read.query, order=""), setting.scene, setting.view)
-    found = [one for one in things if one in known]
-    if read.support:
-        found = [one for one in found if _rests_on(one, read.support)]
-    return _told_apart(read, found, setting)
+def _supported(read: Expression, things: list[Thing]) -> list[Thing]:
+    return [one for one in things if _rests_on(one, read.support)] if read.support else things
 
 
-def _by_nearness(
-    read: Expression, near: Expression, found: list[Thing], setting: Setting
-) -> list[Thing]:
-    """Return the nearest to another thing, or the farthest; none where that is not known."""
-    others = _described_by(near, list(setting.scene.things), setting)
-    if not others or (len(others) > 1 and near.scope is not Scope.ALL):
-        return found if others else []
-    row = [one for one in found if one not in others]
-    row.sort(key=lambda one: min(math.dist(one.xy_m, other.xy_m) for other in others))
-    return row[:1] if ORDERS[read.order] > 0 else row[-1:]
+def _on_side(things: list[Thing], side: str, view: Viewpoint | None) -> list[Thing]:
+    """Return the leftmost, rightmost or middle thing; all of them where they are in no one row."""
+    row = in_a_row(things, view) if len({one.rests for one in things}) == 1 else None
+    if row is None or (side == "middle" and len(row) % 2 == 0):
+        return things
+    return [row[{"left": 0, "right": -1, "middle": len(row) // 2}[side]]]
+
+
+def in_a_row(things: Sequence[Thing], view: Viewpoint | None) -> list[Thing] | None:
+    """Return things from left to right as they are seen, None where they are not side by side."""
+    if view is None or len(things) < 2:
+        return None
+    row = sorted(things, key=lambda thing: -_bearing_rad(thing, view))
+    bearings = [_bearing_rad(thing, view) for thing in row]
+    apart = all(left - right > LEAST_BEARING_RAD for left, right in pairwise(bearings))
+    return row if apart else None
+
+
+def _bearing_rad(thing: Thing, view: Viewpoint) -> float:
+    """Return how far to the left of straight ahead a thing is seen."""
+    angle = math.atan2(thing.xy_m[1] - view.y_m, thing.xy_m[0] - view.x_m) - view.yaw_rad
+    return math.remainder(angle, math.tau)

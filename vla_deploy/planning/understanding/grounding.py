@@ -1,18 +1,16 @@
 """Ground a plan: referring expressions become ids, words or places, what is missing is put in.
 
 One function for every planner: patterns, the command parser, language models, a person's own JSON.
-Each may say "pick up it" and leave the way there out; what they say too much is left out.
+Each may say "pick up it" and leave the way there out.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
+from vla_deploy.planning.errors import PlanInvalid, UnknownPlace
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import (
     MOST_ACTIONS,
     PUT_IN,
@@ -21,13 +19,18 @@ from vla_deploy.planning.plan import (
     dependency_faults,
     execution_order,
 )
-from vla_deploy.planning.symbolic.conditions import MET, Setting, has_free_hand, is_before, is_known
+from vla_deploy.planning.symbolic.conditions import MET, Setting, is_before, is_known
 from vla_deploy.planning.symbolic.simulation import after, in_turn
-from vla_deploy.planning.symbolic.state import Held, State, state_of, subject_of
+from vla_deploy.planning.symbolic.state import (
+    Held,
+    State,
+    state_of,
+    subject_of,
+    subject_or_none,
+)
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.fitting import Use
-from vla_deploy.planning.understanding.normaliser import normalised
 from vla_deploy.planning.understanding.places import (
     Parameters,
     check_readable,
@@ -40,13 +43,7 @@ from vla_deploy.planning.understanding.places import (
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.planning.validator import action_faults
 
-# A free hand takes two steps, then the thing is looked for and driven to.
-MOST_INSERTED: Final = 6
 LONGEST_ID: Final = 48
-# Doing these a second time at once changes nothing.
-IDEMPOTENT: Final = frozenset(
-    {"navigate_to", "look_at", "find_object", "open_gripper", "close_gripper", "move_arm", "stop"}
-)
 # These skills want the robot before the thing, those only want it known.
 FROM_CLOSE: Final = frozenset({"pick_up", "place"})
 OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
@@ -58,17 +55,16 @@ def ground_plan(plan: Plan, request: Request) -> Plan:
     """Return the plan as it can be validated and carried out; it names only what the robot knows.
 
     Raises:
-        PlanInvalid: its dependencies are no order.
+        PlanInvalid: its ids are not unique, or its dependencies no order.
         UnknownObject: an expression names nothing that the robot knows.
         UnknownPlace: a place is not known.
         Ambiguous: only the speaker can tell what is meant.
     """
-    actions = _with_unique_ids(plan.actions)
-    faults = dependency_faults(actions)
+    faults = dependency_faults(plan.actions)
     if faults:
         raise PlanInvalid(faults)
     grounder = _Grounder(request)
-    for action in execution_order(actions):
+    for action in execution_order(plan.actions):
         grounder.add(action)
     if len(grounder.done) > MOST_ACTIONS:
         raise PlanInvalid([f"it would need {len(grounder.done)} actions, {MOST_ACTIONS} at most"])
@@ -93,7 +89,6 @@ class _Grounder:
 
     def add(self, action: Action) -> None:
         """Ground an action, with what must come before it, into none, one or several."""
-        action = normalised(action, self._request.world.poses)
         needed = tuple(
             dict.fromkeys(name for one in action.depends_on for name in self._last.get(one, (one,)))
         )
@@ -102,59 +97,37 @@ class _Grounder:
             if skill == action.skill:
                 step = action.model_copy(update={"parameters": dict(parameters)})
             step = self._with_hand(step)
-            for missing in self._missing_before(step):
-                needed = self._append(_made(step, *missing), needed)
+            for _ in ("a look", "a way"):  # each is done before the next is asked for
+                missing = _missing(step, self._state, self._request)
+                if missing is not None:
+                    needed = self._append(_made(step, *missing), needed)
             needed = self._append(step, needed)
         self._last[action.id] = needed
 
     def _with_hand(self, step: Action) -> Action:
         """Name the hands when a second thing is taken: who puts down must know which is where."""
-        held = self._state.held
-        if step.skill != "pick_up" or len(held) != 1 or len(self._state.hands) < 2:
+        state, wanted = self._state, step.parameters.get("arm")
+        if step.skill != "pick_up" or len(state.held) != 1 or len(state.hands) < 2:
             return step
-        arm = held[0].hand
-        if not arm:
-            arm = next(one for one in self._state.hands if one != step.parameters.get("arm"))
-            self._name_hand(arm)
-        other = next(one for one in self._state.hands if one != arm)
-        arm = step.parameters.get("arm", other)
-        return step.model_copy(update={"parameters": {**step.parameters, "arm": arm}})
-
-    def _name_hand(self, arm: str) -> None:
-        """Let the latest thing taken be in that hand."""
-        at = max(n for n, one in enumerate(self.done) if one.skill == "pick_up")
-        taken = self.done[at]
-        parameters = {**taken.parameters, "arm": arm}
-        self.done[at] = taken.model_copy(update={"parameters": parameters})
-        held = tuple(replace(one, hand=arm) for one in self._state.held)
-        self._state = replace(self._state, held=held)
-
-    def _missing_before(self, step: Action) -> Iterator[Step]:
-        """Yield what must still come before a step; each is done before the next is asked for."""
-        for _ in range(MOST_INSERTED):
-            missing = _missing(step, self._state, self._request)
-            if missing is None:
-                return
-            yield missing
+        first = state.held[0].hand or next(one for one in state.hands if one != wanted)
+        if not state.held[0].hand:
+            at = max(n for n, one in enumerate(self.done) if one.skill == "pick_up")
+            self.done[at] = _with_arm(self.done[at], first)
+            self._state = replace(state, held=(replace(state.held[0], hand=first),))
+        return _with_arm(step, wanted or next(one for one in state.hands if one != first))
 
     def _append(self, action: Action, needed: tuple[str, ...]) -> tuple[str, ...]:
         """Add an action behind those that it needs; return what comes next needs."""
-        if self._is_needless(action):
-            return needed
-        name = _free_id(action.id, self._taken)
+        name, number = action.id, 1
+        while name in self._taken:
+            number += 1
+            name = f"{action.id[:LONGEST_ID]}_{number}"
         self._taken.add(name)
         action = _completed(action.model_copy(update={"id": name, "depends_on": needed}))
         self.done.append(action)
         if action.skill in LOGIC and not action_faults(action, self._request.world):
             self._state = after(action, self._state, self._request.world, self._request.scene)
         return (name,)
-
-    def _is_needless(self, action: Action) -> bool:
-        """Tell whether the action before it has just done the same."""
-        if action.skill not in IDEMPOTENT or not self.done:
-            return False
-        before = self.done[-1]
-        return (before.skill, before.parameters) == (action.skill, action.parameters)
 
     # --- what the parameters of each skill refer to ---------------------------------------------
 
@@ -226,7 +199,11 @@ class _Grounder:
             things = self.resolver.things(given["object"], Use.PUT)
         destination = destination_of(given, self.resolver, self._state)
         if given.get("destination") is None:
-            things = self._to_put_down(things)
+            # What no hand holds is not fetched to put it down, and the plan may have put it before.
+            is_empty = bool(self._state.hands) and not self._state.held
+            things = tuple(one for one in things if (self._held(one) if one else not is_empty))
+            if not (things or self._state.rests):
+                raise PlanInvalid([f"no hand holds {given.get('object', 'anything')}"])
         for thing in things:
             if thing is not None and self._held(thing) is None:
                 if self._has_put(thing, destination):
@@ -238,44 +215,20 @@ class _Grounder:
 
     def _hand_over(self, given: Parameters) -> Iterator[Step]:
         """Give what is held; what is not is fetched before, to where it was asked for."""
-        things = list(self.resolver.things(given["object"], Use.PUT))
-        while things:
-            missing = [one for one in things if self._held(one) is None]
-            fetched = missing[: max(1, self._state.free_hands())]
-            for thing in fetched:
+        for thing in self.resolver.things(given["object"], Use.PUT):
+            if self._held(thing) is None:
                 yield from _on_furniture(thing)
                 yield "pick_up", {"object": thing.name, **_arm(given)}
-            if fetched and self._request.here is not None:
-                yield "navigate_to", self._here("here")
-            in_hand = [one for one in things if self._held(one) is not None]
-            for thing in in_hand or fetched:
-                yield "hand_over", self._hand_of(self._held(thing)) or _arm(given)
-                things.remove(thing)
+                if self._request.here is not None:
+                    yield "navigate_to", self._here("here")
+            yield "hand_over", self._hand_of(self._held(thing)) or _arm(given)
 
     def _has_put(self, thing: Referent, destination: Parameters) -> bool:
         """Tell whether the plan has put a thing there: "take it to the box, drop it in"."""
         rest = self._state.rests.get(self._key(thing))
         where = str(destination.get("destination", ""))
-        if rest is None or rest.of == where:
-            return rest is not None
-        with suppress(UnknownObject):  # a place by another name
-            return rest.of == subject_of(where, self._request.scene).key
-        return False
-
-    def _to_put_down(self, things: tuple[Referent | None, ...]) -> tuple[Referent | None, ...]:
-        """Return what of things is in a hand; nothing where the plan has put them down already.
-
-        Raises:
-            PlanInvalid: none of them is, and the plan has not had it.
-        """
-        state = self._state
-        in_hand = {self._held(one) if one else None: one for one in things}
-        held = tuple(one for where, one in in_hand.items() if one is None or where is not None)
-        if things == (None,) and state.hands and not state.held and state.rests:
-            return ()
-        if not held and not any(self._key(one) in state.rests for one in things if one):
-            raise PlanInvalid([f"no hand holds the {things[0].words}" if things[0] else "nothing"])
-        return held
+        subject = subject_or_none(where, self._request.scene)
+        return rest is not None and rest.of in (where, where if subject is None else subject.key)
 
     def _hand_of(self, held: Held | None) -> Parameters:
         """Name the hand that holds a thing where another holds something, too."""
@@ -303,12 +256,10 @@ def _on_furniture(thing: Referent) -> Iterator[Step]:
 
 
 def _missing(action: Action, state: State, request: Request) -> Step | None:
-    """Return the first step that a plan leaves out before an action: a look, a way, a free hand."""
+    """Return the first step that a plan leaves out before an action: a look, or a way."""
     if action.skill not in OF_THINGS:
         return None
     setting = Setting(parameters=action.parameters, world=request.world, scene=request.scene)
-    if action.skill == "pick_up" and has_free_hand(state, setting):
-        return _towards_free_hand(action, state, request.world)
     subject = setting.subject("object") or setting.subject("destination")
     name = action.parameters.get("object", action.parameters.get("destination"))
     if subject is not None and is_known(state, setting) != MET:
@@ -318,26 +269,16 @@ def _missing(action: Action, state: State, request: Request) -> Step | None:
     return None
 
 
-def _towards_free_hand(action: Action, state: State, world: World) -> Step | None:
-    """Put down what a hand holds, on the nearest furniture; None where there is none."""
-    table = world.nearest_surface(state.spot)
-    arm = action.parameters.get("arm")
-    held = next((one for one in state.held if arm in (None, one.hand)), None)
-    if table is None or held is None:
-        return None
-    if state.at != table:
-        return "navigate_to", {"place": table}
-    put = {"destination": table, "relation": "on"}
-    return "place", {**put, "arm": held.hand} if held.hand else put
+def _with_arm(action: Action, arm: str) -> Action:
+    return action.model_copy(update={"parameters": {**action.parameters, "arm": arm}})
 
 
 def _made(
     action: Action, skill: str, parameters: Mapping[str, Any], description: str = PUT_IN
 ) -> Action:
     """Return an action that comes before another, of the same priority."""
-    name = f"{action.id[:40]}_{skill}"
     return Action(
-        id=name,
+        id=f"{action.id[:40]}_{skill}",
         skill=skill,
         parameters=dict(parameters),
         priority=action.priority,
@@ -354,31 +295,6 @@ def _completed(action: Action) -> Action:
         update={
             "resources": spec.resources,
             "preconditions": action.preconditions or tuple(logic.needs),
-            "effects": action.effects or logic.leaves,
             "estimated_duration_s": action.estimated_duration_s or spec.estimated_duration_s,
         }
     )
-
-
-def _with_unique_ids(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Give each action an id of its own; who depends on a doubled id means the latest before it."""
-    taken: set[str] = set()
-    latest: dict[str, str] = {}
-    unique = []
-    for action in actions:
-        depends_on = tuple(latest.get(one, one) for one in action.depends_on)
-        name = _free_id(action.id, taken)
-        taken.add(name)
-        latest[action.id] = name
-        unique.append(action.model_copy(update={"id": name, "depends_on": depends_on}))
-    return tuple(unique)
-
-
-def _free_id(wanted: str, taken: set[str]) -> str:
-    """Return an id like the wanted one that is not taken."""
-    if wanted not in taken:
-        return wanted
-    number = 2
-    while f"{wanted[:LONGEST_ID]}_{number}" in taken:
-        number += 1
-    return f"{wanted[:LONGEST_ID]}_{number}"

@@ -56,17 +56,9 @@ def test_furniture_to_take_it_from_tells_which_one_is_meant() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("command", "what"),
-    [
-        ("get a grip of the cup", "grip cup"),
-        ("get a grip of the cup", "a grip of the cup"),
-        ("what has become of the cup take it", "cup"),
-        ("the cup is his cup so take it", "his cup"),
-    ],
-)
-def test_what_was_copied_beside_a_thing_is_left_out(command: str, what: str) -> None:
-    (found,) = planned(command, {"do": "pick", "what": what})
+@pytest.mark.parametrize("what", ["grip cup", "a grip of the cup", "of the cup"])
+def test_what_was_copied_beside_a_thing_is_left_out(what: str) -> None:
+    (found,) = planned("get a grip of the cup", {"do": "pick", "what": what})
     assert found == ("pick_up", {"object": "the cup"})
 
 
@@ -115,12 +107,6 @@ def test_back_is_where_the_command_before_was_told() -> None:
         ({"do": "turn", "way": "right", "by": "ninety degrees"}, "turn", "angle_rad", -math.pi / 2),
         ({"do": "turn", "way": "around"}, "turn", "angle_rad", math.pi),
         ({"do": "turn", "way": "around", "by": "about"}, "turn", "angle_rad", math.pi),
-        (
-            {"do": "turn", "way": "left", "by": "a quarter of glare"},
-            "turn",
-            "angle_rad",
-            math.pi / 2,
-        ),
         ({"do": "wait", "by": "half a minute"}, "wait", "duration_s", 30.0),
     ],
 )
@@ -140,6 +126,7 @@ def test_amounts_become_numbers(step: Step, skill: str, name: str, value: float)
         ({"do": "bring", "what": "cup", "to": "anna"}, UnknownPlace),
         ({"do": "go", "where": "back"}, UnknownPlace),
         ({"do": "wait", "by": "blue"}, PlanInvalid),
+        ({"do": "turn", "way": "left", "by": "a quarter of glare"}, PlanInvalid),
         ({"do": "move", "way": "forward", "by": "1 e9 metres"}, PlanInvalid),
         ({"do": "turn", "way": "left", "by": "kitchen degrees"}, PlanInvalid),
     ],

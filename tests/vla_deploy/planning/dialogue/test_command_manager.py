@@ -370,16 +370,14 @@ class TestWaitingForAWord:
         assert told[1]["question"] == "Shall I pick up the blue cup? I wait for you to say go."
         assert desk.plans() == []
 
-    def test_what_is_put_down_first_since_hands_are_full_meanwhile_is_asked(self, desk):
+    def test_what_no_hand_is_free_for_meanwhile_is_refused(self, desk):
         desk.answers()
         desk.executor_is("idle", left="ball", right="book")
         desk.give(command_id="c2", text="go")
         told = desk.answers()
-        assert events(told) == [("c2", "answered"), ("c1", "asked")]
-        assert "My hands are full" in told[-1]["question"]
+        assert events(told) == [("c2", "answered"), ("c1", "rejected")]
+        assert "no hand is free" in told[-1]["reason"]
         assert desk.plans() == []
-        desk.give(command_id="c3", text="go")
-        assert events(desk.answers())[-1] == ("c1", "plan")
 
     def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
         desk.answers()

@@ -6,7 +6,6 @@ from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation
 from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.understanding.grounding import PUT_IN
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.plan_bounds import Confirm
 from vla_deploy.world import Snapshot, Thing
@@ -50,20 +49,9 @@ def test_what_moves_nothing_needs_no_yes(butler: World) -> None:
     assert ask(always, Action(id="s", skill="speak", parameters={"text": "hello"})) == ""
 
 
-@pytest.mark.parametrize(
-    ("change", "why"),
-    [
-        ({"feasibility_score": 0.6}, "I am not sure that I understood you."),
-        ({"description": PUT_IN, "skill": "place",
-          "parameters": {"destination": "coffee_table", "relation": "on"}},
-         "My hands are full: I would put something down first."),
-    ],
-)  # fmt: skip
-def test_each_risk_of_an_action_is_told(butler: World, change: dict[str, object], why: str) -> None:
-    assert ask(butler, PICK.model_copy(update=change)).endswith(why)
-
-
 def test_each_risk_of_a_plan_is_told(butler: World) -> None:
+    unsure = PICK.model_copy(update={"feasibility_score": 0.6})
+    assert ask(butler, unsure).endswith("I am not sure that I understood you.")
     assert "There may be a danger: it is hot." in ask(butler, GO, safety_concerns=("it is hot",))
     assert "not sure that I heard" in ask(butler, GO, heard_confidence=0.4)
     assert ask(butler, GO, heard_confidence=0.9) == ""

