@@ -37,6 +37,14 @@ def stack(make_stack: Callable[..., LockstepStack]) -> LockstepStack:
 
 
 @pytest.fixture
+def coarse_stack(make_stack: Callable[..., LockstepStack], coarse: str) -> LockstepStack:
+    """The whole robot, armed, in the flat, in fewer ticks."""
+    made = make_stack(profile=coarse)
+    made.arm()
+    return made
+
+
+@pytest.fixture
 def make_stack_at_table(
     make_stack: Callable[..., LockstepStack], tmp_path: Path
 ) -> Callable[[str], LockstepStack]:

@@ -16,11 +16,8 @@ pytestmark = pytest.mark.gl
 
 
 @pytest.mark.timeout(240)
-def test_the_cup_ends_in_the_box_and_every_action_is_told(
-    make_stack: MakeStack, coarse: str
-) -> None:
-    stack = make_stack(profile=coarse)
-    stack.arm()
+def test_the_cup_ends_in_the_box_and_every_action_is_told(coarse_stack: LockstepStack) -> None:
+    stack = coarse_stack
     watcher = SceneWatcher(stack)
     stack.lockstep.add(watcher)
     outcome = stack.say(COMMAND)

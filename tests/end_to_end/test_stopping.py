@@ -38,7 +38,8 @@ def _action(skill: str, **parameters: object) -> dict[str, object]:
     return {"id": "a1", "skill": skill, "parameters": parameters}
 
 
-def test_stop_cancels_a_drive_and_leaves_the_robot_ready(stack: LockstepStack) -> None:
+def test_stop_cancels_a_drive_and_leaves_the_robot_ready(coarse_stack: LockstepStack) -> None:
+    stack = coarse_stack
     command_id = drive_until_moving(stack)
     stack.say("stop")
     assert stack.lockstep.run_until(lambda: wheel_speed(stack) < STANDSTILL_RAD_S, 2.0)
@@ -51,8 +52,9 @@ def test_stop_cancels_a_drive_and_leaves_the_robot_ready(stack: LockstepStack) -
 
 
 def test_after_an_emergency_stop_commands_are_refused_until_reset_and_arm(
-    stack: LockstepStack,
+    coarse_stack: LockstepStack,
 ) -> None:
+    stack = coarse_stack
     command_id = drive_until_moving(stack)
     stack.operate("estop")
     assert stack.lockstep.run_until(lambda: joint_speeds(stack).max() < STANDSTILL_RAD_S, 2.0)
