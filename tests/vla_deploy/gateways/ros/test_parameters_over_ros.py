@@ -57,7 +57,7 @@ def robot(
         stack.wait_until_armed()
         yield stack
     finally:
-        stack.close()
+        stack.cut()
 
 
 def holders_of(key: str, robot: ProcessStack) -> set[str]:

@@ -244,7 +244,7 @@ def robot(ros_environment, ros_domain: int, coarse: str) -> Iterator[ProcessStac
             assert ended["success"], ended
             yield stack
         finally:
-            stack.close()
+            stack.cut()
 
 
 @pytest.fixture
