@@ -22,7 +22,7 @@ from benchmarks.planner_desk import Answer, fresh_desk
 from benchmarks.speech_words import open_shipped
 from drivers.clock import NS_PER_S
 from training.speech.judging import NOISY_DB
-from training.speech.trials import NAMES, by_held_out_voices, by_unseen_engine, heard
+from training.speech.trials import by_held_out_voices, by_unseen_engine, heard
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.asr_pipeline import HeardPhrase
@@ -113,7 +113,7 @@ def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) 
 
 
 def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
-    reading = recogniser.read(clip.samples, NAMES)
+    reading = recogniser.read(clip.samples)
     sure = confidence(reading, recogniser.declared.calibration)
     phrase = Phrase(
         number=1, began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S),

@@ -47,7 +47,6 @@ def register(commands: Any) -> None:
     hear.add_argument("--robot", default="butler", help="whose microphone (default: butler)")
     hear.add_argument("--model", help="recogniser (default: as the profile says)")
     hear.add_argument("--profile", help="name or path (default: the one of the next start)")
-    hear.add_argument("--words", default="", help="names of things and places that may occur")
     hear.add_argument("--seconds", type=float, help="how long to listen (default: until Ctrl-C)")
     hear.add_argument("--json", action="store_true", help="print JSON, live a line for each phrase")
     hear.set_defaults(run=run)
@@ -66,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     clock = StreamClock()
     live: Clock = MonotonicClock()
     used = live if arguments.microphone else clock
-    hearing = open_hearing(selected, profile, used, arguments.words)
+    hearing = open_hearing(selected, profile, used)
     try:
         if arguments.microphone:
             return _listen(arguments, hearing, live)

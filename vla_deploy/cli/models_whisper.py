@@ -35,7 +35,6 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
         whisper=Whisper(
             languages=tuple(arguments.languages.split(",")),
             context=Context.TRIMMED if arguments.trimmed else Context.PADDED,
-            hot_words=not arguments.no_hot_words,
         ),
         summary=arguments.summary or "a recogniser that was added",
         licence=arguments.licence,
@@ -54,7 +53,7 @@ def fetch_whisper(
         request = Request(
             name=arguments.name,
             folder=folder,
-            whisper=Whisper(languages=("en",), context=Context.PADDED, hot_words=True),
+            whisper=Whisper(languages=("en",), context=Context.PADDED),
             summary=summary_of(arguments.name),
             licence=LICENCE,
         )

@@ -1,7 +1,7 @@
 """Follow the stream from frame to phrase to transcript, with the robot's own voice held off."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -41,14 +41,12 @@ class AsrPipeline:
         voice_activity: VoiceActivity,
         queue: TranscriptionQueue,
         settings: SpeechSettings,
-        hot_words: Callable[[], str],
         names: Set[str] = frozenset(),
     ) -> None:
         """Take the networks over; `names` are those that the robot answers to."""
         self.queue = queue
         self.counts: Counter[str] = Counter()
         self._activity = voice_activity
-        self._hot_words = hot_words
         self._names = names
         self._framer = Framer()
         self._gate = EchoGate()
@@ -121,9 +119,9 @@ class AsrPipeline:
         if kind is VadEventKind.BEGAN:
             self._gate.note_begun()
         elif kind is VadEventKind.PAUSED:
-            self.queue.draft(phrase, self._hot_words())
+            self.queue.draft(phrase)
         elif kind is VadEventKind.ENDED:
-            self.queue.finish(phrase, self._hot_words())
+            self.queue.finish(phrase)
         else:
             self.queue.forget_draft()
         if kind is VadEventKind.TOO_LONG:

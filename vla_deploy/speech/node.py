@@ -17,7 +17,6 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError, SpeechMissing
 from vla_deploy.speech.event_publisher import SpeechEvents
-from vla_deploy.speech.hot_words import HotWords
 from vla_deploy.speech.microphone import Microphone, OpenInput
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
 from vla_deploy.speech.page_microphone import PageMicrophone
@@ -156,10 +155,9 @@ class SpeechNode:
         except (InferenceError, SpeechError) as error:
             self._go_deaf(one_line(error))
             return
-        hot_words = HotWords(self._robot.places, self._space.cell_reader("scene"))
         queue = TranscriptionQueue(self._executor, self._clock)
         names = frozenset(words_of(self._robot.name))
-        self._asr = AsrPipeline(activity, queue, self._profile.speech, hot_words.text, names)
+        self._asr = AsrPipeline(activity, queue, self._profile.speech, names)
         self._loading = self._select(self._profile, 0)
 
     def _select(self, profile: Profile, model_tier: int) -> "Future[SelectedRecogniser]":

@@ -60,7 +60,7 @@ class Recogniser:
         self._clock = clock
         self._beam = beam
 
-    def read(self, samples: Sound, hot_words: str = "") -> Transcript:
+    def read(self, samples: Sound) -> Transcript:
         """Return what is said in a phrase of at most 29 s.
 
         Raises:
@@ -70,7 +70,7 @@ class Recogniser:
             raise RunFailed(f"{self.model.manifest.name}: it is closed")
         started_ns = self._clock.now_ns()
         try:
-            segments, info = self._transcribe(samples, hot_words)
+            segments, info = self._transcribe(samples)
         except _MODEL_ERRORS as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
@@ -109,7 +109,7 @@ class Recogniser:
         self._whisper = None
         self.claim.release()
 
-    def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
+    def _transcribe(self, samples: Sound) -> tuple[list[Any], Any]:
         whisper = self._whisper
         whisper.hypotheses.clear()
         if self.declared.context == Context.TRIMMED:
@@ -125,7 +125,6 @@ class Recogniser:
             compression_ratio_threshold=None,
             log_prob_threshold=None,
             no_speech_threshold=None,
-            hotwords=hot_words if hot_words and self.declared.hot_words else None,
             # CTranslate2 ends a text at half of what it is told.
             max_new_tokens=min(_MOST_TOKENS, 2 * (_TOKENS + math.ceil(_TOKENS_S * seconds))),
         )

@@ -29,9 +29,7 @@ class StreamClock:
         self.ns = max(self.ns, deadline_ns)
 
 
-def open_hearing(
-    selected: SelectedRecogniser, profile: Profile, clock: Clock, hot_words: str = ""
-) -> AsrPipeline:
+def open_hearing(selected: SelectedRecogniser, profile: Profile, clock: Clock) -> AsrPipeline:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
 
     Raises:
@@ -40,4 +38,4 @@ def open_hearing(
     """
     queue = TranscriptionQueue(AtOnce(), clock)
     queue.selected = selected
-    return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)
+    return AsrPipeline(open_voice_activity(), queue, profile.speech)

@@ -52,11 +52,11 @@ class TranscriptionQueue:
         """Return the recogniser that reads the next phrase."""
         return self.selected.recogniser
 
-    def draft(self, phrase: Phrase, hot_words: str) -> None:
+    def draft(self, phrase: Phrase) -> None:
         """Read a phrase in advance, unless something is being read."""
         under_way = self._drafting is not None and not self._drafting.done()
         if self.recogniser is not None and not under_way and not self._ended:
-            self._drafting = self._ask(self.recogniser, phrase, hot_words)
+            self._drafting = self._ask(self.recogniser, phrase)
             self._draft = phrase, self._drafting
 
     def drafted(self) -> PhraseTranscript | None:
@@ -74,7 +74,7 @@ class TranscriptionQueue:
         if draft is not None:
             draft[1].cancel()
 
-    def finish(self, phrase: Phrase, hot_words: str) -> None:
+    def finish(self, phrase: Phrase) -> None:
         """Take a phrase that has ended: by what was read in advance, if that was all of it."""
         draft, self._draft = self._draft, None
         if self.recogniser is None:
@@ -84,7 +84,7 @@ class TranscriptionQueue:
         elif draft is not None and draft[0].ended_ns == phrase.ended_ns:
             self._ended.append((phrase, draft[1]))
         else:
-            self._ended.append((phrase, self._ask(self.recogniser, phrase, hot_words)))
+            self._ended.append((phrase, self._ask(self.recogniser, phrase)))
 
     def answers(self) -> Iterator[PhraseTranscript]:
         """Yield what has been answered since the last call, in the order of the phrases."""
@@ -109,8 +109,8 @@ class TranscriptionQueue:
         late_ns = self._clock.now_ns() - phrase.ended_ns
         return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
 
-    def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> "Future[Transcript]":
-        return self._executor.submit(recogniser.read, phrase.samples, hot_words)
+    def _ask(self, recogniser: Recogniser, phrase: Phrase) -> "Future[Transcript]":
+        return self._executor.submit(recogniser.read, phrase.samples)
 
     def _refuse(self, phrase: Phrase, trouble: str) -> None:
         self._refused.append(PhraseTranscript(phrase=phrase, transcript=None, trouble=trouble))

@@ -37,11 +37,11 @@ class Reader:
     """Read more of a text the longer the sound is, in place of a network."""
 
     def __init__(self, words: str, log_probability: float) -> None:
-        self.declared = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=False)
+        self.declared = Whisper(languages=("en",), context=Context.TRIMMED)
         self._words = words.split()
         self._log_probability = log_probability
 
-    def read(self, samples: Any, _hot_words: str) -> Transcript:
+    def read(self, samples: Any) -> Transcript:
         voiced_s = float((np.abs(samples) >= LOUD).sum()) / 16_000
         return Transcript(
             text=" ".join(self._words[: 1 + int(voiced_s / 0.3)]),
@@ -63,7 +63,7 @@ def heard(
     reader = cast("Recogniser", Reader(words, log_probability))
     queue.selected = SelectedRecogniser(recogniser=reader)
     activity = cast("VoiceActivity", LoudnessVad())
-    asr = AsrPipeline(activity, queue, load_profile("desktop").speech, lambda: "")
+    asr = AsrPipeline(activity, queue, load_profile("desktop").speech)
     told: list[tuple[float, HeardPhrase]] = []
     tone = np.where(np.arange(FRAME) % 16 < 8, 1.0, -1.0).astype(np.float32)
     quiet, loud = 0.001 * tone, LOUD * tone

@@ -13,7 +13,6 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import SpeechEvents
-from vla_deploy.speech.hot_words import HotWords, hot_words_of
 from vla_deploy.speech.transcript import Alternative, Transcript
 from vla_deploy.speech.verdict import Judgement, Verdict
 
@@ -131,23 +130,3 @@ def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
     (order,) = told("say")
     assert "say it again" in order["text"]
     assert (order["interrupt"], order["source"]) == (False, "speech")
-
-
-def test_hot_words_are_the_things_seen_and_the_places(
-    space: SharedSpace, clock: ManualClock
-) -> None:
-    words = HotWords(["kitchen", "living_room"], space.cell_reader("scene"))
-    assert words.text() == "kitchen, living room"
-    objects = [
-        {"class": "cup", "colour": "red"},
-        {"class": "cup", "colour": "red"},
-        {"class": "keys", "colour": ""},
-    ]
-    space.cell_writer("scene").put_document({"objects": objects})
-    assert words.text() == "red cup, keys, kitchen, living room"
-
-
-def test_hot_words_are_bounded() -> None:
-    objects = [{"class": "cup", "colour": f"c{number}"} for number in range(500)]
-    assert len(hot_words_of({"objects": objects}, ()).split()) == 40
-    assert hot_words_of({}, ()) == ""

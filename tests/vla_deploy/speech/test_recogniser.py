@@ -140,25 +140,6 @@ def test_the_language_is_found_out_only_where_several_are_declared(
     assert len(asked) == detections
 
 
-def test_hot_words_are_given_to_a_model_that_takes_them(scripted_whisper: Any) -> None:
-    prompts: dict[str, list[int]] = {}
-    for name, takes_them in (("takes", True), ("knows-none", False)):
-        recogniser = opened(scripted_whisper.model(name, "turn left", hot_words=takes_them))
-        model = recogniser._whisper
-        generate = model.model.generate
-
-        def spied(
-            features: Any, asked: Any, name: str = name, generate: Any = generate, **options: Any
-        ) -> Any:
-            prompts[name] = asked[0]
-            return generate(features, asked, **options)
-
-        model.model = _Spied(model.model, generate=spied)
-        recogniser.read(SECOND, "left, left")
-    assert len(prompts["knows-none"]) == 2
-    assert len(prompts["takes"]) > 2 + 2
-
-
 def test_an_unsure_model_has_a_low_log_probability(scripted_whisper: Any) -> None:
     reading = opened(scripted_whisper.model("ours", "pick up the red cup", 0.6)).read(SECOND)
     assert reading.log_probability < -1.5

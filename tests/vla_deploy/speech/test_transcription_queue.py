@@ -42,15 +42,13 @@ class Reader:
 
     def __init__(self) -> None:
         self.read_phrases: list[int] = []
-        self.hot_words: list[str] = []
         self.fails = False
         self.closed = 0
 
-    def read(self, samples: Any, hot_words: str) -> Transcript:
+    def read(self, samples: Any) -> Transcript:
         if self.fails:
             raise RunFailed("ours: out of memory")
         self.read_phrases.append(len(samples))
-        self.hot_words.append(hot_words)
         return Transcript(
             text=f"{len(samples)} samples",
             log_probability=-0.1,
@@ -97,27 +95,27 @@ def queue(pool: Waiting, reader: Any, clock: ManualClock) -> TranscriptionQueue:
 def test_what_was_read_in_advance_is_not_read_again(
     queue: TranscriptionQueue, pool: Waiting, reader: Reader
 ) -> None:
-    queue.draft(phrase(1, 0.9, samples=90), "red cup")
+    queue.draft(phrase(1, 0.9, samples=90))
     assert queue.drafted() is None
     pool.work()
     draft = queue.drafted()
     assert draft is not None
     assert draft.transcript is not None
     assert draft.transcript.text == "90 samples"
-    queue.finish(phrase(1, 0.9, samples=120), "red cup")
+    queue.finish(phrase(1, 0.9, samples=120))
     (answer,) = queue.answers()
     assert answer.transcript == draft.transcript
-    assert (reader.read_phrases, reader.hot_words) == ([90], ["red cup"])
+    assert reader.read_phrases == [90]
 
 
 def test_a_speaker_who_goes_on_is_read_again(
     queue: TranscriptionQueue, pool: Waiting, reader: Reader
 ) -> None:
-    queue.draft(phrase(1, 0.5, samples=50), "")
+    queue.draft(phrase(1, 0.5, samples=50))
     pool.work()
     queue.forget_draft()
     assert queue.drafted() is None
-    queue.finish(phrase(1, 0.9, samples=90), "")
+    queue.finish(phrase(1, 0.9, samples=90))
     assert queue.is_busy
     pool.work()
     assert [answer.transcript.text for answer in queue.answers() if answer.transcript] == [
@@ -129,30 +127,30 @@ def test_a_speaker_who_goes_on_is_read_again(
 def test_only_one_phrase_is_read_in_advance_at_a_time(
     queue: TranscriptionQueue, pool: Waiting
 ) -> None:
-    queue.draft(phrase(1, 0.5), "")
-    queue.draft(phrase(1, 0.7), "")
+    queue.draft(phrase(1, 0.5))
+    queue.draft(phrase(1, 0.7))
     assert len(pool.waiting) == 1
 
 
 def test_what_is_read_too_late_of_a_pause_says_nothing_of_the_next_one(
     queue: TranscriptionQueue, pool: Waiting
 ) -> None:
-    queue.draft(phrase(1, 0.5), "")
+    queue.draft(phrase(1, 0.5))
     pool.waiting[0][0].set_running_or_notify_cancel()
     queue.forget_draft()
-    queue.draft(phrase(1, 0.9), "")
+    queue.draft(phrase(1, 0.9))
     assert len(pool.waiting) == 1, "the network is still at the first one"
     future, act = pool.waiting.pop()
     future.set_result(act())
     assert queue.drafted() is None
-    queue.draft(phrase(1, 0.9), "")
+    queue.draft(phrase(1, 0.9))
     pool.work()
     assert queue.drafted() is not None
 
 
 def test_more_phrases_than_can_wait_are_refused(queue: TranscriptionQueue, pool: Waiting) -> None:
     for number in range(MOST_WAITING + 1):
-        queue.finish(phrase(number, 0.9), "")
+        queue.finish(phrase(number, 0.9))
     (refused,) = queue.answers()
     assert (refused.phrase.number, refused.transcript) == (MOST_WAITING, None)
     assert "are waiting to be read already" in refused.trouble
@@ -163,7 +161,7 @@ def test_more_phrases_than_can_wait_are_refused(queue: TranscriptionQueue, pool:
 def test_what_is_read_late_says_so(
     queue: TranscriptionQueue, pool: Waiting, clock: ManualClock
 ) -> None:
-    queue.finish(phrase(1, 0.9), "")
+    queue.finish(phrase(1, 0.9))
     clock.ns = round(6.4 * NS_PER_S)
     pool.work()
     (answer,) = queue.answers()
@@ -174,10 +172,10 @@ def test_a_failing_network_is_told(
     queue: TranscriptionQueue, pool: Waiting, reader: Reader
 ) -> None:
     reader.fails = True
-    queue.draft(phrase(1, 0.9), "")
+    queue.draft(phrase(1, 0.9))
     pool.work()
     assert queue.drafted() is None
-    queue.finish(phrase(1, 0.9), "")
+    queue.finish(phrase(1, 0.9))
     (answer,) = queue.answers()
     assert (answer.transcript, answer.trouble) == (None, "ours: out of memory")
 
@@ -185,8 +183,8 @@ def test_a_failing_network_is_told(
 def test_without_a_network_each_phrase_is_refused_with_the_reason(clock: ManualClock) -> None:
     queue = TranscriptionQueue(AtOnce(), clock)
     queue.selected = SelectedRecogniser(recogniser=None, why="commands-whisper: no such model")
-    queue.draft(phrase(1, 0.9), "")
-    queue.finish(phrase(1, 0.9), "")
+    queue.draft(phrase(1, 0.9))
+    queue.finish(phrase(1, 0.9))
     (answer,) = queue.answers()
     expected = "no model turns speech into text: commands-whisper: no such model"
     assert answer.trouble == expected
@@ -195,7 +193,7 @@ def test_without_a_network_each_phrase_is_refused_with_the_reason(clock: ManualC
 def test_the_network_before_is_closed_behind_what_it_was_asked(
     queue: TranscriptionQueue, pool: Waiting, reader: Reader
 ) -> None:
-    queue.finish(phrase(1, 0.9), "")
+    queue.finish(phrase(1, 0.9))
     before = queue.recogniser
     queue.selected = SelectedRecogniser(recogniser=None, why="changed")
     assert before is reader
