@@ -54,7 +54,6 @@ def _own(sentences: int) -> dict[str, Any]:
             "sentences": sentences,
             "interrupted_itself": interrupted,
             "phrases_of_its_own": status["room"]["counts"].get("began", 0),
-            "echo_reduction_db": status["voice"]["echo_reduction_db"],
             "cpu_ratio": round((time.process_time() - cpu_s) / (room.now_s - began_s), 3),
         }
 

@@ -52,7 +52,7 @@ class AsrPipeline:
         self._gate = EchoGate()
         self.endpointer = Endpointer(settings)
         self._stopped_number = 0
-        self._barge_ns: int | None = None
+        self._barged_in = False
         self._refused: list[HeardPhrase] = []
 
     @property
@@ -62,16 +62,16 @@ class AsrPipeline:
             return "hearing"
         return "transcribing" if self.queue.is_busy else "listening"
 
-    def feed(self, block: SoundBlock, playing: Playing | None) -> int | None:
-        """Take the next block; return since when a person speaks into what the robot says.
+    def feed(self, block: SoundBlock, playing: Playing | None) -> bool:
+        """Take the next block; return whether a person begins to speak into what the robot says.
 
         Raises:
             RunFailed: the voice network fails.
         """
-        self._barge_ns = None
+        self._barged_in = False
         for frame in self._framer.feed(block):
             self._frame(frame, playing)
-        return self._barge_ns
+        return self._barged_in
 
     def heard(self) -> Iterator[HeardPhrase]:
         """Yield what has been understood, or not, since the last call: a stop even in a pause."""
@@ -108,8 +108,7 @@ class AsrPipeline:
         """Return how probably a person speaks while the robot does."""
         is_person = self._gate.is_person(level_db(frame.samples), voice)
         if self._gate.barges_in():
-            self._barge_ns = frame.stamp_ns
-            self.counts["barged_in"] += 1
+            self._barged_in = True
         return voice if is_person else 0.0
 
     def _on(self, event: VadEvent) -> None:

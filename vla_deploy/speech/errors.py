@@ -6,8 +6,7 @@ SpeechError
 ├── SpotterMismatch       the model is not one that the spotter of stop words can run
 └── VoiceError
     ├── EngineMissing     the program that speaks, or its voice, is not here: install it
-    ├── SynthesisFailed   the program ran and gave no sound: its own words are in the message
-    └── OrderRefused      what was to be said is no order: mend whoever gave it
+    └── SynthesisFailed   the program ran and gave no sound: its own words are in the message
 """
 
 from importlib import import_module
@@ -40,10 +39,6 @@ class EngineMissing(VoiceError):
 
 class SynthesisFailed(VoiceError):
     """Say why a text did not become sound."""
-
-
-class OrderRefused(VoiceError):
-    """Say what was expected in an order to speak."""
 
 
 def import_extra(module: str, purpose: str) -> Any:

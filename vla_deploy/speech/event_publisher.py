@@ -81,9 +81,7 @@ class SpeechEvents:
 
     def _ask_again(self) -> None:
         self.counts["asked_again"] += 1
-        self._say.publish(
-            {"say_id": self._new_id(), "text": ASK_AGAIN, "interrupt": False, "source": "speech"}
-        )
+        self._say.publish({"say_id": self._new_id(), "text": ASK_AGAIN, "source": "speech"})
 
     def _new_id(self) -> str:
         return f"{SOURCE}-{os.getpid()}-{next(self._numbers)}"

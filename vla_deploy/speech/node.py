@@ -29,6 +29,7 @@ from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.speech.words import words_of
 
 STATUS_PERIOD_NS: Final = round(NS_PER_S / BY_NAME["speech_status"].rate_hz)
+SOMEBODY_SPOKE: Final = "somebody spoke"
 PreparedSpeech = tuple[Profile, SelectedRecogniser]
 """What a profile asks of speech: its settings, and the recogniser."""
 _log = logging.getLogger(__name__)
@@ -213,7 +214,7 @@ class SpeechNode:
         if not self._opened_asr:
             self._open_asr()
         if not self._in_page and self._voice is not None and self._playing() is not None:
-            self._voice.barge_in(block.stamp_ns)
+            self._voice.fall_silent(SOMEBODY_SPOKE)
         self._understand(block, None, in_page=True)
 
     def _understand(self, block: SoundBlock, playing: Playing | None, *, in_page: bool) -> None:
@@ -223,13 +224,13 @@ class SpeechNode:
             self._in_page = in_page
             block = replace(block, follows=False)
         try:
-            barged_ns = self._asr.feed(block, playing)
+            barged_in = self._asr.feed(block, playing)
         except InferenceError as error:
             self._go_deaf(one_line(error))
             self._close_asr()
             return
-        if barged_ns is not None and self._voice is not None:
-            self._voice.barge_in(barged_ns)
+        if barged_in and self._voice is not None:
+            self._voice.fall_silent(SOMEBODY_SPOKE)
 
     def _after_listeners(self, heard: HeardPhrase) -> HeardPhrase:
         """Keep a phrase in which a listener has heard a stop from being a command."""

@@ -129,4 +129,4 @@ def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
     publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
     (order,) = told("say")
     assert "say it again" in order["text"]
-    assert (order["interrupt"], order["source"]) == (False, "speech")
+    assert order["source"] == "speech"

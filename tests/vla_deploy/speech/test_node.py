@@ -60,11 +60,11 @@ class Listener:
 
 
 class ScriptedVoice:
-    """Say one thing for as long as the test wants, and keep who barged in."""
+    """Say one thing for as long as the test wants, and keep why it fell silent."""
 
     def __init__(self) -> None:
         self.playing: Playing | None = None
-        self.barged: list[int] = []
+        self.silenced: list[str] = []
 
     def start(self, space: SharedSpace) -> None:
         self.space = space
@@ -75,8 +75,8 @@ class ScriptedVoice:
     def cleaned(self, block: SoundBlock) -> SoundBlock:
         return block
 
-    def barge_in(self, stamp_ns: int) -> None:
-        self.barged.append(stamp_ns)
+    def fall_silent(self, reason: str) -> None:
+        self.silenced.append(reason)
 
     def document(self) -> Mapping[str, Any]:
         return {}
@@ -350,11 +350,11 @@ def test_the_robot_does_not_heed_itself_but_a_person_who_speaks_into_it(bench: M
     rig.voice.playing = Playing(say_id="s1", text="I will pick up the cup", echo_db=-20.0)
     rig.say("I will pick up the cup and bring it to you right now", gain=0.3)
     assert rig.told("heard") == []
-    assert rig.voice.barged == []
+    assert rig.voice.silenced == []
     assert rig.status()["speaking"] is True
     heard_by_listeners = len(rig.listener.blocks)
     rig.say("robot come over here to me please", gain=4.0)
-    assert len(rig.voice.barged) == 1
+    assert rig.voice.silenced == ["somebody spoke"]
     assert [one["text"] for one in rig.told("utterance")] == ["come here"]
     assert len(rig.listener.blocks) > heard_by_listeners, "stop words stay live"
 
@@ -457,7 +457,7 @@ def test_the_robot_falls_silent_for_whoever_holds_the_button(bench: MakeBench) -
     rig.voice.playing = Playing(say_id="1", text=question, echo_db=-38.0)
     rig.hold(TEXT)
     rig.quiet(0.1)
-    assert len(rig.voice.barged) == 1
+    assert rig.voice.silenced == ["somebody spoke"]
     assert [one["text"] for one in rig.told("utterance")] == [TEXT]
 
 

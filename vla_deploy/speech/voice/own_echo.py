@@ -37,7 +37,6 @@ RINGS_NS: Final = duration_ns(BLOCK * PARTITIONS)
 LEAST_GAIN: Final = 0.1
 _GAIN_FALLS: Final = 0.6  # with each block: a word's end is not cut
 _FRAME_BLOCKS: Final = 5  # as many as may be under way to the judge of one frame
-_MEMORY: Final = 0.02  # of each block in the mean: a second
 _FITS_RATIO: Final = 8.0  # of powers, 9 dB
 _FITS_AFTER_BLOCKS: Final = 8
 _AUDIBLE_POWER: Final = 1e-6
@@ -127,13 +126,6 @@ class OwnEcho:
         self._tried_blocks = 0
         self._gain = 1.0
         self._left: deque[float] = deque(maxlen=_FRAME_BLOCKS)
-        self._heard_power = 0.0
-        self._rest_power = 0.0
-
-    @property
-    def reduction_db(self) -> float:
-        """Return by how much what was heard while the robot spoke has become less by it."""
-        return _db(self._heard_power) - _db(self._rest_power)
 
     @property
     def left_db(self) -> float:
@@ -196,8 +188,6 @@ class OwnEcho:
         rest = self._filter.feed(known, heard)
         powers = [float(np.mean(wave**2)) for wave in (known, heard, rest)]
         if powers[0] > _AUDIBLE_POWER:
-            self._heard_power += _MEMORY * (powers[1] - self._heard_power)
-            self._rest_power += _MEMORY * (powers[2] - self._rest_power)
             self._try(powers[1], powers[2])
         self._left.append(self._filter.left_power)
         return self._turned_down(rest, powers[2])

@@ -1,8 +1,7 @@
-"""Say aloud what the topic `say` asks for: one order after the other, and silent at a word."""
+"""Say aloud what the topic `say` asks for: one text after the other, and silent at a word."""
 
 import logging
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,31 +13,39 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.description import VoiceSettings
-from vla_deploy.speech.errors import EngineMissing, OrderRefused, VoiceError
+from vla_deploy.speech.errors import EngineMissing, VoiceError
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.say_queue import (
-    LONGEST_ID,
-    LONGEST_WAIT_NS,
-    Order,
-    SayQueue,
-    read_order,
-)
 from vla_deploy.speech.voice.tts import Engine, chosen_engine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""
+LONGEST_LETTERS: Final = 400
+"""More is cut at a word: half a minute of talk is enough, and the text is shown whole elsewhere."""
+LONGEST_ID: Final = 80
+MOST_WAITING: Final = 16
+LONGEST_WAIT_NS: Final = 20 * NS_PER_S
+"""News that old is none any more."""
 _FIRST_WORDS: Final = "hello"
 _REASON_LETTERS: Final = 200  # of any alphabet, a slot holds them
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Order:
+    """Ask for a text to be said."""
+
+    say_id: str
+    text: str
+    given_ns: int
 
 
 @dataclass(slots=True, kw_only=True)
 class _Saying:
     """Hold what is being said: it is in preparation first, and `sound` comes with its end."""
 
-    order: Order
+    order: _Order
     prepared: "Future[PreparedSound]"
     sound: PreparedSound | None = None
     has_begun: bool = False
@@ -66,11 +73,10 @@ class RobotVoice:
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
         self._player = AudioPlayer(open_output, clock, self._echo.note)
-        self._waiting = SayQueue()
+        self._waiting: list[_Order] = []
         self._saying: _Saying | None = None
-        self._sounding: Order | None = None
+        self._sounding: _Order | None = None
         self._missing = ""
-        self._counts: Counter[str] = Counter()
 
     @property
     def playing(self) -> Playing | None:
@@ -107,11 +113,6 @@ class RobotVoice:
         """Return what the microphone heard without what the robot says; None while that waits."""
         return self._echo.clean(block)
 
-    def barge_in(self, stamp_ns: int) -> None:
-        """Fall silent: a person has spoken into what the robot says, from `stamp_ns` on."""
-        late_s = (self._clock.now_ns() - stamp_ns) / NS_PER_S
-        self.fall_silent(f"somebody spoke, noticed after {late_s:.2f} s")
-
     def fall_silent(self, reason: str) -> None:
         """Break off what is being said and drop what waits."""
         self._drop(lambda _: True, reason)
@@ -121,15 +122,7 @@ class RobotVoice:
         """Return what `speech_status` tells under "voice"."""
         why = self._missing or self._player.away
         state = "missing" if self._missing else "away" if why else "ready"
-        return {
-            "state": state,
-            "why": why,
-            "engine": self._engine.name,
-            "volume": self._volume_ratio,
-            "waiting": len(self._waiting),
-            "echo_reduction_db": round(self._echo.reduction_db, 1),
-            "counts": dict(self._counts),
-        }
+        return {"state": state, "why": why, "waiting": len(self._waiting)}
 
     def close(self) -> None:
         """Fall silent and release everything; closing twice is allowed."""
@@ -137,33 +130,35 @@ class RobotVoice:
         self._player.close()
         self._aside.shutdown(wait=False, cancel_futures=True)
 
-    def _take(self, payload: dict[str, Any], stamp_ns: int) -> None:
-        try:
-            order = read_order(payload, stamp_ns)
-        except OrderRefused as error:
-            _log.warning("say: %s", error)
-            self._publish(str(payload.get("say_id", ""))[:LONGEST_ID], "failed", str(error))
-            return
-        said = None if self._saying is None else self._saying.order
-        if order.withdraws:
-            self._drop(lambda waiting: waiting.say_id == order.say_id, "it was taken back")
-            if said is not None and said.say_id == order.say_id:
-                self._break_off("it was taken back")
-            return
-        if order.interrupt and said is not None and order.priority >= said.priority:
-            self._break_off(f"{order.say_id} came first")
-        dropped = self._waiting.add(order)
-        if dropped is not None:
-            self._publish(dropped.say_id, "dropped", "too much waits to be said")
+    def _take(self, payload: Mapping[str, Any], given_ns: int) -> None:
+        say_id, fault = str(payload.get("say_id", ""))[:LONGEST_ID], _fault(payload)
+        if fault:
+            _log.warning("say: %s", fault)
+            self._publish(say_id, "failed", fault)
+        elif payload.get("cancel") is True:
+            self._take_back(say_id)
+        elif len(self._waiting) == MOST_WAITING:
+            self._publish(say_id, "dropped", "too much waits to be said")
+        else:
+            text = _spoken(payload["text"])
+            self._waiting.append(_Order(say_id=say_id, text=text, given_ns=given_ns))
 
-    def _drop(self, is_dropped: Callable[[Order], bool], reason: str) -> None:
-        for order in self._waiting.drop(is_dropped):
+    def _take_back(self, say_id: str) -> None:
+        reason = "it was taken back"
+        self._drop(lambda waiting: waiting.say_id == say_id, reason)
+        if self._saying is not None and self._saying.order.say_id == say_id:
+            self._break_off(reason)
+
+    def _drop(self, is_dropped: Callable[[_Order], bool], reason: str) -> None:
+        dropped = [order for order in self._waiting if is_dropped(order)]
+        self._waiting = [order for order in self._waiting if order not in dropped]
+        for order in dropped:
             self._publish(order.say_id, "dropped", reason)
 
     def _begin_next(self) -> None:
-        order = self._waiting.take()
-        if order is None:
+        if not self._waiting:
             return
+        order = self._waiting.pop(0)
         format_ = self._player.format
         if format_ is None or self._player.away:
             self._publish(order.say_id, "failed", self._player.away)
@@ -188,8 +183,7 @@ class RobotVoice:
             self._sounding = saying.order
             self._publish(saying.order.say_id, "began", "")
         elif self._player.is_done:
-            cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
-            self._end(saying, "finished", cut)
+            self._end(saying, "finished", "")
 
     def _play_once_prepared(self, saying: _Saying) -> None:
         if not saying.prepared.done():
@@ -222,8 +216,23 @@ class RobotVoice:
             _log.error("degraded: the robot has no voice: %s", error)
 
     def _publish(self, say_id: str, event: str, reason: str) -> None:
-        self._counts[event] += 1
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
+
+
+def _fault(payload: Mapping[str, Any]) -> str:
+    """Return why a message of the topic `say` asks for nothing; empty where it does."""
+    say_id, text = payload.get("say_id"), payload.get("text")
+    if not isinstance(say_id, str) or not 0 < len(say_id) <= LONGEST_ID:
+        return f"say_id: expected 1..{LONGEST_ID} letters, got {say_id!r:.100}"
+    if payload.get("cancel") is not True and not (isinstance(text, str) and text.strip()):
+        return f"text: expected words, got {text!r:.100}"
+    return ""
+
+
+def _spoken(text: str) -> str:
+    """Return a text as it is said; `red_cup` is two words."""
+    said = " ".join(text.replace("_", " ").split())
+    return said if len(said) <= LONGEST_LETTERS else said[:LONGEST_LETTERS].rsplit(" ", 1)[0]
 
 
 def build_voice(
