@@ -17,7 +17,7 @@ from vla_deploy.speech.errors import EngineMissing, VoiceError
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.tts import Engine, chosen_engine
+from vla_deploy.speech.voice.tts import ESPEAK, EspeakEngine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""
@@ -60,7 +60,7 @@ class RobotVoice:
 
     def __init__(
         self,
-        engine: Engine,
+        engine: EspeakEngine,
         open_output: OpenOutput,
         clock: Clock,
         aside: Executor,
@@ -241,5 +241,10 @@ def build_voice(
     """Return the voice of a robot; None where it has no speaker."""
     if open_output is None:
         return None
-    engine = chosen_engine(settings)
+    engine = EspeakEngine(
+        voice=settings.voice,
+        words_per_minute=settings.words_per_minute,
+        pitch=settings.pitch,
+        program=settings.program or ESPEAK,
+    )
     return RobotVoice(engine, open_output, clock, aside, volume_ratio=settings.volume_ratio)
