@@ -115,12 +115,9 @@ def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) 
 def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
     reading = recogniser.read(clip.samples)
     sure = confidence(reading, recogniser.declared.calibration)
-    phrase = Phrase(
-        number=1, began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S),
-        voiced_s=clip.duration_s, clipped_ratio=0.0, voice=1.0, samples=clip.samples,
-    )  # fmt: skip
+    phrase = Phrase(began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S), samples=clip.samples)
     case = SpokenCase(
-        transcript=reading, phrase=phrase, confidence=sure, least_confidence=least,
+        transcript=reading, confidence=sure, least_confidence=least,
         languages=recogniser.declared.languages,
     )  # fmt: skip
     return HeardPhrase(phrase=phrase, transcript=reading, confidence=sure, judgement=judge(case))

@@ -47,8 +47,7 @@ def arrival(
     that falls with frequency as that of rooms does.
 
     Raises:
-        EngineMissing: the talker's program or voice is not here.
-        SynthesisFailed: it gives no sound.
+        VoiceError: the talker's words do not become sound.
     """
     dry = _levelled(_trimmed(talker.engine.synthesise(text).at_rate(rate_hz)), acoustics.talker_rms)
     response = path(talker.distance_m, rate_hz, acoustics, seed)

@@ -151,7 +151,7 @@ def _auroc(scores: "np.ndarray[Any, Any]", right: "np.ndarray[Any, Any]") -> flo
 def speed(reads: Sequence[Read]) -> dict[str, float]:
     """Return what reading costs: CPU time per time of sound, and how long one waits for it."""
     took_s = np.array([one.reading.took_s for one in reads])
-    lasted_s = np.array([one.reading.duration_s for one in reads])
+    lasted_s = np.array([one.clip.duration_s for one in reads])
     cpu_s = sum(one.cpu_s for one in reads)
     return {
         "real_time_factor": float(cpu_s / lasted_s.sum()),

@@ -23,8 +23,8 @@ from vla_deploy.speech.event_publisher import evidence
 from vla_deploy.speech.microphone import Microphone, linked_microphone
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
-from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
+from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
+from vla_deploy.speech.sound import Sound, count_of
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -60,8 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     recogniser = selected.recogniser
     if recogniser is None:
         raise SpeechError(selected.why)
-    for notice in recogniser.notices:
-        print(f"vla-deploy: degraded: {notice}", file=sys.stderr)
+    if selected.why:
+        print(f"vla-deploy: degraded: {selected.why}", file=sys.stderr)
     clock = StreamClock()
     live: Clock = MonotonicClock()
     used = live if arguments.microphone else clock
@@ -96,12 +96,9 @@ def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
 
 def _heard(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
     """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
-    padded = np.concatenate((sound, np.zeros(count_of(_AFTER_S), np.float32)))
-    for at in range(0, len(padded), BLOCK):
-        samples = padded[at : at + BLOCK]
-        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
-        clock.ns = block.end_ns
-        hearing.feed(block, None)
+    for frame in frames_of(np.pad(sound, (0, count_of(_AFTER_S)))):
+        clock.ns = frame.end_ns
+        hearing.feed(frame, None)
         yield from hearing.heard()
 
 
@@ -134,11 +131,10 @@ def _live(
         CommandFailed: the microphone is not there.
     """
     while clock.now_ns() < deadline_ns:
-        block = microphone.poll()
-        if block is not None:
-            hearing.feed(block, None)
+        for frame in microphone.poll():
+            hearing.feed(frame, None)
             yield from hearing.heard()
-        elif microphone.away:
+        if microphone.away:
             raise CommandFailed(microphone.away)
         clock.sleep_until(clock.now_ns() + _STEP_NS)
 

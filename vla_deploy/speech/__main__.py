@@ -37,7 +37,7 @@ def build(context: NodeContext) -> SpeechNode:
         beside("recogniser", clock, RECOGNITION_S),
         beside("loader", clock, LOADING_S),
         voice=voice,
-        stop_words=build_stop_words(context, profile, voice),
+        stop_words=build_stop_words(context, profile),
         page_stop_words=build_stop_words(context, profile, place=PAGE),
     )
 

@@ -4,9 +4,7 @@ SpeechError
 ├── SpeechMissing         the `speech` extra is not installed: install it
 ├── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
 ├── SpotterMismatch       the model is not one that the spotter of stop words can run
-└── VoiceError
-    ├── EngineMissing     the program that speaks, or its voice, is not here: install it
-    └── SynthesisFailed   the program ran and gave no sound: its own words are in the message
+└── VoiceError            a text became no sound: the program's own words are in the message
 """
 
 from importlib import import_module
@@ -30,14 +28,6 @@ class SpotterMismatch(SpeechError):
 
 
 class VoiceError(SpeechError):
-    """Base of everything that keeps the robot silent."""
-
-
-class EngineMissing(VoiceError):
-    """Say which program or voice is missing, and how to get it."""
-
-
-class SynthesisFailed(VoiceError):
     """Say why a text did not become sound."""
 
 

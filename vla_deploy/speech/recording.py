@@ -1,17 +1,17 @@
 """Hear without a process around it: a recording, or a microphone of the command line."""
 
-from typing import Final
+from collections.abc import Iterator
+
+import numpy as np
 
 from drivers.clock import Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.speech.asr_pipeline import AsrPipeline
 from vla_deploy.speech.model_selection import SelectedRecogniser
-from vla_deploy.speech.sound import count_of
+from vla_deploy.speech.sound import FRAME, Sound, SoundBlock, duration_ns
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
-
-BLOCK: Final = count_of(0.02)
 
 
 class StreamClock:
@@ -27,6 +27,14 @@ class StreamClock:
     def sleep_until(self, deadline_ns: int) -> None:
         """Jump to the deadline."""
         self.ns = max(self.ns, deadline_ns)
+
+
+def frames_of(sound: Sound, before: int = 0) -> Iterator[SoundBlock]:
+    """Cut a recording, with silence behind it; `before` samples of other sound came before it."""
+    padded = np.pad(sound, (0, -len(sound) % FRAME))
+    for at in range(0, len(padded), FRAME):
+        stamp_ns = duration_ns(before + at)
+        yield SoundBlock(stamp_ns=stamp_ns, samples=padded[at : at + FRAME], follows=at > 0)
 
 
 def open_hearing(selected: SelectedRecogniser, profile: Profile, clock: Clock) -> AsrPipeline:

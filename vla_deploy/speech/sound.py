@@ -1,6 +1,6 @@
-"""Say what sound is inside the speech process: one channel at 16 kHz, in stamped blocks or frames.
+"""Say what sound is inside the speech process: one channel at 16 kHz, in stamped frames.
 
-A device gives blocks of any length; the networks take frames of 512 samples, 32 ms.
+A device gives blocks of any length; all that listens takes frames of 512 samples, 32 ms.
 """
 
 from collections.abc import Iterator

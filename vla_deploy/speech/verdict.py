@@ -11,7 +11,6 @@ from difflib import SequenceMatcher
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.transcript import Transcript
 from vla_deploy.speech.words import STOPS, holds_stop, is_courtesy, is_stop, words_of
 
@@ -21,16 +20,12 @@ STOP_WITHIN_CONFIDENCE: Final = 0.5
 """The same, of a stop word among others: below that, other talk is often misread as one."""
 MOST_COMPRESSION: Final = 2.4
 NO_SPEECH: Final = 0.8
-CLIPPED_RATIO: Final = 0.01
 OWN_RUN: Final = 4
 OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
 OWN_VOICE: Final = "the robot heard itself"
-_OVERDRIVEN: Final = (
-    "; the microphone is overdriven: turn its gain down, or speak from farther away"
-)
 
 
 class Verdict(StrEnum):
@@ -44,10 +39,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Hold all that a phrase is judged by."""
+    """Hold all that a phrase is judged by; `own_words` are what the robot was saying."""
 
     transcript: Transcript
-    phrase: Phrase
+    own_words: str = ""
     confidence: float
     least_confidence: float
     languages: tuple[str, ...]
@@ -80,11 +75,13 @@ def judge(case: Case) -> Judgement:
     for why, ask_again in _REFUSALS:
         reason = why(case)
         if reason:
-            makes_sense = case.confidence >= DOUBT_RATIO * case.least_confidence
-            is_doubted = why is _unsure and makes_sense
-            verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
-            return Judgement(verdict=verdict, reason=reason, ask_again=ask_again)
-    return Judgement(verdict=Verdict.ACCEPTED)
+            return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=ask_again)
+    sure, least = case.confidence, case.least_confidence
+    if sure >= least:
+        return Judgement(verdict=Verdict.ACCEPTED)
+    verdict = Verdict.DOUBTED if sure >= DOUBT_RATIO * least else Verdict.REJECTED
+    reason = f"understood by {sure:.0%}, at least {least:.0%} is needed"
+    return Judgement(verdict=verdict, reason=reason, ask_again=True)
 
 
 def _without_words(case: Case) -> str:
@@ -98,7 +95,7 @@ def _courtesy(case: Case) -> str:
 
 def _own_voice(case: Case) -> str:
     """Know an echo by words in the robot's order: an answer takes up some of them, in its own."""
-    words, own = words_of(case.transcript.text), words_of(case.phrase.own_words)
+    words, own = words_of(case.transcript.text), words_of(case.own_words)
     blocks = SequenceMatcher(None, own, words, autojunk=False).get_matching_blocks()
     runs = [block.size for block in blocks]
     is_echo = words == own or max(runs) >= OWN_RUN
@@ -124,19 +121,11 @@ def _made_up(case: Case) -> str:
     return ""
 
 
-def _unsure(case: Case) -> str:
-    if case.confidence >= case.least_confidence:
-        return ""
-    reason = f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
-    return reason + (_OVERDRIVEN if case.phrase.clipped_ratio > CLIPPED_RATIO else "")
-
-
 _REFUSALS: Final[tuple[tuple[Callable[[Case], str], bool], ...]] = (
     (_without_words, False),
     (_courtesy, False),
     (_own_voice, False),
     (_language, True),
     (_made_up, False),
-    (_unsure, True),
 )
-"""What may be said against a phrase, and whether to ask for it again."""
+"""What may be said against a phrase besides doubt, and whether to ask for it again."""

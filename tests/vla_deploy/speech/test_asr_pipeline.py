@@ -49,8 +49,6 @@ class Reader:
             no_speech=0.0,
             compression=1.0,
             language="en",
-            duration_s=1.0,
-            took_s=0.0,
         )
 
 

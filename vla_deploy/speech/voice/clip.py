@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
-from vla_deploy.speech.errors import SynthesisFailed
+from vla_deploy.speech.errors import VoiceError
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""
@@ -55,7 +55,7 @@ def read_wav_stream(data: bytes) -> Clip:
     """Return the sound of a WAV from a pipe: to the end of what is there, as its header knows none.
 
     Raises:
-        SynthesisFailed: it is no WAV of 16-bit samples of one channel, or has none.
+        VoiceError: it is no WAV of 16-bit samples of one channel, or has none.
     """
     try:
         told = data[:4] + struct.pack("<I", len(data)) + data[8:]
@@ -63,10 +63,10 @@ def read_wav_stream(data: bytes) -> Clip:
             form = sound.getsampwidth(), sound.getnchannels()
             rate_hz, rows = sound.getframerate(), sound.readframes(len(data))
     except (wave.Error, EOFError) as error:
-        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}: {error}") from error
+        raise VoiceError(f"expected a WAV, got {data[:12]!r}: {error}") from error
     samples = np.frombuffer(rows[: len(rows) // 2 * 2], "<i2")
     if form != _MONO_16_BIT or not len(samples):
-        raise SynthesisFailed(
+        raise VoiceError(
             f"expected 16-bit samples of one channel, got {len(samples)} samples of "
             f"{8 * form[0]} bits on {form[1]} channels"
         )

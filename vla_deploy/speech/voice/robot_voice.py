@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.description import VoiceSettings
-from vla_deploy.speech.errors import EngineMissing, VoiceError
+from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
@@ -27,27 +27,19 @@ LONGEST_ID: Final = 80
 MOST_WAITING: Final = 16
 LONGEST_WAIT_NS: Final = 20 * NS_PER_S
 """News that old is none any more."""
-_FIRST_WORDS: Final = "hello"
 _REASON_LETTERS: Final = 200  # of any alphabet, a slot holds them
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Order:
-    """Ask for a text to be said."""
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Saying:
+    """Hold what waits to be said, or is: it is in preparation first, then it plays."""
 
     say_id: str
     text: str
     given_ns: int
-
-
-@dataclass(slots=True, kw_only=True)
-class _Saying:
-    """Hold what is being said: it is in preparation first, and `sound` comes with its end."""
-
-    order: _Order
-    prepared: "Future[PreparedSound]"
-    sound: PreparedSound | None = None
+    prepared: "Future[PreparedSound] | None" = None
+    is_played: bool = False
     has_begun: bool = False
 
 
@@ -73,25 +65,27 @@ class RobotVoice:
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
         self._player = AudioPlayer(open_output, clock, self._echo.note)
-        self._waiting: list[_Order] = []
+        self._waiting: list[_Saying] = []
         self._saying: _Saying | None = None
-        self._sounding: _Order | None = None
+        self._sounding: _Saying | None = None
         self._missing = ""
 
     @property
     def playing(self) -> Playing | None:
         """Return what sounds at this moment, the room's answer to it included."""
-        order, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
-        if order is None or self._clock.now_ns() >= until_ns:
+        saying, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
+        if saying is None or self._clock.now_ns() >= until_ns:
             return None
-        return Playing(say_id=order.say_id, text=order.text, echo_db=self._echo.left_db)
+        return Playing(say_id=saying.say_id, text=saying.text, echo_db=self._echo.left_db)
 
     def start(self, space: SharedSpace) -> None:
-        """Open the topics, and try the engine for the first time."""
+        """Open the topics, and look for the engine."""
         self._orders = space.ring_reader("say", from_start=False)
         self._operator = space.ring_reader("operator", from_start=False)
         self._events = space.ring_writer("voice_event")
-        self._aside.submit(self._engine.synthesise, _FIRST_WORDS).add_done_callback(self._tried)
+        self._missing = self._engine.missing()
+        if self._missing:
+            _log.error("degraded: the robot has no voice: %s", self._missing)
 
     def step(self) -> None:
         """Take what is to be said, and hand the speaker what it has room for."""
@@ -102,16 +96,16 @@ class RobotVoice:
             self._take(event.payload, event.stamp_ns)
         oldest_ns = self._clock.now_ns() - LONGEST_WAIT_NS
         waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
-        self._drop(lambda order: order.given_ns < oldest_ns, waited)
+        self._drop(lambda waiting: waiting.given_ns < oldest_ns, waited)
         if self._saying is None:
             self._begin_next()
         self._player.step()
         if self._saying is not None:
             self._advance(self._saying)
 
-    def cleaned(self, block: SoundBlock) -> SoundBlock | None:
-        """Return what the microphone heard without what the robot says; None while that waits."""
-        return self._echo.clean(block)
+    def cleaned(self, frame: SoundBlock) -> SoundBlock:
+        """Return a frame of the microphone without what the robot says."""
+        return self._echo.clean(frame)
 
     def fall_silent(self, reason: str) -> None:
         """Break off what is being said and drop what waits."""
@@ -131,41 +125,37 @@ class RobotVoice:
         self._aside.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, payload: Mapping[str, Any], given_ns: int) -> None:
-        say_id, fault = str(payload.get("say_id", ""))[:LONGEST_ID], _fault(payload)
-        if fault:
-            _log.warning("say: %s", fault)
-            self._publish(say_id, "failed", fault)
-        elif payload.get("cancel") is True:
+        say_id, text = str(payload.get("say_id", ""))[:LONGEST_ID], payload.get("text")
+        if payload.get("cancel") is True:
             self._take_back(say_id)
+        elif not isinstance(text, str) or not text.strip():
+            self._publish(say_id, "failed", f"text: expected words, got {text!r:.100}")
         elif len(self._waiting) == MOST_WAITING:
             self._publish(say_id, "dropped", "too much waits to be said")
         else:
-            text = _spoken(payload["text"])
-            self._waiting.append(_Order(say_id=say_id, text=text, given_ns=given_ns))
+            self._waiting.append(_Saying(say_id=say_id, text=_spoken(text), given_ns=given_ns))
 
     def _take_back(self, say_id: str) -> None:
         reason = "it was taken back"
         self._drop(lambda waiting: waiting.say_id == say_id, reason)
-        if self._saying is not None and self._saying.order.say_id == say_id:
+        if self._saying is not None and self._saying.say_id == say_id:
             self._break_off(reason)
 
-    def _drop(self, is_dropped: Callable[[_Order], bool], reason: str) -> None:
-        dropped = [order for order in self._waiting if is_dropped(order)]
-        self._waiting = [order for order in self._waiting if order not in dropped]
-        for order in dropped:
-            self._publish(order.say_id, "dropped", reason)
+    def _drop(self, is_dropped: Callable[[_Saying], bool], reason: str) -> None:
+        dropped = [waiting for waiting in self._waiting if is_dropped(waiting)]
+        self._waiting = [waiting for waiting in self._waiting if waiting not in dropped]
+        for waiting in dropped:
+            self._publish(waiting.say_id, "dropped", reason)
 
     def _begin_next(self) -> None:
         if not self._waiting:
             return
-        order = self._waiting.pop(0)
-        format_ = self._player.format
+        saying, format_ = self._waiting.pop(0), self._player.format
         if format_ is None or self._player.away:
-            self._publish(order.say_id, "failed", self._player.away)
+            self._publish(saying.say_id, "failed", self._player.away)
             return
-        self._saying = _Saying(
-            order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
-        )
+        saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
+        self._saying = saying
 
     def _prepare(self, text: str, format_: AudioFormat) -> PreparedSound:
         clip = self._engine.synthesise(text)
@@ -173,29 +163,26 @@ class RobotVoice:
         return PreparedSound(samples=clip.samples(format_, self._volume_ratio), wave=wave)
 
     def _advance(self, saying: _Saying) -> None:
-        if saying.sound is None:
+        if not saying.is_played:
             self._play_once_prepared(saying)
-            return
-        if self._player.away:
+        elif self._player.away:
             self._end(saying, "failed", self._player.away)
         elif not saying.has_begun and self._player.has_begun:
             saying.has_begun = True
-            self._sounding = saying.order
-            self._publish(saying.order.say_id, "began", "")
+            self._sounding = saying
+            self._publish(saying.say_id, "began", "")
         elif self._player.is_done:
             self._end(saying, "finished", "")
 
     def _play_once_prepared(self, saying: _Saying) -> None:
-        if not saying.prepared.done():
+        if saying.prepared is None or not saying.prepared.done():
             return
         try:
-            saying.sound = saying.prepared.result()
+            self._player.play(saying.prepared.result())
         except VoiceError as error:
-            self._missing = str(error) if isinstance(error, EngineMissing) else self._missing
             self._end(saying, "failed", str(error))
             return
-        self._missing = ""
-        self._player.play(saying.sound)
+        saying.is_played = True
         self._player.step()
 
     def _break_off(self, reason: str) -> None:
@@ -206,27 +193,10 @@ class RobotVoice:
     def _end(self, saying: _Saying, event: str, reason: str) -> None:
         self._player.cut()
         self._saying = None
-        self._publish(saying.order.say_id, event, reason)
-
-    def _tried(self, first_words: "Future[Any]") -> None:
-        """Remember why the engine cannot speak; called beside the steps, once."""
-        error = None if first_words.cancelled() else first_words.exception()
-        if isinstance(error, VoiceError):
-            self._missing = str(error)
-            _log.error("degraded: the robot has no voice: %s", error)
+        self._publish(saying.say_id, event, reason)
 
     def _publish(self, say_id: str, event: str, reason: str) -> None:
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
-
-
-def _fault(payload: Mapping[str, Any]) -> str:
-    """Return why a message of the topic `say` asks for nothing; empty where it does."""
-    say_id, text = payload.get("say_id"), payload.get("text")
-    if not isinstance(say_id, str) or not 0 < len(say_id) <= LONGEST_ID:
-        return f"say_id: expected 1..{LONGEST_ID} letters, got {say_id!r:.100}"
-    if payload.get("cancel") is not True and not (isinstance(text, str) and text.strip()):
-        return f"text: expected words, got {text!r:.100}"
-    return ""
 
 
 def _spoken(text: str) -> str:

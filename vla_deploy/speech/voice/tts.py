@@ -1,11 +1,12 @@
 """Turn text into sound by eSpeak NG: a process of its own, as it is under the GPL."""
 
+import shutil
 import subprocess
 from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.voice.clip import Clip, read_wav_stream
 
 TIMEOUT_S: Final = 10.0
@@ -22,17 +23,15 @@ class EspeakEngine:
     pitch: int = 50
     program: str = ESPEAK
 
-    @property
-    def name(self) -> str:
-        """Return the engine and its voice, for people."""
-        return f"eSpeak NG, {self.voice}"
+    def missing(self) -> str:
+        """Return why it cannot speak, and what to do; empty where it is installed."""
+        return "" if shutil.which(self.program) else f"{self.program}: no such program; {_REMEDY}"
 
     def synthesise(self, text: str) -> Clip:
         """Return the sound of a text, after some 20 to 100 ms.
 
         Raises:
-            EngineMissing: eSpeak NG is not installed.
-            SynthesisFailed: it has no such voice, or gives no sound within 10 s.
+            VoiceError: eSpeak NG is not installed, has no such voice, or gives no sound in 10 s.
         """
         words = (
             *(self.program, "--stdin", "--stdout", "-b", "1"),
@@ -45,10 +44,10 @@ class EspeakEngine:
                 words, input=plain.encode(), capture_output=True, timeout=TIMEOUT_S, check=False
             )
         except subprocess.TimeoutExpired as error:
-            raise SynthesisFailed(f"{self.program}: no sound within {TIMEOUT_S:g} s") from error
+            raise VoiceError(f"{self.program}: no sound within {TIMEOUT_S:g} s") from error
         except OSError as error:
-            raise EngineMissing(f"{self.program}: {error.strerror}; {_REMEDY}") from error
+            raise VoiceError(f"{self.program}: {error.strerror}; {_REMEDY}") from error
         if ran.returncode:
             told = one_line(ran.stderr.decode(errors="replace")) or "it says nothing"
-            raise SynthesisFailed(f"{self.program} ended with {ran.returncode}: {told}")
+            raise VoiceError(f"{self.program} ended with {ran.returncode}: {told}")
         return read_wav_stream(ran.stdout)

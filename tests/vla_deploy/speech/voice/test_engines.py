@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
-from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.voice.clip import Clip, read_wav_stream
 from vla_deploy.speech.voice.tts import EspeakEngine
 
@@ -47,15 +47,15 @@ def test_text_is_never_taken_for_an_option_or_for_phonemes() -> None:
 
 
 def test_a_missing_program_says_how_to_get_it(tmp_path: Path) -> None:
-    with pytest.raises(EngineMissing, match="apt install espeak-ng"):
+    with pytest.raises(VoiceError, match="apt install espeak-ng"):
         EspeakEngine(program=str(tmp_path / "none")).synthesise("hello")
     (tmp_path / "plain").write_text("text")
-    with pytest.raises(EngineMissing, match="Permission denied"):
+    with pytest.raises(VoiceError, match="Permission denied"):
         EspeakEngine(program=str(tmp_path / "plain")).synthesise("hello")
 
 
 def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
-    with pytest.raises(SynthesisFailed, match="voice does not exist"):
+    with pytest.raises(VoiceError, match="voice does not exist"):
         EspeakEngine(voice="klingon-orc").synthesise("hello")
 
 
@@ -71,7 +71,7 @@ def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
     ],
 )
 def test_what_is_no_sound_is_refused(data: bytes, told: str) -> None:
-    with pytest.raises(SynthesisFailed, match=told):
+    with pytest.raises(VoiceError, match=told):
         read_wav_stream(data)
 
 

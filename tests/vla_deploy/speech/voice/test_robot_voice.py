@@ -41,13 +41,12 @@ def test_a_person_who_speaks_silences_the_voice_within_its_lead(rig: VoiceRig) -
     rig.say("next", "and more")
     rig.run_until("long", "began")
     rig.run(0.5)
-    rig.speaker.said()
     rig.voice.fall_silent("somebody spoke")
+    rig.speaker.said()
     rig.run(2.0)
     assert rig.events[1:] == [("next", "dropped"), ("long", "interrupted")]
     assert rig.reasons["long"] == "somebody spoke"
-    fade_rows = len(rig.speaker.said())
-    assert 0 < fade_rows <= 0.01 * rig.format.rate_hz
+    assert len(rig.speaker.said()) == 0, "no more was handed over than had to be"
 
 
 def test_an_emergency_stop_silences_the_voice(rig: VoiceRig) -> None:
@@ -126,24 +125,12 @@ def test_a_text_without_end_is_cut(rig: VoiceRig) -> None:
     rig.run_until("endless", "finished", at_most_s=60.0)
 
 
-@pytest.mark.parametrize(
-    ("message", "told"),
-    [
-        ({"say_id": "x"}, "text: expected words"),
-        ({"say_id": "x", "text": "  "}, "text: expected words"),
-        ({"say_id": "x", "text": 7}, "text: expected words"),
-        ({"say_id": "x" * 90, "text": "hi"}, "say_id"),
-        ({"text": "hi"}, "say_id"),
-    ],
-)
-def test_what_is_no_order_fails_with_the_reason(
-    rig: VoiceRig, message: dict[str, Any], told: str
-) -> None:
-    rig.publish(message)
+@pytest.mark.parametrize("message", [{}, {"text": "  "}, {"text": 7}])
+def test_what_has_no_words_fails_with_the_reason(rig: VoiceRig, message: dict[str, Any]) -> None:
+    rig.publish({"say_id": "x", **message})
     rig.run(0.1)
-    ((say_id, event),) = rig.events
-    assert event == "failed"
-    assert told in rig.reasons[say_id]
+    assert rig.events == [("x", "failed")]
+    assert "text: expected words" in rig.reasons["x"]
 
 
 def test_without_an_engine_everything_fails_with_the_remedy(
