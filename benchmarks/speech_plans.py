@@ -29,8 +29,6 @@ from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import utterance
 from vla_deploy.speech.recogniser import Recogniser
-from vla_deploy.speech.transcript import confidence
-from vla_deploy.speech.verdict import Case as SpokenCase
 from vla_deploy.speech.verdict import Verdict, judge
 
 Random = np.random.Generator
@@ -114,13 +112,8 @@ def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) 
 
 def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
     reading = recogniser.read(clip.samples)
-    sure = confidence(reading, recogniser.declared.calibration)
     phrase = Phrase(began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S), samples=clip.samples)
-    case = SpokenCase(
-        transcript=reading, confidence=sure, least_confidence=least,
-        languages=recogniser.declared.languages,
-    )  # fmt: skip
-    return HeardPhrase(phrase=phrase, transcript=reading, confidence=sure, judgement=judge(case))
+    return HeardPhrase(phrase=phrase, transcript=reading, judgement=judge(reading, "", least))
 
 
 def _share(

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -20,7 +21,7 @@ from vla_deploy.robots.links import device_links
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import evidence
-from vla_deploy.speech.microphone import Microphone, linked_microphone
+from vla_deploy.speech.microphone import Microphone, linked
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.model_tools.benching import sound_of
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
@@ -105,7 +106,7 @@ def _heard(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[H
 def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -> int:
     """Follow the microphone until its time is over, or Ctrl-C."""
     robot = load_robot(arguments.robot)
-    opened = linked_microphone(robot, device_links(robot), clock)
+    opened = linked(robot.microphone, open_audio_input, device_links(robot), clock)
     if opened is None:
         raise UsageError(f"robot {robot.name} has no [microphone]; hear a FILE.wav instead")
     microphone = Microphone("microphone", opened, clock)

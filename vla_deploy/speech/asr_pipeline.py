@@ -8,9 +8,9 @@ from platforms import SpeechSettings
 from vla_deploy.speech.echo_gate import EchoGate
 from vla_deploy.speech.endpointing import Endpointer, Phrase, VadEventKind
 from vla_deploy.speech.sound import Playing, SoundBlock
-from vla_deploy.speech.transcript import Transcript, confidence
+from vla_deploy.speech.transcript import Transcript
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
-from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge, stops
+from vla_deploy.speech.verdict import Judgement, Verdict, judge, stops
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
 
@@ -23,8 +23,12 @@ class HeardPhrase:
 
     phrase: Phrase
     transcript: Transcript | None
-    confidence: float
     judgement: Judgement
+
+    @property
+    def confidence(self) -> float:
+        """Return how probably its words are right."""
+        return 0.0 if self.transcript is None else self.transcript.confidence
 
     @property
     def text(self) -> str:
@@ -112,46 +116,25 @@ class AsrPipeline:
             return
         if self._stops(phrase, transcript):
             self._stopped_ns = phrase.began_ns
-            yield self._heard(phrase, transcript, Judgement(verdict=Verdict.STOP))
+            stop = Judgement(verdict=Verdict.STOP)
+            yield HeardPhrase(phrase=phrase, transcript=transcript, judgement=stop)
         elif self.endpointer.is_open and is_unfinished(transcript.text):
             self.endpointer.wait_longer()
 
     def _judged(self, phrase: Phrase, transcript: Transcript | None, trouble: str) -> HeardPhrase:
         """Return what becomes of a phrase that has ended."""
-        recogniser = self.queue.recogniser
-        if transcript is None or recogniser is None:
-            return self._heard(phrase, None, Judgement(verdict=Verdict.REJECTED, reason=trouble))
-        if phrase.began_ns == self._stopped_ns:
+        if transcript is None:
+            judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble)
+        elif phrase.began_ns == self._stopped_ns:
             judgement = Judgement(verdict=Verdict.REJECTED, reason=STOPPED)
         elif self._stops(phrase, transcript):
             judgement = Judgement(verdict=Verdict.STOP)
         elif trouble:
             judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble, ask_again=True)
         else:
-            case = Case(
-                transcript=transcript,
-                own_words=phrase.own_words,
-                confidence=self._confidence(transcript),
-                least_confidence=self.endpointer.settings.least_confidence,
-                languages=recogniser.declared.languages,
-            )
-            judgement = judge(case)
-        return self._heard(phrase, transcript, judgement)
+            least = self.endpointer.settings.least_confidence
+            judgement = judge(transcript, phrase.own_words, least)
+        return HeardPhrase(phrase=phrase, transcript=transcript, judgement=judgement)
 
     def _stops(self, phrase: Phrase, transcript: Transcript) -> bool:
-        sure = self._confidence(transcript)
-        return stops(transcript.text, sure, phrase.own_words, self._names)
-
-    def _confidence(self, transcript: Transcript | None) -> float:
-        recogniser = self.queue.recogniser
-        if transcript is None or recogniser is None:
-            return 0.0
-        return confidence(transcript, recogniser.declared.calibration)
-
-    def _heard(
-        self, phrase: Phrase, transcript: Transcript | None, judgement: Judgement
-    ) -> HeardPhrase:
-        sure = self._confidence(transcript)
-        return HeardPhrase(
-            phrase=phrase, transcript=transcript, confidence=sure, judgement=judgement
-        )
+        return stops(transcript.text, transcript.confidence, phrase.own_words, self._names)

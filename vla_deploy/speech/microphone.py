@@ -2,20 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from drivers.audio.base import FULL_SCALE, AudioBlock, AudioFormat, AudioInput, Samples
-from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock
 from drivers.errors import DriverError
 from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.robots.description import Audio, RobotDescription
+from vla_deploy.robots.description import Audio
 from vla_deploy.speech.errors import SpeechMissing, import_extra
 from vla_deploy.speech.sound import RATE_HZ, Framer, Sound, SoundBlock
 
+T = TypeVar("T")
 OpenInput = Callable[[], AudioInput]
 SILENT_NS: Final = 2 * NS_PER_S
 """A device that is there and gives nothing for so long is said to be silent."""
@@ -105,14 +105,16 @@ class Microphone:
         return SoundBlock(stamp_ns=block.stamp_ns, samples=samples, follows=follows)
 
 
-def linked_microphone(
-    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
-) -> OpenInput | None:
-    """Return how to open the microphone by the path of its link; None where there is none."""
-    audio = robot.microphone
+def linked(
+    audio: Audio | None,
+    opened: Callable[[str, Clock, AudioFormat], T],
+    links: Mapping[str, DeviceLink],
+    clock: Clock,
+) -> Callable[[], T] | None:
+    """Return how to open a microphone or a speaker by its link's path; None where there is none."""
     if audio is None:
         return None
-    return partial(open_audio_input, links[audio.device].path, clock, format_of(audio))
+    return partial(opened, links[audio.device].path, clock, format_of(audio))
 
 
 def format_of(audio: Audio) -> AudioFormat:

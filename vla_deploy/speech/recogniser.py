@@ -19,7 +19,7 @@ from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.sound import RATE_HZ, Sound
-from vla_deploy.speech.transcript import Transcript
+from vla_deploy.speech.transcript import Transcript, confidence
 
 _COMPUTE: Final = {
     (CPU, "int8"): "int8",
@@ -74,7 +74,11 @@ class Recogniser:
             )
         except _MODEL_ERRORS as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
-        return replace(transcript, took_s=(self._clock.now_ns() - started_ns) / NS_PER_S)
+        return replace(
+            transcript,
+            confidence=confidence(transcript, self.declared.calibration),
+            took_s=(self._clock.now_ns() - started_ns) / NS_PER_S,
+        )
 
     def close(self) -> None:
         """Release the memory; closing twice is allowed."""

@@ -21,7 +21,8 @@ class Transcript:
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
     as far as the model knows several. `others` is what may have been said instead, the likeliest
-    first, each with its probability over that of `text`.
+    first, each with its probability over that of `text`; `confidence` how probably the words are
+    right. A phrase `is_foreign` that was spoken in a language which nobody declared.
     """
 
     text: str
@@ -30,6 +31,8 @@ class Transcript:
     compression: float
     language: str
     others: tuple[tuple[str, float], ...] = ()
+    is_foreign: bool = False
+    confidence: float = 0.0
     took_s: float = 0.0
 
 

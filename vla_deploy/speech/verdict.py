@@ -38,17 +38,6 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """Hold all that a phrase is judged by; `own_words` are what the robot was saying."""
-
-    transcript: Transcript
-    own_words: str = ""
-    confidence: float
-    least_confidence: float
-    languages: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """Say what becomes of a phrase, why, and whether asking again may help."""
 
@@ -70,13 +59,13 @@ def stops(text: str, confidence: float, own_words: str = "", names: Set[str] = f
     return holds_stop(text) and confidence >= STOP_WITHIN_CONFIDENCE
 
 
-def judge(case: Case) -> Judgement:
-    """Return what becomes of a phrase that is no stop."""
+def judge(transcript: Transcript, own_words: str, least_confidence: float) -> Judgement:
+    """Return what becomes of words that are no stop, while the robot was saying `own_words`."""
     for why, ask_again in _REFUSALS:
-        reason = why(case)
+        reason = why(transcript, own_words)
         if reason:
             return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=ask_again)
-    sure, least = case.confidence, case.least_confidence
+    sure, least = transcript.confidence, least_confidence
     if sure >= least:
         return Judgement(verdict=Verdict.ACCEPTED)
     verdict = Verdict.DOUBTED if sure >= DOUBT_RATIO * least else Verdict.REJECTED
@@ -84,44 +73,38 @@ def judge(case: Case) -> Judgement:
     return Judgement(verdict=verdict, reason=reason, ask_again=True)
 
 
-def _without_words(case: Case) -> str:
-    return "" if words_of(case.transcript.text) else "a sound without words"
+def _without_words(transcript: Transcript, _: str) -> str:
+    return "" if words_of(transcript.text) else "a sound without words"
 
 
-def _courtesy(case: Case) -> str:
-    is_one = is_courtesy(case.transcript.text)
-    return "a courtesy: nothing to do, nothing to answer" if is_one else ""
+def _courtesy(transcript: Transcript, _: str) -> str:
+    return "a courtesy: nothing to do or to answer" if is_courtesy(transcript.text) else ""
 
 
-def _own_voice(case: Case) -> str:
+def _own_voice(transcript: Transcript, own_words: str) -> str:
     """Know an echo by words in the robot's order: an answer takes up some of them, in its own."""
-    words, own = words_of(case.transcript.text), words_of(case.own_words)
+    words, own = words_of(transcript.text), words_of(own_words)
     blocks = SequenceMatcher(None, own, words, autojunk=False).get_matching_blocks()
     runs = [block.size for block in blocks]
     is_echo = words == own or max(runs) >= OWN_RUN
     return OWN_VOICE if is_echo and sum(runs) > OWN_RATIO * len(words) else ""
 
 
-def _language(case: Case) -> str:
-    spoken = case.transcript.language
-    if spoken in case.languages:
-        return ""
-    return f"spoken in {spoken}, but only {', '.join(case.languages)} is understood"
+def _language(transcript: Transcript, _: str) -> str:
+    spoken = transcript.language
+    return f"spoken in {spoken}, which is not understood" if transcript.is_foreign else ""
 
 
-def _made_up(case: Case) -> str:
+def _made_up(transcript: Transcript, _: str) -> str:
     """Know what networks invent where nobody speaks: they say so, or repeat themselves."""
-    no_speech, compression = case.transcript.no_speech, case.transcript.compression
-    if no_speech > NO_SPEECH:
-        return f"nobody spoke, by {no_speech:.0%}"
-    if compression > MOST_COMPRESSION:
-        return (
-            f"the text repeats itself, compression {compression:.1f} of {MOST_COMPRESSION} at most"
-        )
+    if transcript.no_speech > NO_SPEECH:
+        return f"nobody spoke, by {transcript.no_speech:.0%}"
+    if transcript.compression > MOST_COMPRESSION:
+        return f"the text repeats itself, by {transcript.compression:.1f}"
     return ""
 
 
-_REFUSALS: Final[tuple[tuple[Callable[[Case], str], bool], ...]] = (
+_REFUSALS: Final[tuple[tuple[Callable[[Transcript, str], str], bool], ...]] = (
     (_without_words, False),
     (_courtesy, False),
     (_own_voice, False),

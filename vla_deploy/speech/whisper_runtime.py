@@ -83,6 +83,7 @@ class Whisper:
             compression=get_compression_ratio(text),
             language=language,
             others=others_of(readings),
+            is_foreign=self.model.is_multilingual and language not in languages,
         )
 
     def _window(self, samples: Sound) -> NDArray[np.float32]:

@@ -33,11 +33,11 @@ def heard(
         compression=0.9,
         language="en",
         others=others,
+        confidence=0.83,
     )
     return HeardPhrase(
         phrase=Phrase(began_ns=NS_PER_S // 2, ended_ns=NS_PER_S, samples=NOTHING),
         transcript=reading,
-        confidence=0.83,
         judgement=Judgement(verdict=verdict, reason="because", ask_again=ask_again),
     )
 

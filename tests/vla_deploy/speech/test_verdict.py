@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.speech.transcript import Transcript, confidence
-from vla_deploy.speech.verdict import Case, Verdict, judge, stops
+from vla_deploy.speech.verdict import Judgement, Verdict, judge, stops
 from vla_deploy.speech.words import is_stop, is_unfinished, words_of
 
 TRANSCRIPT = Transcript(
@@ -16,28 +16,29 @@ TRANSCRIPT = Transcript(
     no_speech=0.01,
     compression=0.9,
     language="en",
+    confidence=0.9,
 )
-CASE = Case(transcript=TRANSCRIPT, confidence=0.9, least_confidence=0.5, languages=("en",))
+LEAST = 0.5
 
 
-def case(transcript: Any = None, **changes: Any) -> Case:
-    return replace(CASE, transcript=replace(TRANSCRIPT, **(transcript or {})), **changes)
+def judged(own_words: str = "", **changes: Any) -> Judgement:
+    return judge(replace(TRANSCRIPT, **changes), own_words, LEAST)
 
 
 def test_a_sure_reading_is_a_command() -> None:
-    judgement = judge(CASE)
+    judgement = judged()
     assert (judgement.verdict, judgement.reason) == (Verdict.ACCEPTED, "")
 
 
 @pytest.mark.parametrize(
     ("changed", "reason", "ask_again"),
     [
-        ({"transcript": {"text": " ... "}}, "a sound without words", False),
-        ({"transcript": {"text": "Please. Thank you!"}}, "a courtesy", False),
+        ({"text": " ... "}, "a sound without words", False),
+        ({"text": "Please. Thank you!"}, "a courtesy", False),
         ({"confidence": 0.2}, "understood by 20%, at least 50% is needed", True),
-        ({"transcript": {"language": "fr"}}, "spoken in fr, but only en is understood", True),
-        ({"transcript": {"no_speech": 0.93}}, "nobody spoke, by 93%", False),
-        ({"transcript": {"compression": 4.2}}, "the text repeats itself, compression 4.2", False),
+        ({"language": "fr", "is_foreign": True}, "spoken in fr, which is not understood", True),
+        ({"no_speech": 0.93}, "nobody spoke, by 93%", False),
+        ({"compression": 4.2}, "the text repeats itself, by 4.2", False),
         ({"own_words": "I pick up the red cup"}, "the robot heard itself", False),
         (
             {"own_words": "Shall I go and pick up the red cup, and then the blue one?"},
@@ -49,7 +50,7 @@ def test_a_sure_reading_is_a_command() -> None:
 def test_what_speaks_against_it_is_told(
     changed: dict[str, Any], reason: str, ask_again: bool
 ) -> None:
-    judgement = judge(case(**changed))
+    judgement = judged(**changed)
     assert judgement.verdict is Verdict.REJECTED
     assert reason in judgement.reason
     assert judgement.ask_again is ask_again
@@ -62,11 +63,11 @@ def test_what_speaks_against_it_is_told(
 def test_what_is_only_not_sure_enough_is_for_the_planner_to_make_sense_of(
     confidence: float, verdict: Verdict
 ) -> None:
-    assert judge(case(confidence=confidence)).verdict is verdict
+    assert judged(confidence=confidence).verdict is verdict
 
 
 def test_what_else_speaks_against_it_is_no_doubt() -> None:
-    judgement = judge(case(confidence=0.4, transcript={"no_speech": 0.93}))
+    judgement = judged(confidence=0.4, no_speech=0.93)
     assert judgement.verdict is Verdict.REJECTED
 
 
@@ -83,8 +84,7 @@ def test_what_else_speaks_against_it_is_no_doubt() -> None:
     ],
 )
 def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: str) -> None:
-    spoken = case(transcript={"text": answer}, own_words=said)
-    assert judge(spoken).verdict is Verdict.ACCEPTED
+    assert judged(text=answer, own_words=said).verdict is Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize(
@@ -98,8 +98,7 @@ def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: st
     ],
 )
 def test_what_the_robot_said_itself_is_no_command(said: str, echo: str) -> None:
-    judgement = judge(case(transcript={"text": echo}, own_words=said))
-    assert judgement.reason == "the robot heard itself"
+    assert judged(text=echo, own_words=said).reason == "the robot heard itself"
 
 
 @pytest.mark.parametrize(

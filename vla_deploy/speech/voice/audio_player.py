@@ -3,18 +3,13 @@
 A sound is handed over bit by bit, so that the robot can fall silent at any moment.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 from drivers.audio.base import AudioFormat, AudioOutput, Samples
-from drivers.audio.open_audio import open_audio_output
 from drivers.clock import NS_PER_S, Clock
-from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.robots.description import RobotDescription
-from vla_deploy.speech.microphone import format_of
 from vla_deploy.speech.voice.clip import Wave
 
 LEAD_NS: Final = 3 * NS_PER_S // 20
@@ -100,13 +95,3 @@ class AudioPlayer:
         output = self._open_output()
         self.format = output.format
         return output
-
-
-def linked_speaker(
-    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
-) -> OpenOutput | None:
-    """Return how to open the speaker by the path of its link; None where there is none."""
-    audio = robot.speaker
-    if audio is None:
-        return None
-    return partial(open_audio_output, links[audio.device].path, clock, format_of(audio))

@@ -68,7 +68,6 @@ class RobotVoice:
         self._waiting: list[_Saying] = []
         self._saying: _Saying | None = None
         self._sounding: _Saying | None = None
-        self._missing = ""
 
     @property
     def playing(self) -> Playing | None:
@@ -83,9 +82,9 @@ class RobotVoice:
         self._orders = space.ring_reader("say", from_start=False)
         self._operator = space.ring_reader("operator", from_start=False)
         self._events = space.ring_writer("voice_event")
-        self._missing = self._engine.missing()
-        if self._missing:
-            _log.error("degraded: the robot has no voice: %s", self._missing)
+        missing = self._engine.missing()
+        if missing:
+            _log.error("degraded: the robot has no voice: %s", missing)
 
     def step(self) -> None:
         """Take what is to be said, and hand the speaker what it has room for."""
@@ -94,9 +93,6 @@ class RobotVoice:
                 self.fall_silent("the robot was stopped")
         for event in self._orders.drain():
             self._take(event.payload, event.stamp_ns)
-        oldest_ns = self._clock.now_ns() - LONGEST_WAIT_NS
-        waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
-        self._drop(lambda waiting: waiting.given_ns < oldest_ns, waited)
         if self._saying is None:
             self._begin_next()
         self._player.step()
@@ -114,8 +110,9 @@ class RobotVoice:
 
     def document(self) -> dict[str, Any]:
         """Return what `speech_status` tells under "voice"."""
-        why = self._missing or self._player.away
-        state = "missing" if self._missing else "away" if why else "ready"
+        missing = self._engine.missing()
+        why = missing or self._player.away
+        state = "missing" if missing else "away" if why else "ready"
         return {"state": state, "why": why, "waiting": len(self._waiting)}
 
     def close(self) -> None:
@@ -151,11 +148,14 @@ class RobotVoice:
         if not self._waiting:
             return
         saying, format_ = self._waiting.pop(0), self._player.format
-        if format_ is None or self._player.away:
+        if self._clock.now_ns() - saying.given_ns > LONGEST_WAIT_NS:
+            waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
+            self._publish(saying.say_id, "dropped", waited)
+        elif format_ is None or self._player.away:
             self._publish(saying.say_id, "failed", self._player.away)
-            return
-        saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
-        self._saying = saying
+        else:
+            saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
+            self._saying = saying
 
     def _prepare(self, text: str, format_: AudioFormat) -> PreparedSound:
         clip = self._engine.synthesise(text)
