@@ -109,7 +109,7 @@ def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -
     opened = linked(robot.microphone, open_audio_input, device_links(robot), clock)
     if opened is None:
         raise UsageError(f"robot {robot.name} has no [microphone]; hear a FILE.wav instead")
-    microphone = Microphone("microphone", opened, clock)
+    microphone = Microphone(opened, clock)
     began_ns = clock.now_ns()
     deadline_ns = began_ns + round((arguments.seconds or 1e9) * NS_PER_S)
     try:

@@ -56,10 +56,10 @@ class Resampler:
 class Microphone:
     """Hold a microphone that may come and go."""
 
-    def __init__(self, name: str, open_input: OpenInput, clock: Clock) -> None:
+    def __init__(self, open_input: OpenInput, clock: Clock) -> None:
         self._clock = clock
         self._open_input = open_input
-        self._device: Reopening[AudioInput] = Reopening(name, self._connect, clock)
+        self._device: Reopening[AudioInput] = Reopening("microphone", self._connect, clock)
         self._resampler: Resampler | None = None
         self._framer = Framer()
         self._end_ns: int | None = None

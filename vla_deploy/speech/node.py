@@ -75,7 +75,7 @@ class SpeechNode:
         self._microphone: Microphone | None = None
         self._deaf = f"robot {robot.name} has no [microphone]"
         if microphone is not None:
-            self._microphone = Microphone("microphone", microphone, context.clock)
+            self._microphone = Microphone(microphone, context.clock)
             self._deaf = ""
         self._asr: AsrPipeline | None = None
         self._page: PageMicrophone

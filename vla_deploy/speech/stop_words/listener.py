@@ -90,9 +90,8 @@ class StopWords:
 
     def adopt(self, settings: SpeechSettings) -> None:
         """Go by the sensitivity of another profile from now on."""
-        changed, self._sensitivity = self._sensitivity != settings.stop_words, settings.stop_words
-        if changed:
-            self._warn_if_off()
+        self._sensitivity = settings.stop_words
+        self._warn_if_off()
 
     def feed(self, frame: SoundBlock, playing: Playing | None = None) -> None:
         """Take the next frame, and press the button where a stop word was heard in it.

@@ -102,14 +102,13 @@ def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
 
 def _checked(manifest: Manifest) -> KeyWords:
     words, shapes = manifest.key_words, [one.shape for one in (*manifest.inputs, *manifest.outputs)]
-    if words is None or words.features != features.NAME:
-        got = "no [key_words]" if words is None else repr(words.features)
-        raise SpotterMismatch(f"{manifest.name}: expected features {features.NAME!r}, got {got}")
     is_counted = all(isinstance(shape[-1], int) for shape in shapes)
-    if len(shapes) != 2 or shapes[0][:2] != (1, features.BANDS) or not is_counted:
+    fits = is_counted and len(shapes) == 2 and shapes[0][:2] == (1, features.BANDS)
+    if words is None or words.features != features.NAME or not fits:
+        got = "no [key_words]" if words is None else f"features {words.features!r}"
         raise SpotterMismatch(
-            f"{manifest.name}: expected one input of shape (1, {features.BANDS}, frames) and a "
-            f"count of moments, got {shapes}"
+            f"{manifest.name}: expected features {features.NAME!r}, one input of shape "
+            f"(1, {features.BANDS}, frames) and a count of moments, got {got} and {shapes}"
         )
     return words
 

@@ -33,13 +33,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Saying:
-    """Hold what waits to be said, or is: it is in preparation first, then it plays."""
+    """Hold what waits to be said, or is: it is `prepared` first, then it plays."""
 
     say_id: str
     text: str
     given_ns: int
     prepared: "Future[PreparedSound] | None" = None
-    is_played: bool = False
     has_begun: bool = False
 
 
@@ -163,8 +162,8 @@ class RobotVoice:
         return PreparedSound(samples=clip.samples(format_, self._volume_ratio), wave=wave)
 
     def _advance(self, saying: _Saying) -> None:
-        if not saying.is_played:
-            self._play_once_prepared(saying)
+        if saying.prepared is not None:
+            self._play_once_done(saying, saying.prepared)
         elif self._player.away:
             self._end(saying, "failed", self._player.away)
         elif not saying.has_begun and self._player.has_begun:
@@ -174,15 +173,15 @@ class RobotVoice:
         elif self._player.is_done:
             self._end(saying, "finished", "")
 
-    def _play_once_prepared(self, saying: _Saying) -> None:
-        if saying.prepared is None or not saying.prepared.done():
+    def _play_once_done(self, saying: _Saying, prepared: "Future[PreparedSound]") -> None:
+        if not prepared.done():
             return
         try:
-            self._player.play(saying.prepared.result())
+            self._player.play(prepared.result())
         except VoiceError as error:
             self._end(saying, "failed", str(error))
             return
-        saying.is_played = True
+        saying.prepared = None
         self._player.step()
 
     def _break_off(self, reason: str) -> None:
