@@ -25,8 +25,6 @@ LONGEST_LETTERS: Final = 400
 """More is cut at a word: half a minute of talk is enough, and the text is shown whole elsewhere."""
 LONGEST_ID: Final = 80
 MOST_WAITING: Final = 16
-LONGEST_WAIT_NS: Final = 20 * NS_PER_S
-"""News that old is none any more."""
 _REASON_LETTERS: Final = 200  # of any alphabet, a slot holds them
 _log = logging.getLogger(__name__)
 
@@ -37,7 +35,6 @@ class _Saying:
 
     say_id: str
     text: str
-    given_ns: int
     prepared: "Future[PreparedSound] | None" = None
     has_begun: bool = False
 
@@ -91,7 +88,7 @@ class RobotVoice:
             if event.payload.get("act") == ESTOP:
                 self.fall_silent("the robot was stopped")
         for event in self._orders.drain():
-            self._take(event.payload, event.stamp_ns)
+            self._take(event.payload)
         if self._saying is None:
             self._begin_next()
         self._player.step()
@@ -120,7 +117,7 @@ class RobotVoice:
         self._player.close()
         self._aside.shutdown(wait=False, cancel_futures=True)
 
-    def _take(self, payload: Mapping[str, Any], given_ns: int) -> None:
+    def _take(self, payload: Mapping[str, Any]) -> None:
         say_id, text = str(payload.get("say_id", ""))[:LONGEST_ID], payload.get("text")
         if payload.get("cancel") is True:
             self._take_back(say_id)
@@ -129,7 +126,7 @@ class RobotVoice:
         elif len(self._waiting) == MOST_WAITING:
             self._publish(say_id, "dropped", "too much waits to be said")
         else:
-            self._waiting.append(_Saying(say_id=say_id, text=_spoken(text), given_ns=given_ns))
+            self._waiting.append(_Saying(say_id=say_id, text=_spoken(text)))
 
     def _take_back(self, say_id: str) -> None:
         reason = "it was taken back"
@@ -147,10 +144,7 @@ class RobotVoice:
         if not self._waiting:
             return
         saying, format_ = self._waiting.pop(0), self._player.format
-        if self._clock.now_ns() - saying.given_ns > LONGEST_WAIT_NS:
-            waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
-            self._publish(saying.say_id, "dropped", waited)
-        elif format_ is None or self._player.away:
+        if format_ is None or self._player.away:
             self._publish(saying.say_id, "failed", self._player.away)
         else:
             saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
