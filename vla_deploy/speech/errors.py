@@ -3,7 +3,6 @@
 SpeechError
 ├── SpeechMissing         the `speech` extra is not installed: install it
 ├── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
-├── SpotterMismatch       the model is not one that the spotter of stop words can run
 └── VoiceError            a text became no sound: the program's own words are in the message
 """
 
@@ -21,10 +20,6 @@ class SpeechMissing(SpeechError):
 
 class RecordingsInvalid(SpeechError):
     """Say what is wrong with a folder of recordings."""
-
-
-class SpotterMismatch(SpeechError):
-    """Say what a model needs that the spotter does not give."""
 
 
 class VoiceError(SpeechError):

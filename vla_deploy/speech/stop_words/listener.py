@@ -19,7 +19,6 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.node import NodeContext
-from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.sound import Playing, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter, open_spotter
 from vla_deploy.speech.words import words_of
@@ -84,7 +83,7 @@ class StopWords:
         self._heard = space.ring_writer("heard")
         try:
             self._spotter = self._open_spotter()
-        except (InferenceError, SpeechError) as error:
+        except InferenceError as error:
             self._break(str(error))
         self._warn_if_off()
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
+from vla_deploy.inference.errors import ModelMismatch
 from vla_deploy.inference.manifest import KeyWords, Manifest
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession
-from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import Sound, duration_ns
 from vla_deploy.speech.stop_words import features
 
@@ -37,7 +37,7 @@ class Spotter:
         """Take the model and what its manifest says of it.
 
         Raises:
-            SpotterMismatch: it wants other features than there are, or none at all.
+            ModelMismatch: it wants other features than there are, or none at all.
         """
         self._session = session
         key_words = _checked(manifest)
@@ -106,10 +106,11 @@ def _checked(manifest: Manifest) -> KeyWords:
     fits = is_counted and len(shapes) == 2 and shapes[0][:2] == (1, features.BANDS)
     if words is None or words.features != features.NAME or not fits:
         got = "no [key_words]" if words is None else f"features {words.features!r}"
-        raise SpotterMismatch(
-            f"{manifest.name}: expected features {features.NAME!r}, one input of shape "
-            f"(1, {features.BANDS}, frames) and a count of moments, got {got} and {shapes}"
+        fault = (
+            f"expected features {features.NAME!r}, one input of shape (1, {features.BANDS}, "
+            f"frames) and a count of moments, got {got} and {shapes}"
         )
+        raise ModelMismatch(manifest.name, (fault,))
     return words
 
 
@@ -117,8 +118,7 @@ def open_spotter(shelf: ModelShelf, profile: Profile) -> Spotter:
     """Open the network that a profile chooses.
 
     Raises:
-        InferenceError: the profile's model cannot be opened.
-        SpotterMismatch: it is not one that a spotter can run.
+        InferenceError: the profile's model cannot be opened, or a spotter cannot run it.
     """
     session = shelf.open(ROLE, profile, 0)
     return Spotter(session, session.model.manifest)

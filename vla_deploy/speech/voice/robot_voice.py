@@ -1,7 +1,7 @@
 """Say aloud what the topic `say` asks for: one text after the other, and silent at a word."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any, Final
@@ -101,7 +101,7 @@ class RobotVoice:
 
     def fall_silent(self, reason: str) -> None:
         """Break off what is being said and drop what waits."""
-        self._drop(lambda _: True, reason)
+        self._drop(self._waiting, reason)
         self._break_off(reason)
 
     def document(self) -> dict[str, Any]:
@@ -130,12 +130,11 @@ class RobotVoice:
 
     def _take_back(self, say_id: str) -> None:
         reason = "it was taken back"
-        self._drop(lambda waiting: waiting.say_id == say_id, reason)
+        self._drop([one for one in self._waiting if one.say_id == say_id], reason)
         if self._saying is not None and self._saying.say_id == say_id:
             self._break_off(reason)
 
-    def _drop(self, is_dropped: Callable[[_Saying], bool], reason: str) -> None:
-        dropped = [waiting for waiting in self._waiting if is_dropped(waiting)]
+    def _drop(self, dropped: list[_Saying], reason: str) -> None:
         self._waiting = [waiting for waiting in self._waiting if waiting not in dropped]
         for waiting in dropped:
             self._publish(waiting.say_id, "dropped", reason)

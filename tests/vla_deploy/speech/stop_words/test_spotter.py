@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
+from vla_deploy.inference.errors import ModelMismatch
 from vla_deploy.inference.manifest import Manifest
-from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import RATE_HZ, Sound, duration_ns
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 
@@ -82,5 +82,5 @@ def test_after_a_reset_nothing_of_before_counts(spotter: Spotter) -> None:
 def test_a_model_of_another_kind_is_refused(
     scorer: Any, manifest: Manifest, change: dict[str, Any], told: str
 ) -> None:
-    with pytest.raises(SpotterMismatch, match=told):
+    with pytest.raises(ModelMismatch, match=told):
         Spotter(scorer, dataclasses.replace(manifest, **change))
