@@ -23,8 +23,8 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
-from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing
-from vla_deploy.speech.sound import RATE_HZ, Sound, SoundBlock, duration_ns
+from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
+from vla_deploy.speech.sound import RATE_HZ, Sound, duration_ns
 from vla_deploy.speech.voice.tts import EspeakEngine
 from vla_deploy.supervisor.runtime import default_base
 
@@ -188,11 +188,9 @@ def _hear(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> Run:
 def _told(
     hearing: AsrPipeline, clock: StreamClock, sound: Sound
 ) -> Iterator[tuple[HeardPhrase, int]]:
-    for at in range(0, len(sound), BLOCK):
-        samples = sound[at : at + BLOCK]
-        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
-        clock.ns = block.end_ns
-        hearing.feed(block, None)
+    for frame in frames_of(sound):
+        clock.ns = frame.end_ns
+        hearing.feed(frame, None)
         for heard in hearing.heard():
             yield heard, clock.ns
 

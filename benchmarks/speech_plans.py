@@ -22,15 +22,13 @@ from benchmarks.planner_desk import Answer, fresh_desk
 from benchmarks.speech_words import open_shipped
 from drivers.clock import NS_PER_S
 from training.speech.judging import NOISY_DB
-from training.speech.trials import NAMES, by_held_out_voices, by_unseen_engine, heard
+from training.speech.trials import by_held_out_voices, by_unseen_engine, heard
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import utterance
 from vla_deploy.speech.recogniser import Recogniser
-from vla_deploy.speech.transcript import confidence
-from vla_deploy.speech.verdict import Case as SpokenCase
 from vla_deploy.speech.verdict import Verdict, judge
 
 Random = np.random.Generator
@@ -113,17 +111,9 @@ def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) 
 
 
 def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
-    reading = recogniser.read(clip.samples, NAMES)
-    sure = confidence(reading, recogniser.declared.calibration)
-    phrase = Phrase(
-        number=1, began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S),
-        voiced_s=clip.duration_s, clipped_ratio=0.0, voice=1.0, samples=clip.samples,
-    )  # fmt: skip
-    case = SpokenCase(
-        transcript=reading, phrase=phrase, confidence=sure, least_confidence=least,
-        languages=recogniser.declared.languages,
-    )  # fmt: skip
-    return HeardPhrase(phrase=phrase, transcript=reading, confidence=sure, judgement=judge(case))
+    reading = recogniser.read(clip.samples)
+    phrase = Phrase(began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S), samples=clip.samples)
+    return HeardPhrase(phrase=phrase, transcript=reading, judgement=judge(reading, "", least))
 
 
 def _share(

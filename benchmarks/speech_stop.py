@@ -21,7 +21,6 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.speech_stop_latch import latch
 from benchmarks.speech_stop_listening import (
-    BLOCK,
     SPOTTER,
     WORDS,
     Delay,
@@ -33,7 +32,7 @@ from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 from training.voices.rooms import draw_room, in_room
-from vla_deploy.speech.sound import NOTHING
+from vla_deploy.speech.sound import FRAME, NOTHING
 
 SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
 CASES: Final[Mapping[str, tuple[float | None, bool]]] = {
@@ -46,7 +45,7 @@ TOO_LATE_S: Final = 1.0
 _LEVEL_DB: Final = -26.0
 _HISS: Final = 2e-4
 _BEFORE_S, _AFTER_S = 0.8, 1.2
-_SECOND: Final = RATE_HZ // BLOCK
+_SECOND: Final = RATE_HZ // FRAME
 _THRESHOLDS: Final = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85)
 
 

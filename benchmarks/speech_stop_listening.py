@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from benchmarks.percentiles import percentile, spread_s
 from drivers.clock import MonotonicClock
@@ -11,14 +11,12 @@ from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.speech.model_selection import select_recogniser
-from vla_deploy.speech.recording import StreamClock, open_hearing
-from vla_deploy.speech.sound import SoundBlock, duration_ns
+from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
+from vla_deploy.speech.sound import FRAME, FRAME_S, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, open_spotter
 from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
-BLOCK: Final = RATE_HZ // 50
-"""The node steps so often."""
 SPOTTER, WORDS = "spotter", "words"
 
 
@@ -75,26 +73,25 @@ class StopListening:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
         self.scores = []
-        for at in range(0, len(sound), BLOCK):
-            samples = sound[at : at + BLOCK]
-            block = SoundBlock(stamp_ns=duration_ns(self._count), samples=samples, follows=at > 0)
-            self._count += len(samples)
-            self._clock.ns = block.end_ns
-            at_s = (at + len(samples)) / RATE_HZ
+        at_s = 0.0
+        for frame in frames_of(sound, self._count):
+            self._count += FRAME
+            self._clock.ns = frame.end_ns
+            at_s += FRAME_S
             for by, listen in ((SPOTTER, self._spot), (WORDS, self._read)):
                 began_s, busy_s = time.perf_counter(), time.process_time()
-                word = listen(block)
+                word = listen(frame)
                 took_s = time.perf_counter() - began_s
                 self.busy_s[by] += time.process_time() - busy_s
                 if word:
                     yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
             self.scores.append((at_s, self.spotter.score))
 
-    def _spot(self, block: SoundBlock) -> str:
-        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self.threshold)
+    def _spot(self, frame: SoundBlock) -> str:
+        spotted: Spotted | None = self.spotter.feed(frame.samples, frame.end_ns, self.threshold)
         return "" if spotted is None else spotted.word
 
-    def _read(self, block: SoundBlock) -> str:
-        self._asr.feed(block, None)
+    def _read(self, frame: SoundBlock) -> str:
+        self._asr.feed(frame, None)
         told = list(self._asr.heard())
         return next((one.text for one in told if one.judgement.verdict is Verdict.STOP), "")

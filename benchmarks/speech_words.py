@@ -2,8 +2,7 @@
 
 Sentences and the names of the voices lie in `training/speech/held_out` and `training/voices`; they
 are spoken on the spot by eSpeak NG, flite and festival. `missing` says which engine is not
-installed: its figures are None then. All is read as on the robot; `hot_words` tells whether the
-recogniser takes the names of things and places that it is given.
+installed: its figures are None then. All is read as on the robot.
 """
 
 import sys
@@ -38,7 +37,6 @@ def measure(sentences: int = 150, seed: int = 0, profile: str = "desktop") -> di
             "model": MODEL,
             **figures,
             "wer_10db": figures["wer_held_out_voices_10db"],
-            "hot_words": recogniser.declared.hot_words,
             **speed(reads),
             **sureness(recogniser, reads, least),
             **other_sounds(recogniser, least, _OTHER_SOUNDS, seed),

@@ -163,7 +163,7 @@ class LockstepStack(LockstepControl):
             self._profile,
             streamed_microphone(robot, devices, context.clock),
             voice=voice,
-            stop_words=build_stop_words(context, self._profile, voice),
+            stop_words=build_stop_words(context, self._profile),
             page_stop_words=build_stop_words(context, self._profile, place=PAGE),
         )
 

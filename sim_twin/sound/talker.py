@@ -7,7 +7,7 @@ import numpy as np
 
 from sim_twin.sound.acoustics import Acoustics, path, through
 from vla_deploy.speech.voice.clip import Clip, Wave
-from vla_deploy.speech.voice.tts import Engine, EspeakEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 USUAL_DISTANCE_M: Final = 1.5
 NOISE_AROUND_S: Final = 0.5
@@ -20,7 +20,7 @@ _SILENCE_RATIO: Final = 10.0 ** (-35.0 / 20.0)
 class Talker:
     """Be somebody in the room: a voice, and how far from the robot's microphone."""
 
-    engine: Engine = field(default_factory=EspeakEngine)
+    engine: EspeakEngine = field(default_factory=EspeakEngine)
     distance_m: float = USUAL_DISTANCE_M
 
 
@@ -47,8 +47,7 @@ def arrival(
     that falls with frequency as that of rooms does.
 
     Raises:
-        EngineMissing: the talker's program or voice is not here.
-        SynthesisFailed: it gives no sound.
+        VoiceError: the talker's words do not become sound.
     """
     dry = _levelled(_trimmed(talker.engine.synthesise(text).at_rate(rate_hz)), acoustics.talker_rms)
     response = path(talker.distance_m, rate_hz, acoustics, seed)

@@ -449,7 +449,7 @@ class ScriptedWhisper:
         """Write a model with a manifest that says how it is read."""
         folder = self.write(name, text, sureness)
         paths = sorted(path.name for path in folder.iterdir())
-        whisper: dict[str, Any] = {"context": Context.TRIMMED, "hot_words": False, **declared}
+        whisper: dict[str, Any] = {"context": Context.TRIMMED, **declared}
         manifest = Manifest(
             name=name,
             role="speech_to_text",

@@ -9,12 +9,10 @@ import numpy as np
 
 from training.speech.errors_of_words import Count, count
 from training.speech.trials import (
-    NAMES,
     by_foreigners,
     by_held_out_voices,
     by_known_voices,
     by_unseen_engine,
-    drawn_sentences,
     heard,
     noises_alone,
     sentences,
@@ -41,14 +39,14 @@ class Read:
         return count([(self.clip.text, self.reading.text)]).exact == 1
 
 
-def read_all(recogniser: Recogniser, clips: Sequence[Clip], hot_words: str = "") -> list[Read]:
+def read_all(recogniser: Recogniser, clips: Sequence[Clip]) -> list[Read]:
     """Read clips one by one."""
-    return [_read(recogniser, clip, hot_words) for clip in clips]
+    return [_read(recogniser, clip) for clip in clips]
 
 
-def _read(recogniser: Recogniser, clip: Clip, hot_words: str) -> Read:
+def _read(recogniser: Recogniser, clip: Clip) -> Read:
     began_s = time.process_time()
-    reading = recogniser.read(clip.samples, hot_words)
+    reading = recogniser.read(clip.samples)
     return Read(clip=clip, reading=reading, cpu_s=time.process_time() - began_s)
 
 
@@ -60,8 +58,7 @@ def count_of(reads: Sequence[Read]) -> Count:
 def word_errors(recogniser: Recogniser, most: int, seed: int) -> tuple[dict[str, Any], list[Read]]:
     """Return the word error rates over the sets of voices and noise, and all the readings.
 
-    It is given hot words, as on the robot, which it takes where its manifest says so. Figures of an
-    engine that is not installed are None; `missing` says what to install.
+    Figures of an engine that is not installed are None; `missing` says what to install.
     """
     texts = sentences("commands")[:most]
     figures: dict[str, Any] = {"sentences": len(texts), "missing": []}
@@ -74,7 +71,7 @@ def word_errors(recogniser: Recogniser, most: int, seed: int) -> tuple[dict[str,
             clips = []
         for suffix, snr_db in (("", None), ("_10db", NOISY_DB)):
             random = np.random.default_rng([seed, 2])
-            told = read_all(recogniser, [heard(c, random, snr_db) for c in clips], NAMES)
+            told = read_all(recogniser, [heard(c, random, snr_db) for c in clips])
             reads += told
             figures[f"wer_{name}{suffix}"] = count_of(told).error_ratio if told else None
             figures[f"exact_{name}{suffix}"] = count_of(told).exact_ratio if told else None
@@ -89,14 +86,6 @@ _SETS: Final[dict[str, Callable[[Sequence[str], np.random.Generator], list[Clip]
     "held_out_voices": by_held_out_voices,
     "unseen_engine": by_unseen_engine,
 }
-
-
-def heeds_hot_words(recogniser: Recogniser, count_of_texts: int, seed: int) -> bool:
-    """Tell whether names given as hot words do no harm to its readings."""
-    random = np.random.default_rng([seed, 7])
-    clips = by_known_voices(drawn_sentences(count_of_texts, random), random, 0.4)
-    wrong = {names: count_of(read_all(recogniser, clips, names)).wrong for names in ("", NAMES)}
-    return wrong[NAMES] <= wrong[""]
 
 
 def _by_voice(reads: Sequence[Read]) -> dict[str, float]:
@@ -162,7 +151,7 @@ def _auroc(scores: "np.ndarray[Any, Any]", right: "np.ndarray[Any, Any]") -> flo
 def speed(reads: Sequence[Read]) -> dict[str, float]:
     """Return what reading costs: CPU time per time of sound, and how long one waits for it."""
     took_s = np.array([one.reading.took_s for one in reads])
-    lasted_s = np.array([one.reading.duration_s for one in reads])
+    lasted_s = np.array([one.clip.duration_s for one in reads])
     cpu_s = sum(one.cpu_s for one in reads)
     return {
         "real_time_factor": float(cpu_s / lasted_s.sum()),

@@ -27,7 +27,6 @@ BEAM: Final = _SPEECH.beam
 LEAST_CONFIDENCE: Final = _SPEECH.least_confidence
 _SUMMARY: Final = "Spoken commands in the English of synthetic voices; never heard a person"
 _CALIBRATION_CLIPS: Final = 300
-_HOT_WORD_CLIPS: Final = 40
 _OTHER_SOUNDS: Final = 66
 _LOG = logging.getLogger(__name__)
 
@@ -40,12 +39,11 @@ def judge(out: Path, size: Size) -> None:
         EngineMissing: eSpeak NG or flite is not installed.
     """
     folder = out / MODEL
-    plain = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=True)
+    plain = Whisper(languages=("en",), context=Context.TRIMMED)
     draft = _open(_manifest(folder, plain), folder)
     fitted = calibration.fit(calibration.readings(draft, _CALIBRATION_CLIPS, size.seed))
-    heeds = judging.heeds_hot_words(draft, _HOT_WORD_CLIPS, size.seed)
     draft.close()
-    manifest = _manifest(folder, replace(plain, calibration=fitted, hot_words=heeds))
+    manifest = _manifest(folder, replace(plain, calibration=fitted))
     recogniser = _open(manifest, folder)
     metrics = _measure(recogniser, out, size)
     recogniser.close()

@@ -20,12 +20,6 @@ from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 
 Random = np.random.Generator
-NAMES: Final = (
-    "red cup, blue ball, green bottle, white bowl, brown box, black phone, grey remote, "
-    "yellow can, charging station, living room, coffee table, side table, kitchen, "
-    "kitchen table, bedroom, bedside table, entrance"
-)
-"""Hot words as the robot gives them: things that it sees, its places."""
 _SPEECH_LEVEL_DB: Final = -23.0
 _LEAD_S, _TAIL_S = 0.3, 0.3
 FOREIGN: Final = ("de", "fr", "es", "it", "pl", "nl", "sv", "pt", "tr", "fi", "ru", "cs")

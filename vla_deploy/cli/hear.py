@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -20,10 +21,10 @@ from vla_deploy.robots.links import device_links
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import evidence
-from vla_deploy.speech.microphone import Microphone, linked_microphone
+from vla_deploy.speech.microphone import Microphone, linked
 from vla_deploy.speech.model_selection import select_recogniser
-from vla_deploy.speech.recording import BLOCK, StreamClock, open_hearing, sound_of
-from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
+from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing, sound_of
+from vla_deploy.speech.sound import Sound, count_of
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -46,7 +47,6 @@ def register(commands: Any) -> None:
     hear.add_argument("--robot", default="butler", help="whose microphone (default: butler)")
     hear.add_argument("--model", help="recogniser (default: as the profile says)")
     hear.add_argument("--profile", help="name or path (default: the one of the next start)")
-    hear.add_argument("--words", default="", help="names of things and places that may occur")
     hear.add_argument("--seconds", type=float, help="how long to listen (default: until Ctrl-C)")
     hear.add_argument("--json", action="store_true", help="print JSON, live a line for each phrase")
     hear.set_defaults(run=run)
@@ -60,12 +60,12 @@ def run(arguments: argparse.Namespace) -> int:
     recogniser = selected.recogniser
     if recogniser is None:
         raise SpeechError(selected.why)
-    for notice in recogniser.notices:
-        print(f"vla-deploy: degraded: {notice}", file=sys.stderr)
+    if selected.why:
+        print(f"vla-deploy: degraded: {selected.why}", file=sys.stderr)
     clock = StreamClock()
     live: Clock = MonotonicClock()
     used = live if arguments.microphone else clock
-    hearing = open_hearing(selected, profile, used, arguments.words)
+    hearing = open_hearing(selected, profile, used)
     try:
         if arguments.microphone:
             return _listen(arguments, hearing, live)
@@ -96,22 +96,19 @@ def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
 
 def _heard(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
     """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
-    padded = np.concatenate((sound, np.zeros(count_of(_AFTER_S), np.float32)))
-    for at in range(0, len(padded), BLOCK):
-        samples = padded[at : at + BLOCK]
-        block = SoundBlock(stamp_ns=duration_ns(at), samples=samples, follows=at > 0)
-        clock.ns = block.end_ns
-        hearing.feed(block, None)
+    for frame in frames_of(np.pad(sound, (0, count_of(_AFTER_S)))):
+        clock.ns = frame.end_ns
+        hearing.feed(frame, None)
         yield from hearing.heard()
 
 
 def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -> int:
     """Follow the microphone until its time is over, or Ctrl-C."""
     robot = load_robot(arguments.robot)
-    opened = linked_microphone(robot, device_links(robot), clock)
+    opened = linked(robot.microphone, open_audio_input, device_links(robot), clock)
     if opened is None:
         raise UsageError(f"robot {robot.name} has no [microphone]; hear a FILE.wav instead")
-    microphone = Microphone("microphone", opened, clock)
+    microphone = Microphone(opened, clock)
     began_ns = clock.now_ns()
     deadline_ns = began_ns + round((arguments.seconds or 1e9) * NS_PER_S)
     try:
@@ -134,11 +131,10 @@ def _live(
         CommandFailed: the microphone is not there.
     """
     while clock.now_ns() < deadline_ns:
-        block = microphone.poll()
-        if block is not None:
-            hearing.feed(block, None)
+        for frame in microphone.poll():
+            hearing.feed(frame, None)
             yield from hearing.heard()
-        elif microphone.away:
+        if microphone.away:
             raise CommandFailed(microphone.away)
         clock.sleep_until(clock.now_ns() + _STEP_NS)
 

@@ -113,9 +113,6 @@ def _add_whisper_arguments(add: argparse.ArgumentParser) -> None:
         action="store_true",
         help="its weights were trained on sound without the padding to 30 s",
     )
-    add.add_argument(
-        "--no-hot-words", action="store_true", help="give it no names of things and places"
-    )
 
 
 def _add_image_arguments(add: argparse.ArgumentParser) -> None:

@@ -36,7 +36,6 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
         whisper=Whisper(
             languages=tuple(arguments.languages.split(",")),
             context=Context.TRIMMED if arguments.trimmed else Context.PADDED,
-            hot_words=not arguments.no_hot_words,
         ),
         summary=arguments.summary or "a recogniser that was added",
         licence=arguments.licence,
@@ -55,7 +54,7 @@ def fetch_whisper(
         source = WhisperSource(
             name=arguments.name,
             folder=folder,
-            whisper=Whisper(languages=("en",), context=Context.PADDED, hot_words=True),
+            whisper=Whisper(languages=("en",), context=Context.PADDED),
             summary=published.summary,
             licence=licence,
         )

@@ -8,7 +8,6 @@ from vla_deploy.doctor.finding import Finding, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.stop_words.listener import OFF
 from vla_deploy.speech.stop_words.spotter import open_spotter
 from vla_deploy.state_dir import engines_dir_of
@@ -32,7 +31,7 @@ def spoken_stop(context: Context) -> Iterator[Finding]:
         shelf = ModelShelf(store=context.models, engines=engines, clock=context.clock)
         try:
             spotter = open_spotter(shelf, profile)
-        except (InferenceError, SpeechError) as error:
+        except InferenceError as error:
             yield warn(NAME, one_line(error), "vla-deploy models list")
             return
         chosen = profile.speech.stop_words

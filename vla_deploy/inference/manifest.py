@@ -149,13 +149,12 @@ class Calibration:
 class Whisper:
     """Declare a model of the Whisper family in CTranslate2's form.
 
-    `languages` are those that may be understood; `hot_words` tells whether it heeds words that it
-    is given. `calibration` is None where nobody has measured it.
+    `languages` are those that may be understood; `calibration` is None where nobody has measured
+    it.
     """
 
     languages: tuple[str, ...]
     context: Context
-    hot_words: bool
     calibration: Calibration | None = None
 
 

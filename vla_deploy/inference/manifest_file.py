@@ -132,7 +132,6 @@ def _whisper(table: Document) -> Whisper:
     return Whisper(
         languages=tuple(table["languages"]),
         context=Context(table["context"]),
-        hot_words=table["hot_words"],
         calibration=None if calibration is None else Calibration(**calibration),
     )
 

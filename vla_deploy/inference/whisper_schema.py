@@ -31,7 +31,8 @@ _WHISPER: Shape = {
         ),
     ),
     "context": one_of(*Context),
-    "hot_words": Check(expected="true or false", holds=lambda value: isinstance(value, bool)),
+    # Manifests of earlier releases have it; it has no meaning any more.
+    "hot_words": Check(expected="true or false", holds=lambda _: True, is_optional=True),
     "calibration": OPTIONAL_TABLE,
 }
 _CALIBRATION: Shape = {

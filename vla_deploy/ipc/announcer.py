@@ -55,19 +55,11 @@ class Announcer:
             return ""
         return str(voice.get("why") or "the robot has no speaker")
 
-    def say(self, text: str, *, interrupt: bool = False, priority: str = "medium") -> str:
-        """Have a text said and return its id; `interrupt` cuts off what is no more urgent."""
+    def say(self, text: str) -> str:
+        """Have a text said, after what waits to be, and return its id."""
         say_id = f"{self._source}-{os.getpid()}-{next(self._numbers)}"
         self._said.append(say_id)
-        self._say.publish(
-            {
-                "say_id": say_id,
-                "text": text[:_LETTERS],
-                "interrupt": interrupt,
-                "priority": priority,
-                "source": self._source,
-            }
-        )
+        self._say.publish({"say_id": say_id, "text": text[:_LETTERS], "source": self._source})
         return say_id
 
     def take_back(self, say_id: str) -> None:

@@ -292,7 +292,7 @@ TOPICS: tuple[Topic, ...] = (
         name="say",
         kind=Kind.RING,
         owner="any",
-        summary="what the robot is to say aloud: say id, text, urgency; or a say id to take back",
+        summary="what the robot is to say aloud: say id and text; or a say id to take back",
         slots=32,
         slot_bytes=8192,
     ),

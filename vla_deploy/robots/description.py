@@ -224,12 +224,11 @@ class Audio:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoiceSettings:
-    """Describe how the robot sounds; `voice` and `program` are the engine's own words for them.
+    """Describe how the robot sounds; `voice` is one of eSpeak NG's.
 
-    An empty `program` is the engine's usual one. `volume_ratio` is of the speaker's full scale.
+    An empty `program` is the one on the PATH. `volume_ratio` is of the speaker's full scale.
     """
 
-    engine: str = "espeak-ng"
     voice: str = "en-gb"
     program: str = ""
     words_per_minute: int = 160

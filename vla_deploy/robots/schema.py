@@ -189,7 +189,6 @@ AUDIO: Shape = {
     "channels": _integer(1, 8),
 }
 VOICE: Shape = {
-    "engine": one_of("espeak-ng", "piper", is_optional=True),
     "voice": OPTIONAL_TEXT,
     "program": OPTIONAL_TEXT,
     "words_per_minute": replace(_integer(80, 450), is_optional=True),

@@ -3,16 +3,16 @@
 import sys
 from typing import Final
 
+from drivers.audio.open_audio import open_audio_input, open_audio_output
 from platforms import load_profile
 from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.microphone import linked_microphone
+from vla_deploy.speech.microphone import linked
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
-from vla_deploy.speech.voice.audio_player import linked_speaker
 from vla_deploy.speech.voice.robot_voice import build_voice
 
 SYNTHESIS_S: Final = 0.1
@@ -27,17 +27,17 @@ def build(context: NodeContext) -> SpeechNode:
     links = device_links(robot, context.devices_dir)
     profile = load_profile(context.profile)
     clock = context.clock
-    speaker = linked_speaker(robot, links, clock)
+    speaker = linked(robot.speaker, open_audio_output, links, clock)
     voice = build_voice(robot.voice, speaker, clock, beside("voice", clock, SYNTHESIS_S))
     return SpeechNode(
         context,
         robot,
         profile,
-        linked_microphone(robot, links, clock),
+        linked(robot.microphone, open_audio_input, links, clock),
         beside("recogniser", clock, RECOGNITION_S),
         beside("loader", clock, LOADING_S),
         voice=voice,
-        stop_words=build_stop_words(context, profile, voice),
+        stop_words=build_stop_words(context, profile),
         page_stop_words=build_stop_words(context, profile, place=PAGE),
     )
 

@@ -1,17 +1,16 @@
 """Follow the stream from frame to phrase to transcript, with the robot's own voice held off."""
 
-from collections import Counter
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 from platforms import SpeechSettings
 from vla_deploy.speech.echo_gate import EchoGate
-from vla_deploy.speech.endpointing import Endpointer, Phrase, VadEvent, VadEventKind
-from vla_deploy.speech.sound import Framer, Playing, SoundBlock, level_db
-from vla_deploy.speech.transcript import Transcript, confidence
-from vla_deploy.speech.transcription_queue import PhraseTranscript, TranscriptionQueue
-from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge, stops
+from vla_deploy.speech.endpointing import Endpointer, Phrase, VadEventKind
+from vla_deploy.speech.sound import Playing, SoundBlock
+from vla_deploy.speech.transcript import Transcript
+from vla_deploy.speech.transcription_queue import TranscriptionQueue
+from vla_deploy.speech.verdict import Judgement, Verdict, judge, stops
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
 
@@ -24,8 +23,12 @@ class HeardPhrase:
 
     phrase: Phrase
     transcript: Transcript | None
-    confidence: float
     judgement: Judgement
+
+    @property
+    def confidence(self) -> float:
+        """Return how probably its words are right."""
+        return 0.0 if self.transcript is None else self.transcript.confidence
 
     @property
     def text(self) -> str:
@@ -34,27 +37,22 @@ class HeardPhrase:
 
 
 class AsrPipeline:
-    """Hold what hearing remembers between two blocks."""
+    """Hold what hearing remembers between two frames."""
 
     def __init__(
         self,
         voice_activity: VoiceActivity,
         queue: TranscriptionQueue,
         settings: SpeechSettings,
-        hot_words: Callable[[], str],
         names: Set[str] = frozenset(),
     ) -> None:
         """Take the networks over; `names` are those that the robot answers to."""
         self.queue = queue
-        self.counts: Counter[str] = Counter()
-        self._activity = voice_activity
-        self._hot_words = hot_words
-        self._names = names
-        self._framer = Framer()
-        self._gate = EchoGate()
         self.endpointer = Endpointer(settings)
-        self._stopped_number = 0
-        self._barge_ns: int | None = None
+        self._activity = voice_activity
+        self._names = names
+        self._gate = EchoGate()
+        self._stopped_ns: int | None = None
         self._refused: list[HeardPhrase] = []
 
     @property
@@ -64,122 +62,79 @@ class AsrPipeline:
             return "hearing"
         return "transcribing" if self.queue.is_busy else "listening"
 
-    def feed(self, block: SoundBlock, playing: Playing | None) -> int | None:
-        """Take the next block; return since when a person speaks into what the robot says.
+    def feed(self, frame: SoundBlock, playing: Playing | None) -> bool:
+        """Take the next frame; return whether a person begins to speak into what the robot says.
 
         Raises:
             RunFailed: the voice network fails.
         """
-        self._barge_ns = None
-        for frame in self._framer.feed(block):
-            self._frame(frame, playing)
-        return self._barge_ns
+        before = self._gate.barged_in
+        if not frame.follows:
+            self._activity.reset()
+            self.endpointer.reset()
+            self.queue.forget_draft()
+        voice = self._activity.probability(frame.samples)
+        voice = self._gate.persons_voice(frame, voice, playing)
+        for kind, phrase in self.endpointer.feed(frame, voice):
+            self._on(kind, replace(phrase, own_words=self._gate.own_words(phrase)))
+        return self._gate.barged_in and not before
 
     def heard(self) -> Iterator[HeardPhrase]:
         """Yield what has been understood, or not, since the last call: a stop even in a pause."""
         draft = self.queue.drafted()
         if draft is not None:
-            yield from self._draft(draft)
+            yield from self._draft(*draft)
         refused, self._refused = self._refused, []
         yield from refused
-        for answer in self.queue.answers():
-            yield self._judged(answer)
-
-    def document(self) -> dict[str, Any]:
-        """Return how many phrases have begun, ended and so on, as `speech_status` tells it."""
-        return {"counts": dict(self.counts)}
+        for reading in self.queue.answers():
+            yield self._judged(*reading)
 
     def close(self) -> None:
         """Release the networks."""
         self.queue.close()
         self._activity.close()
 
-    def _frame(self, frame: SoundBlock, playing: Playing | None) -> None:
-        if not frame.follows:
-            self._activity.reset()
-            self.endpointer.reset()
-            self.queue.forget_draft()
-        voice = self._activity.probability(frame.samples)
-        self._gate.follow(playing, frame.end_ns)
-        if self._gate.is_shut:
-            voice = self._through_gate(frame, voice)
-        for event in self.endpointer.feed(frame, voice):
-            self._on(event)
+    def _on(self, kind: VadEventKind, phrase: Phrase) -> None:
+        refusal = ""
+        match kind:
+            case VadEventKind.PAUSED:
+                self.queue.draft(phrase)
+            case VadEventKind.RESUMED | VadEventKind.TOO_SHORT:
+                self.queue.forget_draft()
+            case VadEventKind.ENDED:
+                refusal = self.queue.finish(phrase)
+            case VadEventKind.TOO_LONG:
+                self.queue.forget_draft()
+                longest_s = self.endpointer.settings.longest_phrase_s
+                refusal = f"{longest_s:g} s of talk are no command"
+        if refusal:
+            self._refused.append(self._judged(phrase, None, refusal))
 
-    def _through_gate(self, frame: SoundBlock, voice: float) -> float:
-        """Return how probably a person speaks while the robot does."""
-        is_person = self._gate.is_person(level_db(frame.samples), voice)
-        if self._gate.barges_in():
-            self._barge_ns = frame.stamp_ns
-            self.counts["barged_in"] += 1
-        return voice if is_person else 0.0
-
-    def _on(self, event: VadEvent) -> None:
-        kind = event.kind
-        phrase = replace(event.phrase, own_words=self._gate.own_words(event.phrase))
-        self.counts[kind.name.lower()] += 1
-        if kind is VadEventKind.BEGAN:
-            self._gate.note_begun()
-        elif kind is VadEventKind.PAUSED:
-            self.queue.draft(phrase, self._hot_words())
-        elif kind is VadEventKind.ENDED:
-            self.queue.finish(phrase, self._hot_words())
-        else:
-            self.queue.forget_draft()
-        if kind is VadEventKind.TOO_LONG:
-            reason = f"{self.endpointer.settings.longest_phrase_s:g} s of talk are no command"
-            self._refused.append(_refused(phrase, reason))
-
-    def _draft(self, draft: PhraseTranscript) -> Iterator[HeardPhrase]:
+    def _draft(self, phrase: Phrase, transcript: Transcript) -> Iterator[HeardPhrase]:
         """Stop at once by the words so far; wait longer where they cannot be all."""
-        if draft.transcript is None or draft.phrase.number == self._stopped_number:
+        if phrase.began_ns == self._stopped_ns:
             return
-        sure = self._confidence(draft.transcript)
-        if self._stops(draft.phrase, draft.transcript, sure):
-            self._stopped_number = draft.phrase.number
-            yield _heard(draft, sure, Judgement(verdict=Verdict.STOP))
-        elif self.endpointer.is_open and is_unfinished(draft.transcript.text):
+        if self._stops(phrase, transcript):
+            self._stopped_ns = phrase.began_ns
+            stop = Judgement(verdict=Verdict.STOP)
+            yield HeardPhrase(phrase=phrase, transcript=transcript, judgement=stop)
+        elif self.endpointer.is_open and is_unfinished(transcript.text):
             self.endpointer.wait_longer()
 
-    def _judged(self, answer: PhraseTranscript) -> HeardPhrase:
+    def _judged(self, phrase: Phrase, transcript: Transcript | None, trouble: str) -> HeardPhrase:
         """Return what becomes of a phrase that has ended."""
-        recogniser = self.queue.recogniser
-        if answer.transcript is None or recogniser is None:
-            return _refused(answer.phrase, answer.trouble)
-        sure = self._confidence(answer.transcript)
-        if answer.phrase.number == self._stopped_number:
+        if transcript is None:
+            judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble)
+        elif phrase.began_ns == self._stopped_ns:
             judgement = Judgement(verdict=Verdict.REJECTED, reason=STOPPED)
-        elif self._stops(answer.phrase, answer.transcript, sure):
+        elif self._stops(phrase, transcript):
             judgement = Judgement(verdict=Verdict.STOP)
-        elif answer.trouble:
-            judgement = Judgement(verdict=Verdict.REJECTED, reason=answer.trouble, ask_again=True)
+        elif trouble:
+            judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble, ask_again=True)
         else:
-            case = Case(
-                transcript=answer.transcript,
-                phrase=answer.phrase,
-                confidence=sure,
-                least_confidence=self.endpointer.settings.least_confidence,
-                languages=recogniser.declared.languages,
-            )
-            judgement = judge(case)
-        return _heard(answer, sure, judgement)
+            least = self.endpointer.settings.least_confidence
+            judgement = judge(transcript, phrase.own_words, least)
+        return HeardPhrase(phrase=phrase, transcript=transcript, judgement=judgement)
 
-    def _stops(self, phrase: Phrase, transcript: Transcript, sure: float) -> bool:
-        return stops(transcript.text, sure, phrase.own_words, self._names)
-
-    def _confidence(self, transcript: Transcript) -> float:
-        recogniser = self.queue.recogniser
-        return (
-            0.0 if recogniser is None else confidence(transcript, recogniser.declared.calibration)
-        )
-
-
-def _heard(answer: PhraseTranscript, sure: float, judgement: Judgement) -> HeardPhrase:
-    return HeardPhrase(
-        phrase=answer.phrase, transcript=answer.transcript, confidence=sure, judgement=judgement
-    )
-
-
-def _refused(phrase: Phrase, reason: str) -> HeardPhrase:
-    judgement = Judgement(verdict=Verdict.REJECTED, reason=reason)
-    return HeardPhrase(phrase=phrase, transcript=None, confidence=0.0, judgement=judgement)
+    def _stops(self, phrase: Phrase, transcript: Transcript) -> bool:
+        return stops(transcript.text, transcript.confidence, phrase.own_words, self._names)

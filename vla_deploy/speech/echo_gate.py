@@ -16,7 +16,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.speech.endpointing import Phrase
-from vla_deploy.speech.sound import Playing
+from vla_deploy.speech.sound import Playing, SoundBlock, level_db
 
 SURE: Final = 0.8
 BARGE_FRAMES: Final = 6
@@ -26,51 +26,42 @@ OUTLASTS_NS: Final = 3 * NS_PER_S // 10
 
 
 class EchoGate:
-    """Follow what the speaker plays, and judge each frame of the microphone by it."""
+    """Judge each frame of the microphone by what the speaker plays."""
 
     def __init__(self) -> None:
+        self.barged_in = False
+        """Whether a person has spoken into what sounds now, or sounded last."""
         self._playing: Playing | None = None
-        self._until_ns = 0
+        self._from_ns = self._until_ns = 0
+        self._words = ""
         self._persons: deque[bool] = deque(maxlen=WITHIN_FRAMES)
-        self._opened = False
-        self._own_words = ""
 
-    @property
-    def is_shut(self) -> bool:
-        """Return whether the robot can be heard at this moment, and nobody has barged in."""
-        return self._playing is not None and not self._opened
+    def persons_voice(self, frame: SoundBlock, voice: float, playing: Playing | None) -> float:
+        """Return how probably a person speaks in a frame; `voice` is the network's word for it.
 
-    def follow(self, playing: Playing | None, end_ns: int) -> None:
-        """Take what sounds, the room's answer included, during the frame that ends at `end_ns`."""
-        self._playing = playing
-        if playing is None:
-            self._opened = False
-            self._persons.clear()
-        else:
-            self._until_ns = end_ns
-
-    def is_person(self, level_db: float, voice: float) -> bool:
-        """Judge one frame of the microphone while the gate is shut."""
-        loudest_db = level_db if self._playing is None else self._playing.echo_db
-        is_person = voice >= SURE and level_db >= loudest_db
+        `playing` is what sounds during the frame, the room's answer included.
+        """
+        self._follow(frame, playing)
+        if playing is None or self.barged_in:
+            return voice
+        is_person = voice >= SURE and level_db(frame.samples) >= playing.echo_db
         self._persons.append(is_person)
-        return is_person
-
-    def barges_in(self) -> bool:
-        """Return, once, that a person speaks into what the robot says, and open the gate."""
-        if sum(self._persons) < BARGE_FRAMES:
-            return False
-        self._opened = True
-        self._persons.clear()
-        self._own_words = ""
-        return True
-
-    def note_begun(self) -> None:
-        """Note that a phrase begins."""
-        playing = None if self._opened else self._playing
-        self._own_words = "" if playing is None else playing.text
+        self.barged_in = sum(self._persons) >= BARGE_FRAMES
+        return voice if is_person else 0.0
 
     def own_words(self, phrase: Phrase) -> str:
         """Return what the robot was saying in a phrase that pauses or ends; mostly nothing."""
+        began_within = self._from_ns <= phrase.began_ns < self._until_ns
         outlasts = phrase.ended_ns > self._until_ns + OUTLASTS_NS
-        return "" if outlasts else self._own_words
+        return self._words if began_within and not outlasts and not self.barged_in else ""
+
+    def _follow(self, frame: SoundBlock, playing: Playing | None) -> None:
+        before, self._playing = self._playing, playing
+        if playing is None:
+            return
+        if before is None:
+            self._from_ns, self._words, self.barged_in = frame.stamp_ns, "", False
+            self._persons.clear()
+        if before is None or playing.say_id != before.say_id:
+            self._words += f" {playing.text}"
+        self._until_ns = frame.end_ns

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from drivers.clock import NS_PER_S
 from platforms import SpeechSettings
 from vla_deploy.speech.sound import FRAME_S, Sound, SoundBlock
 
@@ -19,13 +20,11 @@ OFFSET: Final = 0.45
 ONSET_FRAMES: Final = 2
 PAUSE_RATIO: Final = 0.6
 """After this share of the silence that ends a phrase, its words are read in advance."""
-CLIPPED: Final = 0.985
 
 
 class VadEventKind(Enum):
-    """Name what may happen to a phrase."""
+    """Name what may happen to a phrase that somebody has begun."""
 
-    BEGAN = "somebody begins to speak"
     PAUSED = "long enough to read the words so far in advance"
     RESUMED = "the speaker goes on"
     ENDED = "the speaker has ended"
@@ -35,28 +34,21 @@ class VadEventKind(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Phrase:
-    """Hold what somebody said; `number` counts phrases, `voiced_s` is without pauses at the ends.
+    """Hold what somebody said.
 
-    `began_ns` and `ended_ns` are those of the voice; the samples begin before and end after it.
-    `own_words` are what the robot was saying, where it may have heard itself.
+    `began_ns`, which no two phrases share, and `ended_ns` are those of the voice; the samples begin
+    before and end after it. `own_words` are what the robot was saying, where it may have heard
+    itself.
     """
 
-    number: int
     began_ns: int
     ended_ns: int
-    voiced_s: float
-    clipped_ratio: float
-    voice: float
     samples: Sound
     own_words: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class VadEvent:
-    """Say what has happened, and the phrase so far."""
-
-    kind: VadEventKind
-    phrase: Phrase
+VadEvent = tuple[VadEventKind, Phrase]
+"""What has happened, and the phrase so far."""
 
 
 class Endpointer:
@@ -66,10 +58,9 @@ class Endpointer:
         self.settings = settings
         self._before: deque[SoundBlock] = deque()
         self._frames: list[SoundBlock] = []
-        self._voices: list[float] = []
+        self._began_ns = self._ended_ns = 0
         self._rising = 0
         self._silent = 0
-        self._number = 0
         self._patience_s = settings.end_silence_s
         self._swallowing = False
 
@@ -93,9 +84,9 @@ class Endpointer:
         if self._frames:
             yield from self._go_on(frame, voice)
         else:
-            yield from self._wait(frame, voice)
+            self._wait(frame, voice)
 
-    def _wait(self, frame: SoundBlock, voice: float) -> Iterator[VadEvent]:
+    def _wait(self, frame: SoundBlock, voice: float) -> None:
         self._before.append(frame)
         self._rising = self._rising + 1 if voice >= ONSET else 0
         if self._swallowing:
@@ -106,34 +97,33 @@ class Endpointer:
         while len(self._before) > kept:
             self._before.popleft()
         if self._rising >= ONSET_FRAMES:
-            self._open(voice)
-            yield VadEvent(VadEventKind.BEGAN, self._phrase())
+            self._open()
 
-    def _open(self, voice: float) -> None:
-        self._number += 1
+    def _open(self) -> None:
         self._frames = list(self._before)
-        self._voices = [0.0] * (len(self._frames) - ONSET_FRAMES) + [voice] * ONSET_FRAMES
+        self._began_ns = self._frames[-ONSET_FRAMES].stamp_ns
+        self._ended_ns = self._frames[-1].end_ns
         self._before.clear()
         self._silent = 0
-        self._rising = 0
         self._patience_s = self.settings.end_silence_s
 
     def _go_on(self, frame: SoundBlock, voice: float) -> Iterator[VadEvent]:
         paused = self._silent >= self._pause_frames
         self._frames.append(frame)
-        self._voices.append(voice)
         self._count_silence(voice)
+        if self._silent == 0:
+            self._ended_ns = frame.end_ns
         if self._silent == 0 and paused:
             self._patience_s = self.settings.end_silence_s
-            yield VadEvent(VadEventKind.RESUMED, self._phrase())
+            yield VadEventKind.RESUMED, self._phrase()
         if self._silent * FRAME_S >= self._patience_s:
             yield self._end()
         elif len(self._frames) * FRAME_S >= self.settings.longest_phrase_s:
-            yield VadEvent(VadEventKind.TOO_LONG, self._phrase())
+            yield VadEventKind.TOO_LONG, self._phrase()
             self._close()
             self._swallowing = True
         elif self._silent == self._pause_frames:
-            yield VadEvent(VadEventKind.PAUSED, self._phrase())
+            yield VadEventKind.PAUSED, self._phrase()
 
     @property
     def _pause_frames(self) -> int:
@@ -144,25 +134,15 @@ class Endpointer:
 
     def _end(self) -> VadEvent:
         phrase = self._phrase()
-        is_word = phrase.voiced_s >= self.settings.shortest_phrase_s
+        is_word = phrase.ended_ns - phrase.began_ns >= self.settings.shortest_phrase_s * NS_PER_S
         self._close()
-        return VadEvent(VadEventKind.ENDED if is_word else VadEventKind.TOO_SHORT, phrase)
+        return VadEventKind.ENDED if is_word else VadEventKind.TOO_SHORT, phrase
 
     def _close(self) -> None:
-        self._frames, self._voices = [], []
+        self._frames = []
         self._silent = self._rising = 0
 
     def _phrase(self) -> Phrase:
         """Return the phrase so far."""
-        voiced = [number for number, voice in enumerate(self._voices) if voice >= OFFSET]
-        first, last = voiced[0], voiced[-1]
         samples = np.concatenate([frame.samples for frame in self._frames])
-        return Phrase(
-            number=self._number,
-            began_ns=self._frames[first].stamp_ns,
-            ended_ns=self._frames[last].end_ns,
-            voiced_s=(last - first + 1) * FRAME_S,
-            clipped_ratio=float(np.mean(np.abs(samples) >= CLIPPED)),
-            voice=float(np.mean([self._voices[number] for number in voiced])),
-            samples=samples,
-        )
+        return Phrase(began_ns=self._began_ns, ended_ns=self._ended_ns, samples=samples)

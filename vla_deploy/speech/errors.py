@@ -3,11 +3,7 @@
 SpeechError
 ├── SpeechMissing         the `speech` extra is not installed: install it
 ├── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
-├── SpotterMismatch       the model is not one that the spotter of stop words can run
-└── VoiceError
-    ├── EngineMissing     the program that speaks, or its voice, is not here: install it
-    ├── SynthesisFailed   the program ran and gave no sound: its own words are in the message
-    └── OrderRefused      what was to be said is no order: mend whoever gave it
+└── VoiceError            a text became no sound: the program's own words are in the message
 """
 
 from importlib import import_module
@@ -26,24 +22,8 @@ class RecordingsInvalid(SpeechError):
     """Say what is wrong with a folder of recordings."""
 
 
-class SpotterMismatch(SpeechError):
-    """Say what a model needs that the spotter does not give."""
-
-
 class VoiceError(SpeechError):
-    """Base of everything that keeps the robot silent."""
-
-
-class EngineMissing(VoiceError):
-    """Say which program or voice is missing, and how to get it."""
-
-
-class SynthesisFailed(VoiceError):
     """Say why a text did not become sound."""
-
-
-class OrderRefused(VoiceError):
-    """Say what was expected in an order to speak."""
 
 
 def import_extra(module: str, purpose: str) -> Any:

@@ -1,20 +1,21 @@
-"""Keep one microphone open, whichever kind it is, and give what it hears as one 16 kHz stream."""
+"""Keep one microphone open, whichever kind it is, and give what it hears in frames at 16 kHz."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from drivers.audio.base import FULL_SCALE, AudioBlock, AudioFormat, AudioInput, Samples
-from drivers.audio.open_audio import open_audio_input
 from drivers.clock import NS_PER_S, Clock
+from drivers.errors import DriverError
 from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.robots.description import Audio, RobotDescription
-from vla_deploy.speech.errors import import_extra
-from vla_deploy.speech.sound import RATE_HZ, Sound, SoundBlock
+from vla_deploy.robots.description import Audio
+from vla_deploy.speech.errors import SpeechMissing, import_extra
+from vla_deploy.speech.sound import RATE_HZ, Framer, Sound, SoundBlock
 
+T = TypeVar("T")
 OpenInput = Callable[[], AudioInput]
 SILENT_NS: Final = 2 * NS_PER_S
 """A device that is there and gives nothing for so long is said to be silent."""
@@ -39,22 +40,13 @@ class Resampler:
         self._av: Any = None
         if format_.rate_hz != RATE_HZ:
             self._av = import_extra("av", "sound of another rate than 16 kHz needs PyAV")
-        self._resampler: Any = None
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what came before: the next block does not continue it."""
-        if self._av is not None:
             self._resampler = self._av.AudioResampler(**_MONO, rate=RATE_HZ)
 
     def feed(self, samples: Samples) -> Sound:
         """Return what a block, (n, channels), makes at 16 kHz; it may be a little or nothing."""
         mono: Sound = samples.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE)
-        if self._resampler is None or not len(mono):
+        if self._av is None or not len(mono):
             return mono
-        return self._converted(mono)
-
-    def _converted(self, mono: Sound) -> Sound:
         frame = self._av.AudioFrame.from_ndarray(mono[None], **_MONO)
         frame.sample_rate = self._rate_hz
         parts = [one.to_ndarray()[0] for one in self._resampler.resample(frame)]
@@ -64,73 +56,65 @@ class Resampler:
 class Microphone:
     """Hold a microphone that may come and go."""
 
-    def __init__(self, name: str, open_input: OpenInput, clock: Clock) -> None:
+    def __init__(self, open_input: OpenInput, clock: Clock) -> None:
         self._clock = clock
         self._open_input = open_input
-        self._device: Reopening[AudioInput] = Reopening(name, self._connect, clock)
-        self._input: AudioInput | None = None
+        self._device: Reopening[AudioInput] = Reopening("microphone", self._connect, clock)
         self._resampler: Resampler | None = None
+        self._framer = Framer()
         self._end_ns: int | None = None
         self._heard_ns = clock.now_ns()
 
     @property
     def away(self) -> str:
         """Return why nothing is heard; empty while the device gives sound."""
-        if self._device.failure or self._input is None:
+        if self._device.failure or self._resampler is None:
             return self._device.failure or "the microphone is not open yet"
         silent_ns = self._clock.now_ns() - self._heard_ns
         if silent_ns < SILENT_NS:
             return ""
         return f"the microphone is there but has given nothing for {silent_ns // NS_PER_S} s"
 
-    def poll(self) -> SoundBlock | None:
-        """Return what was heard since the last call, or None; opens the device where it is away.
-
-        Raises:
-            SpeechMissing: its rate needs a package that is not installed.
-        """
+    def poll(self) -> list[SoundBlock]:
+        """Return the frames that are whole now; opens the device where it is away."""
         block = self._device.poll(lambda device: device.poll(), None)
-        return None if block is None else self._sound(block)
-
-    def document(self) -> dict[str, Any]:
-        """Return what the device is and what was lost, as `speech_status` tells it."""
-        device = self._input
-        told: dict[str, Any] = {"away": self.away, "opened": self._device.reconnects}
-        if device is not None:
-            counters = device.counters
-            told |= {"format": str(device.format), "lost_samples": counters.lost_samples}
-        return told
+        return [] if block is None else list(self._framer.feed(self._sound(block)))
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
         self._device.close()
 
     def _connect(self) -> AudioInput:
-        self._input = self._open_input()
-        self._resampler = Resampler(self._input.format)
+        device = self._open_input()
+        try:
+            self._resampler = Resampler(device.format)
+        except SpeechMissing as error:
+            device.close()
+            raise DriverError(str(error)) from error
         self._end_ns = None
         self._heard_ns = self._clock.now_ns()
-        return self._input
+        return device
 
     def _sound(self, block: AudioBlock) -> SoundBlock:
-        assert self._resampler is not None, "a block comes from a device that was connected"
         self._heard_ns = self._clock.now_ns()
         follows = self._end_ns is not None and abs(block.stamp_ns - self._end_ns) < _GAP_NS
-        if not follows:
-            self._resampler.reset()
+        if self._resampler is None or not follows:
+            self._resampler = Resampler(block.format)
         samples = self._resampler.feed(block.samples)
         self._end_ns = block.stamp_ns + block.format.duration_ns(len(block.samples))
         return SoundBlock(stamp_ns=block.stamp_ns, samples=samples, follows=follows)
 
 
-def linked_microphone(
-    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
-) -> OpenInput | None:
-    """Return how to open the microphone by the path of its link; None where there is none."""
-    audio = robot.microphone
+def linked(
+    audio: Audio | None,
+    opened: Callable[[str, Clock, AudioFormat], T],
+    links: Mapping[str, DeviceLink],
+    clock: Clock,
+) -> Callable[[], T] | None:
+    """Return how to open a microphone or a speaker by its link's path; None where there is none."""
     if audio is None:
         return None
-    return partial(open_audio_input, links[audio.device].path, clock, format_of(audio))
+    return partial(opened, links[audio.device].path, clock, format_of(audio))
 
 
 def format_of(audio: Audio) -> AudioFormat:

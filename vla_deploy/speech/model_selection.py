@@ -49,6 +49,5 @@ def select_recogniser(shelf: ModelShelf, profile: Profile, model_tier: int) -> S
         except (InferenceError, SpeechError) as error:
             reasons.append(f"{name}: {one_line(error)}")
             continue
-        recogniser.notices = tuple(reasons)
         return SelectedRecogniser(recogniser=recogniser, why="; ".join(reasons))
     return SelectedRecogniser(recogniser=None, why="; ".join(reasons))

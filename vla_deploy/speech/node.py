@@ -15,9 +15,8 @@ from vla_deploy.node import NodeContext
 from vla_deploy.one_line import one_line
 from vla_deploy.robots import RobotDescription
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
-from vla_deploy.speech.errors import SpeechError, SpeechMissing
+from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import SpeechEvents
-from vla_deploy.speech.hot_words import HotWords
 from vla_deploy.speech.microphone import Microphone, OpenInput
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
 from vla_deploy.speech.page_microphone import PageMicrophone
@@ -30,6 +29,7 @@ from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.speech.words import words_of
 
 STATUS_PERIOD_NS: Final = round(NS_PER_S / BY_NAME["speech_status"].rate_hz)
+SOMEBODY_SPOKE: Final = "somebody spoke"
 PreparedSpeech = tuple[Profile, SelectedRecogniser]
 """What a profile asks of speech: its settings, and the recogniser."""
 _log = logging.getLogger(__name__)
@@ -75,12 +75,11 @@ class SpeechNode:
         self._microphone: Microphone | None = None
         self._deaf = f"robot {robot.name} has no [microphone]"
         if microphone is not None:
-            self._microphone = Microphone("microphone", microphone, context.clock)
+            self._microphone = Microphone(microphone, context.clock)
             self._deaf = ""
         self._asr: AsrPipeline | None = None
         self._page: PageMicrophone
         self._in_page = False
-        self._opened_asr = False
         self._loading: Future[SelectedRecogniser] | None = None
         self._status_due_ns = 0
 
@@ -93,20 +92,17 @@ class SpeechNode:
             self._voice.start(self._space)
         for listener in self._listeners:
             listener.start(self._space)
-        if self._microphone is not None:
-            self._open_asr()
+        self._open_asr()
 
     def step(self) -> None:
         """Speak, hear what the microphones have, and publish what was understood."""
         if self._voice is not None:
             self._voice.step()
-        block = self._poll()
-        if block is not None and self._voice is not None:
-            block = self._voice.cleaned(block)
-        for said in self._page.poll(self._profile.speech.unfinished_silence_s):
-            self._hear_page(said)
-        if block is not None:
-            self._hear_room(block)
+        for frame in self._page.poll(self._profile.speech.unfinished_silence_s):
+            self._hear_page(frame)
+        if self._microphone is not None:
+            for frame in self._microphone.poll():
+                self._hear_room(frame)
         self._take_loaded()
         if self._asr is not None:
             for heard in self._asr.heard():
@@ -150,16 +146,14 @@ class SpeechNode:
             recogniser.close()
 
     def _open_asr(self) -> None:
-        self._opened_asr = True
         try:
             activity = open_voice_activity()
         except (InferenceError, SpeechError) as error:
             self._go_deaf(one_line(error))
             return
-        hot_words = HotWords(self._robot.places, self._space.cell_reader("scene"))
         queue = TranscriptionQueue(self._executor, self._clock)
         names = frozenset(words_of(self._robot.name))
-        self._asr = AsrPipeline(activity, queue, self._profile.speech, hot_words.text, names)
+        self._asr = AsrPipeline(activity, queue, self._profile.speech, names)
         self._loading = self._select(self._profile, 0)
 
     def _select(self, profile: Profile, model_tier: int) -> "Future[SelectedRecogniser]":
@@ -186,52 +180,41 @@ class SpeechNode:
             return
         self._asr.queue.selected, self._loading = self._loading.result(), None
 
-    def _poll(self) -> SoundBlock | None:
-        if self._microphone is None:
-            return None
-        try:
-            return self._microphone.poll()
-        except SpeechMissing as error:
-            self._go_deaf(str(error))
-            self._microphone.close()
-            self._microphone = None
-            return None
-
     def _go_deaf(self, why: str) -> None:
         _log.error("degraded: the robot is deaf: %s", why)
         self._deaf = why
 
-    def _hear_room(self, block: SoundBlock) -> None:
+    def _hear_room(self, frame: SoundBlock) -> None:
         """Hear the room; while a person speaks into the page, only for stop words."""
+        if self._voice is not None:
+            frame = self._voice.cleaned(frame)
         if self._stop_words is not None:
-            self._stop_words.feed(block)
+            self._stop_words.feed(frame, self._playing())
         if not self._page.is_open:
-            self._understand(block, self._playing(), in_page=False)
+            self._understand(frame, self._playing(), in_page=False)
 
-    def _hear_page(self, block: SoundBlock) -> None:
+    def _hear_page(self, frame: SoundBlock) -> None:
         """Hear a person who holds the page's button: the robot falls silent for them."""
         if self._page_stop_words is not None:
-            self._page_stop_words.feed(block)
-        if not self._opened_asr:
-            self._open_asr()
+            self._page_stop_words.feed(frame)
         if not self._in_page and self._voice is not None and self._playing() is not None:
-            self._voice.barge_in(block.stamp_ns)
-        self._understand(block, None, in_page=True)
+            self._voice.fall_silent(SOMEBODY_SPOKE)
+        self._understand(frame, None, in_page=True)
 
-    def _understand(self, block: SoundBlock, playing: Playing | None, *, in_page: bool) -> None:
+    def _understand(self, frame: SoundBlock, playing: Playing | None, *, in_page: bool) -> None:
         if self._asr is None:
             return
         if in_page is not self._in_page:
             self._in_page = in_page
-            block = replace(block, follows=False)
+            frame = replace(frame, follows=False)
         try:
-            barged_ns = self._asr.feed(block, playing)
+            barged_in = self._asr.feed(frame, playing)
         except InferenceError as error:
             self._go_deaf(one_line(error))
             self._close_asr()
             return
-        if barged_ns is not None and self._voice is not None:
-            self._voice.barge_in(barged_ns)
+        if barged_in and self._voice is not None:
+            self._voice.fall_silent(SOMEBODY_SPOKE)
 
     def _after_listeners(self, heard: HeardPhrase) -> HeardPhrase:
         """Keep a phrase in which a listener has heard a stop from being a command."""
@@ -254,17 +237,13 @@ class SpeechNode:
             self._status.put_document(self._document())
 
     def _document(self) -> dict[str, Any]:
-        microphone, asr = self._microphone, self._asr
+        asr, why = self._asr, self._why_deaf()
         recogniser = None if asr is None else asr.queue.recogniser
-        why = self._why_deaf()
         return {
             "state": "deaf" if why or asr is None else asr.state,
             "why": why,
             "speaking": self._playing() is not None,
-            "microphone": {} if microphone is None else microphone.document(),
-            "page": self._page.document(),
-            "room": {} if asr is None else asr.document(),
-            "model": {} if recogniser is None else recogniser.document(),
+            "model": {} if recogniser is None else {"name": recogniser.model.manifest.name},
             "heard": self._publisher.document(),
             "voice": {} if self._voice is None else dict(self._voice.document()),
             **{one.name: dict(one.document()) for one in self._listeners},

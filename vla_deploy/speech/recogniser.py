@@ -1,13 +1,12 @@
 """Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
 
-import math
 import os
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from drivers.latency import LatencyHistogram
 from platforms import ModelChoice
 from vla_deploy.aside import background
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
@@ -20,11 +19,8 @@ from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.sound import RATE_HZ, Sound
-from vla_deploy.speech.transcript import Transcript, others_of
+from vla_deploy.speech.transcript import Transcript, confidence
 
-_TOKENS_S: Final = 12.0
-_TOKENS: Final = 8
-_MOST_TOKENS: Final = 200
 _COMPUTE: Final = {
     (CPU, "int8"): "int8",
     (CPU, "fp16"): "float32",
@@ -43,24 +39,27 @@ class Recogniser:
     """Read phrases one at a time, in this thread or another one."""
 
     def __init__(
-        self, model: Model, whisper: Any, clock: Clock, *, provider: str, beam: int
+        self,
+        model: Model,
+        declared: Whisper,
+        whisper: Any,
+        clock: Clock,
+        *,
+        provider: str,
+        beam: int,
     ) -> None:
         """Take an open Whisper over; `open_recogniser` makes one."""
-        declared = model.manifest.whisper
-        assert declared is not None, "only manifests of a Whisper come here"
         self.model = model
-        self.declared: Whisper = declared
+        self.declared = declared
         self.provider = provider
-        self.notices: tuple[str, ...] = ()
         self.load_s = 0.0
         self.memory_mb = 0.0
         self.claim = MemoryClaim()
-        self.latency = LatencyHistogram()
         self._whisper: Any = whisper
         self._clock = clock
         self._beam = beam
 
-    def read(self, samples: Sound, hot_words: str = "") -> Transcript:
+    def read(self, samples: Sound) -> Transcript:
         """Return what is said in a phrase of at most 29 s.
 
         Raises:
@@ -70,37 +69,16 @@ class Recogniser:
             raise RunFailed(f"{self.model.manifest.name}: it is closed")
         started_ns = self._clock.now_ns()
         try:
-            segments, info = self._transcribe(samples, hot_words)
+            transcript: Transcript = self._whisper.read(
+                samples, languages=self.declared.languages, beam=self._beam
+            )
         except _MODEL_ERRORS as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
-        took_ns = self._clock.now_ns() - started_ns
-        self.latency.record(took_ns)
-        # Without timestamps a window is one segment, and a phrase is one window.
-        segment = segments[0] if segments else None
-        return Transcript(
-            text="" if segment is None else segment.text.strip(),
-            log_probability=0.0 if segment is None else segment.avg_logprob,
-            no_speech=1.0 if segment is None else segment.no_speech_prob,
-            compression=0.0 if segment is None else segment.compression_ratio,
-            language=info.language,
-            duration_s=len(samples) / RATE_HZ,
-            took_s=took_ns / NS_PER_S,
-            others=others_of(self._whisper.hypotheses),
+        return replace(
+            transcript,
+            confidence=confidence(transcript, self.declared.calibration),
+            took_s=(self._clock.now_ns() - started_ns) / NS_PER_S,
         )
-
-    def document(self) -> dict[str, Any]:
-        """Return what it is and has cost, as `speech_status` tells it."""
-        return {
-            "name": self.model.manifest.name,
-            "provider": self.provider,
-            "calibrated": self.declared.calibration is not None,
-            "load_s": round(self.load_s, 3),
-            "memory_mb": round(self.memory_mb, 1),
-            "read": self.latency.count,
-            "p50_s": self.latency.percentile_ns(0.5) / NS_PER_S,
-            "p95_s": self.latency.percentile_ns(0.95) / NS_PER_S,
-            "notices": list(self.notices),
-        }
 
     def close(self) -> None:
         """Release the memory; closing twice is allowed."""
@@ -108,35 +86,6 @@ class Recogniser:
             self._whisper.model.unload_model()
         self._whisper = None
         self.claim.release()
-
-    def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
-        whisper = self._whisper
-        whisper.hypotheses.clear()
-        if self.declared.context == Context.TRIMMED:
-            whisper.content_frames = len(samples) // whisper.feature_extractor.hop_length
-        seconds = len(samples) / RATE_HZ
-        segments, info = whisper.transcribe(
-            samples,
-            language=self._language(),
-            beam_size=self._beam,
-            temperature=0.0,
-            without_timestamps=True,
-            condition_on_previous_text=False,
-            compression_ratio_threshold=None,
-            log_prob_threshold=None,
-            no_speech_threshold=None,
-            hotwords=hot_words if hot_words and self.declared.hot_words else None,
-            # CTranslate2 ends a text at half of what it is told.
-            max_new_tokens=min(_MOST_TOKENS, 2 * (_TOKENS + math.ceil(_TOKENS_S * seconds))),
-        )
-        return list(segments), info
-
-    def _language(self) -> str | None:
-        """Return the language that is spoken; None finds out, at the cost of encoding twice."""
-        if not self._whisper.model.is_multilingual:
-            return "en"
-        declared = self.declared.languages
-        return declared[0] if len(declared) == 1 else None
 
 
 def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Clock) -> Recogniser:
@@ -154,24 +103,24 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     # the threads that it starts inherit the priority, and phrases are to be read without delay.
     with background(MonotonicClock()) as thread:
         thread.submit(check_parts, model).result()
-    provider = _provider(choice, runtime)
+    provider, declared = _provider(choice, runtime), model.manifest.whisper
+    assert declared is not None, "only manifests of a Whisper come here"
     try:
         whisper = runtime.Whisper(
-            str(model.folder),
+            model.folder,
+            trimmed=declared.context == Context.TRIMMED,
             device=_DEVICES[provider],
             compute_type=_COMPUTE[provider, choice.precision],
             cpu_threads=min(choice.threads, len(os.sched_getaffinity(0))),
             num_workers=1,
-            local_files_only=True,
         )
     except _MODEL_ERRORS as error:
         raise ModelFileSpoiled(
             f"{model.folder}: {runtime.VERSION} cannot load it: {one_line(error)}; expected a "
             "Whisper converted by CTranslate2: add the model again"
         ) from error
-    recogniser = Recogniser(model, whisper, clock, provider=provider, beam=beam)
+    recogniser = Recogniser(model, declared, whisper, clock, provider=provider, beam=beam)
     recogniser.read(np.zeros(RATE_HZ, np.float32))
-    recogniser.latency.reset()
     recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
     return recogniser

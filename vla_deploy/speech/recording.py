@@ -1,7 +1,9 @@
 """Hear without a process around it: a recording, or a microphone of the command line."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+
+import numpy as np
 
 from drivers.audio.wav import read_wav
 from drivers.clock import Clock
@@ -10,11 +12,9 @@ from vla_deploy.aside import AtOnce
 from vla_deploy.speech.asr_pipeline import AsrPipeline
 from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.model_selection import SelectedRecogniser
-from vla_deploy.speech.sound import Sound, count_of
+from vla_deploy.speech.sound import FRAME, Sound, SoundBlock, duration_ns
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
-
-BLOCK: Final = count_of(0.02)
 
 
 class StreamClock:
@@ -32,9 +32,15 @@ class StreamClock:
         self.ns = max(self.ns, deadline_ns)
 
 
-def open_hearing(
-    selected: SelectedRecogniser, profile: Profile, clock: Clock, hot_words: str = ""
-) -> AsrPipeline:
+def frames_of(sound: Sound, before: int = 0) -> Iterator[SoundBlock]:
+    """Cut a recording, with silence behind it; `before` samples of other sound came before it."""
+    padded = np.pad(sound, (0, -len(sound) % FRAME))
+    for at in range(0, len(padded), FRAME):
+        stamp_ns = duration_ns(before + at)
+        yield SoundBlock(stamp_ns=stamp_ns, samples=padded[at : at + FRAME], follows=at > 0)
+
+
+def open_hearing(selected: SelectedRecogniser, profile: Profile, clock: Clock) -> AsrPipeline:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
 
     Raises:
@@ -43,7 +49,7 @@ def open_hearing(
     """
     queue = TranscriptionQueue(AtOnce(), clock)
     queue.selected = selected
-    return AsrPipeline(open_voice_activity(), queue, profile.speech, lambda: hot_words)
+    return AsrPipeline(open_voice_activity(), queue, profile.speech)
 
 
 def sound_of(path: Path) -> Sound:

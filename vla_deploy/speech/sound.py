@@ -1,6 +1,6 @@
-"""Say what sound is inside the speech process: one channel at 16 kHz, in stamped blocks or frames.
+"""Say what sound is inside the speech process: one channel at 16 kHz, in stamped frames.
 
-A device gives blocks of any length; the networks take frames of 512 samples, 32 ms.
+A device gives blocks of any length; all that listens takes frames of 512 samples, 32 ms.
 """
 
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 
 RATE_HZ: Final = 16_000
-SILENCE_DB: Final = -100.0
+_SILENT_POWER: Final = 1e-10
 FRAME: Final = 512
 FRAME_S: Final = FRAME / RATE_HZ
 Sound = NDArray[np.float32]
@@ -90,7 +90,4 @@ def level_db(samples: Sound) -> float:
 
     A constant offset, as cheap microphones have one, is no sound.
     """
-    if not len(samples):
-        return SILENCE_DB
-    power = float(np.var(samples, dtype=np.float64))
-    return max(SILENCE_DB, 10.0 * float(np.log10(power + 1e-12)))
+    return 10.0 * float(np.log10(np.var(samples, dtype=np.float64) + _SILENT_POWER))

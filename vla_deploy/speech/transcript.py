@@ -1,6 +1,7 @@
 """Hold what a recogniser read in a phrase, what may have been said instead, and how sure it is."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from typing import Final
 
@@ -13,14 +14,6 @@ _LEAST_ODDS: Final = 0.02
 _PLAIN_COMPRESSION: Final = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Alternative:
-    """Hold what may have been said instead; `odds` is its probability over the transcript's own."""
-
-    text: str
-    odds: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transcript:
     """Hold what a model read in a phrase, and what speaks for it.
@@ -28,7 +21,8 @@ class Transcript:
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
     as far as the model knows several. `others` is what may have been said instead, the likeliest
-    first.
+    first, each with its probability over that of `text`; `confidence` how probably the words are
+    right. A phrase `is_foreign` that was spoken in a language which nobody declared.
     """
 
     text: str
@@ -36,22 +30,21 @@ class Transcript:
     no_speech: float
     compression: float
     language: str
-    duration_s: float
-    took_s: float
-    others: tuple[Alternative, ...] = ()
+    others: tuple[tuple[str, float], ...] = ()
+    is_foreign: bool = False
+    confidence: float = 0.0
+    took_s: float = 0.0
 
 
-def others_of(windows: list[list[tuple[str, float]]]) -> tuple[Alternative, ...]:
-    """Return what else was found in a phrase; of several windows of sound nobody can tell."""
-    if len(windows) != 1:
-        return ()
-    (best, best_log), *rest = windows[0]
+def others_of(readings: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+    """Return what else was found; `readings` have the logarithm of their probability."""
+    (best, best_log), *rest = readings
     odds: dict[str, float] = {}
     for text, log_probability in rest:
         if text and text != best:
             odds.setdefault(text, math.exp(min(0.0, log_probability - best_log)))
     ranked = sorted(odds.items(), key=lambda one: -one[1])
-    return tuple(Alternative(text, round(one, 4)) for text, one in ranked if one >= _LEAST_ODDS)
+    return tuple((text, round(one, 4)) for text, one in ranked if one >= _LEAST_ODDS)
 
 
 def evidence_of(transcript: Transcript) -> tuple[float, float, float, float]:

@@ -6,7 +6,6 @@ then is not carried out; of more than `MOST_WAITING` phrases that wait, the newe
 
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
@@ -18,15 +17,8 @@ from vla_deploy.speech.transcript import Transcript
 
 LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PhraseTranscript:
-    """Hold what was read in a phrase, or in one so far; None, and why, where nothing could be."""
-
-    phrase: Phrase
-    transcript: Transcript | None
-    trouble: str = ""
+Reading = tuple[Phrase, Transcript | None, str]
+"""What was read in a phrase that has ended, and why it is not to be carried out, if so."""
 
 
 class TranscriptionQueue:
@@ -38,9 +30,7 @@ class TranscriptionQueue:
         self._clock = clock
         self._executor = executor
         self._draft: tuple[Phrase, Future[Transcript]] | None = None
-        self._drafting: Future[Transcript] | None = None
         self._ended: list[tuple[Phrase, Future[Transcript]]] = []
-        self._refused: list[PhraseTranscript] = []
 
     @property
     def is_busy(self) -> bool:
@@ -52,51 +42,48 @@ class TranscriptionQueue:
         """Return the recogniser that reads the next phrase."""
         return self.selected.recogniser
 
-    def draft(self, phrase: Phrase, hot_words: str) -> None:
-        """Read a phrase in advance, unless something is being read."""
-        under_way = self._drafting is not None and not self._drafting.done()
-        if self.recogniser is not None and not under_way and not self._ended:
-            self._drafting = self._ask(self.recogniser, phrase, hot_words)
-            self._draft = phrase, self._drafting
+    def draft(self, phrase: Phrase) -> None:
+        """Read a phrase in advance."""
+        self.forget_draft()
+        if self.recogniser is not None:
+            self._draft = phrase, self._ask(self.recogniser, phrase)
 
-    def drafted(self) -> PhraseTranscript | None:
+    def drafted(self) -> tuple[Phrase, Transcript] | None:
         """Return what was read in advance, as soon as it is there."""
         if self._draft is None:
             return None
         phrase, future = self._draft
-        if not future.done() or future.cancelled() or future.exception() is not None:
+        if not future.done() or future.exception() is not None:
             return None
-        return PhraseTranscript(phrase=phrase, transcript=future.result())
+        return phrase, future.result()
 
     def forget_draft(self) -> None:
         """Note that the speaker has gone on: what was read in advance is not all."""
-        draft, self._draft = self._draft, None
-        if draft is not None:
-            draft[1].cancel()
+        if self._draft is not None:
+            self._draft[1].cancel()
+        self._draft = None
 
-    def finish(self, phrase: Phrase, hot_words: str) -> None:
-        """Take a phrase that has ended: by what was read in advance, if that was all of it."""
+    def finish(self, phrase: Phrase) -> str:
+        """Take a phrase that has ended, read in advance if that was all of it; return why not."""
         draft, self._draft = self._draft, None
         if self.recogniser is None:
-            self._refuse(phrase, f"no model turns speech into text: {self.selected.why}")
-        elif len(self._ended) >= MOST_WAITING:
-            self._refuse(phrase, f"{MOST_WAITING} phrases are waiting to be read already")
-        elif draft is not None and draft[0].ended_ns == phrase.ended_ns:
+            return f"no model turns speech into text: {self.selected.why}"
+        if len(self._ended) >= MOST_WAITING:
+            return f"{MOST_WAITING} phrases are waiting to be read already"
+        if draft is not None and draft[0].ended_ns == phrase.ended_ns:
             self._ended.append((phrase, draft[1]))
         else:
-            self._ended.append((phrase, self._ask(self.recogniser, phrase, hot_words)))
+            self._ended.append((phrase, self._ask(self.recogniser, phrase)))
+        return ""
 
-    def answers(self) -> Iterator[PhraseTranscript]:
+    def answers(self) -> Iterator[Reading]:
         """Yield what has been answered since the last call, in the order of the phrases."""
-        refused, self._refused = self._refused, []
-        yield from refused
         while self._ended and self._ended[0][1].done():
             phrase, future = self._ended.pop(0)
             try:
-                transcript, trouble = future.result(), self._late(phrase)
+                yield phrase, future.result(), self._late(phrase)
             except RunFailed as error:
-                transcript, trouble = None, str(error)
-            yield PhraseTranscript(phrase=phrase, transcript=transcript, trouble=trouble)
+                yield phrase, None, str(error)
 
     def close(self) -> None:
         """Release everything; what is under way is given up."""
@@ -109,8 +96,5 @@ class TranscriptionQueue:
         late_ns = self._clock.now_ns() - phrase.ended_ns
         return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
 
-    def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> "Future[Transcript]":
-        return self._executor.submit(recogniser.read, phrase.samples, hot_words)
-
-    def _refuse(self, phrase: Phrase, trouble: str) -> None:
-        self._refused.append(PhraseTranscript(phrase=phrase, transcript=None, trouble=trouble))
+    def _ask(self, recogniser: Recogniser, phrase: Phrase) -> "Future[Transcript]":
+        return self._executor.submit(recogniser.read, phrase.samples)

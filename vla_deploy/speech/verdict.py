@@ -11,7 +11,6 @@ from difflib import SequenceMatcher
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.transcript import Transcript
 from vla_deploy.speech.words import STOPS, holds_stop, is_courtesy, is_stop, words_of
 
@@ -21,16 +20,12 @@ STOP_WITHIN_CONFIDENCE: Final = 0.5
 """The same, of a stop word among others: below that, other talk is often misread as one."""
 MOST_COMPRESSION: Final = 2.4
 NO_SPEECH: Final = 0.8
-CLIPPED_RATIO: Final = 0.01
 OWN_RUN: Final = 4
 OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
 OWN_VOICE: Final = "the robot heard itself"
-_OVERDRIVEN: Final = (
-    "; the microphone is overdriven: turn its gain down, or speak from farther away"
-)
 
 
 class Verdict(StrEnum):
@@ -40,17 +35,6 @@ class Verdict(StrEnum):
     DOUBTED = "doubted"
     REJECTED = "rejected"
     STOP = "stop"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """Hold all that a phrase is judged by."""
-
-    transcript: Transcript
-    phrase: Phrase
-    confidence: float
-    least_confidence: float
-    languages: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,68 +59,56 @@ def stops(text: str, confidence: float, own_words: str = "", names: Set[str] = f
     return holds_stop(text) and confidence >= STOP_WITHIN_CONFIDENCE
 
 
-def judge(case: Case) -> Judgement:
-    """Return what becomes of a phrase that is no stop."""
+def judge(transcript: Transcript, own_words: str, least_confidence: float) -> Judgement:
+    """Return what becomes of words that are no stop, while the robot was saying `own_words`."""
     for why, ask_again in _REFUSALS:
-        reason = why(case)
+        reason = why(transcript, own_words)
         if reason:
-            makes_sense = case.confidence >= DOUBT_RATIO * case.least_confidence
-            is_doubted = why is _unsure and makes_sense
-            verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
-            return Judgement(verdict=verdict, reason=reason, ask_again=ask_again)
-    return Judgement(verdict=Verdict.ACCEPTED)
+            return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=ask_again)
+    sure, least = transcript.confidence, least_confidence
+    if sure >= least:
+        return Judgement(verdict=Verdict.ACCEPTED)
+    verdict = Verdict.DOUBTED if sure >= DOUBT_RATIO * least else Verdict.REJECTED
+    reason = f"understood by {sure:.0%}, at least {least:.0%} is needed"
+    return Judgement(verdict=verdict, reason=reason, ask_again=True)
 
 
-def _without_words(case: Case) -> str:
-    return "" if words_of(case.transcript.text) else "a sound without words"
+def _without_words(transcript: Transcript, _: str) -> str:
+    return "" if words_of(transcript.text) else "a sound without words"
 
 
-def _courtesy(case: Case) -> str:
-    is_one = is_courtesy(case.transcript.text)
-    return "a courtesy: nothing to do, nothing to answer" if is_one else ""
+def _courtesy(transcript: Transcript, _: str) -> str:
+    return "a courtesy: nothing to do or to answer" if is_courtesy(transcript.text) else ""
 
 
-def _own_voice(case: Case) -> str:
+def _own_voice(transcript: Transcript, own_words: str) -> str:
     """Know an echo by words in the robot's order: an answer takes up some of them, in its own."""
-    words, own = words_of(case.transcript.text), words_of(case.phrase.own_words)
+    words, own = words_of(transcript.text), words_of(own_words)
     blocks = SequenceMatcher(None, own, words, autojunk=False).get_matching_blocks()
     runs = [block.size for block in blocks]
     is_echo = words == own or max(runs) >= OWN_RUN
     return OWN_VOICE if is_echo and sum(runs) > OWN_RATIO * len(words) else ""
 
 
-def _language(case: Case) -> str:
-    spoken = case.transcript.language
-    if spoken in case.languages:
-        return ""
-    return f"spoken in {spoken}, but only {', '.join(case.languages)} is understood"
+def _language(transcript: Transcript, _: str) -> str:
+    spoken = transcript.language
+    return f"spoken in {spoken}, which is not understood" if transcript.is_foreign else ""
 
 
-def _made_up(case: Case) -> str:
+def _made_up(transcript: Transcript, _: str) -> str:
     """Know what networks invent where nobody speaks: they say so, or repeat themselves."""
-    no_speech, compression = case.transcript.no_speech, case.transcript.compression
-    if no_speech > NO_SPEECH:
-        return f"nobody spoke, by {no_speech:.0%}"
-    if compression > MOST_COMPRESSION:
-        return (
-            f"the text repeats itself, compression {compression:.1f} of {MOST_COMPRESSION} at most"
-        )
+    if transcript.no_speech > NO_SPEECH:
+        return f"nobody spoke, by {transcript.no_speech:.0%}"
+    if transcript.compression > MOST_COMPRESSION:
+        return f"the text repeats itself, by {transcript.compression:.1f}"
     return ""
 
 
-def _unsure(case: Case) -> str:
-    if case.confidence >= case.least_confidence:
-        return ""
-    reason = f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
-    return reason + (_OVERDRIVEN if case.phrase.clipped_ratio > CLIPPED_RATIO else "")
-
-
-_REFUSALS: Final[tuple[tuple[Callable[[Case], str], bool], ...]] = (
+_REFUSALS: Final[tuple[tuple[Callable[[Transcript, str], str], bool], ...]] = (
     (_without_words, False),
     (_courtesy, False),
     (_own_voice, False),
     (_language, True),
     (_made_up, False),
-    (_unsure, True),
 )
-"""What may be said against a phrase, and whether to ask for it again."""
+"""What may be said against a phrase besides doubt, and whether to ask for it again."""

@@ -4,9 +4,11 @@ It loads the hub's client, which would look for what a model's folder lacks. Thr
 arithmetic that wait for work give their core away.
 """
 
-import logging
+import math
 import os
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 os.environ["HF_HUB_OFFLINE"] = "1"
@@ -17,76 +19,93 @@ os.environ["KMP_BLOCKTIME"] = "0"
 import ctranslate2
 import faster_whisper
 import numpy as np
-from faster_whisper.transcribe import get_compression_ratio
+from faster_whisper.audio import pad_or_trim
+from faster_whisper.tokenizer import Tokenizer
+from faster_whisper.transcribe import get_compression_ratio, get_suppressed_tokens
 from numpy.typing import NDArray
 
-# It tells the log of every phrase; what was heard is told in `heard`, and nowhere else.
-logging.getLogger("faster_whisper").setLevel(logging.WARNING)
+from vla_deploy.speech.sound import RATE_HZ, Sound
+from vla_deploy.speech.transcript import Transcript, others_of
+
 VERSION: str = f"faster-whisper {faster_whisper.__version__}"
-_MARGIN_FRAMES = 40
-_FRAMES_PER_STATE = 2
+_TOKENS_S: Final = 12.0
+_TOKENS: Final = 8
+_MOST_TOKENS: Final = 200
+_MARGIN_FRAMES: Final = 40
+_FRAMES_PER_STATE: Final = 2
+_PLAIN_SUPPRESSED: Final = [-1]  # those that a model's own files name
 
 
-class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimported,unused-ignore]
-    """Keep what else the search found beside what it read, which the library drops.
+class Whisper:
+    """Read phrases of one window of sound, and keep what else the search found.
 
-    `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
-    the best first. Whoever reads empties them before. With `content_frames` the encoder is given
-    only so many frames and a little silence, for weights that were trained so: the library itself
-    always pads to its window.
+    With `trimmed` weights the encoder is given the sound's own frames and a little silence only;
+    others know but windows of 30 s.
     """
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self.hypotheses: list[list[tuple[str, float]]] = []
-        self.content_frames: int | None = None
+    def __init__(self, folder: Path, *, trimmed: bool, **options: Any) -> None:
+        whisper = faster_whisper.WhisperModel(str(folder), local_files_only=True, **options)
+        self.model = whisper.model
+        self.feature_extractor = whisper.feature_extractor
+        self._tokenizer = whisper.hf_tokenizer
+        self._trimmed = trimmed
 
-    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
-        """Return what the encoder makes of features, (mel bands, frames)."""
-        if self.content_frames is None:
-            return super().encode(features)
-        kept = self.content_frames + _MARGIN_FRAMES
+    def read(self, samples: Sound, *, languages: Sequence[str], beam: int) -> Transcript:
+        """Return what is said, in the one language of `languages` or in the one that is found."""
+        window = self._window(samples)
+        states = self.model.encode(ctranslate2.StorageView.from_array(window), to_cpu=False)
+        language = self._language(states, languages)
+        multilingual = self.model.is_multilingual
+        words = Tokenizer(self._tokenizer, multilingual, task="transcribe", language=language)
+        prompt = [*words.sot_sequence, words.no_timestamps]
+        # CTranslate2 ends a text at half of what it is told.
+        longest = 2 * (_TOKENS + math.ceil(_TOKENS_S * len(samples) / RATE_HZ))
+        found = self.model.generate(
+            states,
+            [prompt],
+            beam_size=beam,
+            num_hypotheses=beam,
+            max_length=len(prompt) + min(_MOST_TOKENS, longest),
+            return_scores=True,
+            return_no_speech_prob=True,
+            suppress_tokens=get_suppressed_tokens(words, _PLAIN_SUPPRESSED),
+        )[0]
+        readings = [
+            (words.decode(tokens).strip(), score * len(tokens))
+            for tokens, score in zip(found.sequences_ids, found.scores, strict=True)
+        ]
+        text, log_probability = readings[0]
+        return Transcript(
+            text=text,
+            # The end of the text is a token, too.
+            log_probability=log_probability / (len(found.sequences_ids[0]) + 1),
+            no_speech=found.no_speech_prob,
+            compression=get_compression_ratio(text),
+            language=language,
+            others=others_of(readings),
+            is_foreign=self.model.is_multilingual and language not in languages,
+        )
+
+    def _window(self, samples: Sound) -> NDArray[np.float32]:
+        """Return the features that the encoder is given, (1, mel bands, frames)."""
+        features = pad_or_trim(self.feature_extractor(samples)[:, :-1])
+        if not self._trimmed:
+            return np.ascontiguousarray(features[None])
+        kept = len(samples) // self.feature_extractor.hop_length + _MARGIN_FRAMES
         kept += kept % _FRAMES_PER_STATE
         # CTranslate2 takes what has as many rows as there are mel bands for features, and would
         # encode its own states once more (`WhisperEncoder::is_encoded`).
         if kept // _FRAMES_PER_STATE == features.shape[-2]:
             kept += _FRAMES_PER_STATE
-        return super().encode(np.ascontiguousarray(features[..., :kept]))
+        return np.ascontiguousarray(features[None, :, :kept])
 
-    def generate_with_fallback(
-        self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any
-    ) -> tuple[Any, float, float, float]:
-        """Return the best text, its mean log-probability, the temperature, how much it repeats.
-
-        The library would try again at other temperatures; here there is none but nought.
-        """
-        # The library takes the same bounds from its options.
-        longest = how.max_new_tokens
-        result = self.model.generate(
-            encoder_output,
-            [prompt],
-            beam_size=how.beam_size,
-            num_hypotheses=how.beam_size,
-            patience=how.patience,
-            length_penalty=how.length_penalty,
-            repetition_penalty=how.repetition_penalty,
-            no_repeat_ngram_size=how.no_repeat_ngram_size,
-            max_length=self.max_length if longest is None else len(prompt) + longest,
-            return_scores=True,
-            return_no_speech_prob=True,
-            suppress_blank=how.suppress_blank,
-            suppress_tokens=how.suppress_tokens,
-            max_initial_timestamp_index=round(how.max_initial_timestamp / self.time_precision),
-        )[0]
-        found = [
-            (tokenizer.decode(tokens).strip(), score * len(tokens) ** how.length_penalty)
-            for tokens, score in zip(result.sequences_ids, result.scores, strict=True)
-        ]
-        self.hypotheses.append(found)
-        text, log_probability = found[0]
-        # The end of the text is a token, too.
-        mean = log_probability / (len(result.sequences_ids[0]) + 1)
-        return result, mean, 0.0, get_compression_ratio(text)
+    def _language(self, states: ctranslate2.StorageView, languages: Sequence[str]) -> str:
+        if not self.model.is_multilingual:
+            return "en"
+        if len(languages) == 1:
+            return languages[0]
+        token: str = self.model.detect_language(states)[0][0][0]
+        return token[2:-2]
 
 
 def cuda_devices() -> int:

@@ -14,8 +14,6 @@ def _read(text: str, log_probability: float) -> Read:
         no_speech=0.0,
         compression=0.5,
         language="en",
-        duration_s=1.0,
-        took_s=0.01,
     )
     return Read(clip=clip, reading=reading, cpu_s=0.01)
 

@@ -54,7 +54,7 @@ def test_each_phrase_of_a_recording_is_told_with_times_and_verdict(
     assert (code, [one["text"] for one in phrases]) == (0, ["turn left", "turn left"])
     assert {one["verdict"] for one in phrases} == {"accepted"}
     assert 0 < phrases[0]["began_s"] < phrases[0]["ended_s"] < phrases[1]["began_s"]
-    assert phrases[0]["log_probability"] > -0.3
+    assert phrases[0]["confidence"] > 0.8
     assert "accepted" in hear(recording, "--model", "says-left")[1]
 
 

@@ -47,7 +47,7 @@ def test_a_whisper_is_added_listed_checked_measured_and_removed(
         ["model.bin"],
     )
     shown = json.loads(vla("show", "mine", "--json")[1])
-    assert shown["whisper"] == {"languages": ["en"], "context": "trimmed", "hot_words": True}
+    assert shown["whisper"] == {"languages": ["en"], "context": "trimmed"}
     code, out, _ = vla("verify", "mine", "--profile", "desktop")
     assert (code, out.count("ok  ")) == (0, 3)
     code, out, _ = vla("bench", "mine", "--rounds", "2", "--profile", "desktop", "--json")

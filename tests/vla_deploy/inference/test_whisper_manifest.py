@@ -27,7 +27,6 @@ def manifest_of(paths: tuple[str, ...] = PARTS, role: str = "speech_to_text") ->
         whisper=Whisper(
             languages=("en",),
             context=Context.TRIMMED,
-            hot_words=False,
             calibration=Calibration(bias=3, log_probability=4.5, no_speech=-3, compression=-2),
         ),
     )

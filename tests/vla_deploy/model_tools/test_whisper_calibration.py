@@ -24,8 +24,6 @@ READING = Transcript(
     no_speech=0.0,
     compression=1.0,
     language="en",
-    duration_s=1.0,
-    took_s=0.02,
 )
 
 

@@ -1,5 +1,6 @@
 """A spoken stop presses the button before its phrase has ended, once, and is no command."""
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -7,13 +8,12 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.aside import AtOnce
-from vla_deploy.inference.manifest import Context, Whisper
 from vla_deploy.speech.asr_pipeline import STOPPED, AsrPipeline, HeardPhrase
 from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import FRAME, Playing, SoundBlock, duration_ns
-from vla_deploy.speech.transcript import Transcript
+from vla_deploy.speech.transcript import Transcript, confidence
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.verdict import OWN_VOICE, Verdict
 from vla_deploy.speech.voice_activity import VoiceActivity
@@ -37,21 +37,19 @@ class Reader:
     """Read more of a text the longer the sound is, in place of a network."""
 
     def __init__(self, words: str, log_probability: float) -> None:
-        self.declared = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=False)
         self._words = words.split()
         self._log_probability = log_probability
 
-    def read(self, samples: Any, _hot_words: str) -> Transcript:
+    def read(self, samples: Any) -> Transcript:
         voiced_s = float((np.abs(samples) >= LOUD).sum()) / 16_000
-        return Transcript(
+        read = Transcript(
             text=" ".join(self._words[: 1 + int(voiced_s / 0.3)]),
             log_probability=self._log_probability,
             no_speech=0.0,
             compression=1.0,
             language="en",
-            duration_s=1.0,
-            took_s=0.0,
         )
+        return replace(read, confidence=confidence(read, None))
 
 
 def heard(
@@ -63,7 +61,7 @@ def heard(
     reader = cast("Recogniser", Reader(words, log_probability))
     queue.selected = SelectedRecogniser(recogniser=reader)
     activity = cast("VoiceActivity", LoudnessVad())
-    asr = AsrPipeline(activity, queue, load_profile("desktop").speech, lambda: "")
+    asr = AsrPipeline(activity, queue, load_profile("desktop").speech)
     told: list[tuple[float, HeardPhrase]] = []
     tone = np.where(np.arange(FRAME) % 16 < 8, 1.0, -1.0).astype(np.float32)
     quiet, loud = 0.001 * tone, LOUD * tone

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from platforms import SpeechSettings
-from vla_deploy.speech.endpointing import Endpointer, VadEvent, VadEventKind
+from vla_deploy.speech.endpointing import Endpointer, VadEvent
 from vla_deploy.speech.sound import FRAME, FRAME_S, Framer, SoundBlock, duration_ns, level_db
 
 SETTINGS = SpeechSettings(
@@ -26,12 +26,12 @@ class Stream:
         self.phrases = Endpointer(SETTINGS)
         self.at = 0
 
-    def play(self, scene: str, *, level: float = 0.1) -> list[VadEvent]:
+    def play(self, scene: str) -> list[VadEvent]:
         found: list[VadEvent] = []
         for letter in scene:
             frame = SoundBlock(
                 stamp_ns=duration_ns(self.at * FRAME),
-                samples=np.full(FRAME, level, np.float32),
+                samples=np.full(FRAME, 0.1, np.float32),
                 follows=True,
             )
             self.at += 1
@@ -41,37 +41,35 @@ class Stream:
 
 
 def steps(found: list[VadEvent]) -> list[str]:
-    return [one.kind.name for one in found]
+    return [kind.name for kind, _ in found]
 
 
 def test_a_phrase_is_its_voice_with_what_came_before_and_a_pause_after() -> None:
     stream = Stream()
     found = stream.play(20 * "." + 30 * "v" + 20 * ".")
-    assert steps(found) == ["BEGAN", "PAUSED", "ENDED"]
-    phrase = found[-1].phrase
+    assert steps(found) == ["PAUSED", "ENDED"]
+    phrase = found[-1][1]
     assert phrase.began_ns == duration_ns(20 * FRAME)
     assert phrase.ended_ns == duration_ns(50 * FRAME)
-    assert phrase.voiced_s == pytest.approx(30 * FRAME_S)
     assert len(phrase.samples) == (10 + 30 + 10) * FRAME, "pre-roll, voice, silence"
-    assert phrase.voice == pytest.approx(0.95)
     assert not stream.phrases.is_open
 
 
 def test_a_murmur_keeps_a_phrase_open_and_begins_none() -> None:
     stream = Stream()
     assert stream.play(100 * "m") == []
-    assert steps(stream.play("vvmmmmmmmmmmmmmmmmmmmmvv" + 10 * ".")) == ["BEGAN", "PAUSED", "ENDED"]
+    assert steps(stream.play("vvmmmmmmmmmmmmmmmmmmmmvv" + 10 * ".")) == ["PAUSED", "ENDED"]
 
 
 def test_a_speaker_who_goes_on_after_a_short_pause_says_one_phrase() -> None:
     found = Stream().play(20 * "v" + 8 * "." + 20 * "v" + 12 * ".")
-    assert steps(found) == ["BEGAN", "PAUSED", "RESUMED", "PAUSED", "ENDED"]
-    assert found[-1].phrase.voiced_s == pytest.approx(48 * FRAME_S)
+    assert steps(found) == ["PAUSED", "RESUMED", "PAUSED", "ENDED"]
+    assert found[-1][1].ended_ns - found[-1][1].began_ns == duration_ns(48 * FRAME)
 
 
 def test_an_unfinished_sentence_is_waited_for_in_this_pause_only() -> None:
     stream = Stream()
-    assert steps(stream.play(20 * "v" + 6 * ".")) == ["BEGAN", "PAUSED"]
+    assert steps(stream.play(20 * "v" + 6 * ".")) == ["PAUSED"]
     stream.phrases.wait_longer()
     assert stream.play(20 * ".") == []
     assert steps(stream.play(20 * "v" + 10 * ".")) == ["RESUMED", "PAUSED", "ENDED"]
@@ -86,27 +84,19 @@ def test_an_unfinished_sentence_that_stays_so_ends_all_the_same() -> None:
 
 def test_a_click_is_no_word() -> None:
     found = Stream().play(20 * "." + "vvv" + 20 * ".")
-    assert steps(found) == ["BEGAN", "PAUSED", "TOO_SHORT"]
+    assert steps(found) == ["PAUSED", "TOO_SHORT"]
 
 
 def test_ten_minutes_of_talk_are_refused_once_and_cost_no_memory() -> None:
     stream = Stream()
     found = stream.play(round(600 / FRAME_S) * "v")
-    assert steps(found) == ["BEGAN", "TOO_LONG"]
-    assert len(found[-1].phrase.samples) * 1.0 <= (SETTINGS.longest_phrase_s + FRAME_S) * 16_000
+    assert steps(found) == ["TOO_LONG"]
+    assert len(found[-1][1].samples) * 1.0 <= (SETTINGS.longest_phrase_s + FRAME_S) * 16_000
     assert stream.play(20 * ".") == [], "a pause of a breath is still the same talk"
     assert steps(stream.play(20 * "v" + 40 * "." + 20 * "v" + 12 * ".")) == [
-        "BEGAN",
         "PAUSED",
         "ENDED",
     ]
-
-
-def test_clipped_samples_are_counted() -> None:
-    stream = Stream()
-    stream.play(20 * "v", level=1.0)
-    (ended,) = (one for one in stream.play(12 * ".") if one.kind is VadEventKind.ENDED)
-    assert ended.phrase.clipped_ratio == pytest.approx(20 / 30, abs=0.01)
 
 
 def test_a_gap_in_the_stream_forgets_what_was_begun() -> None:

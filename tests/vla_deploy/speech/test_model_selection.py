@@ -22,10 +22,11 @@ def shelf(scripted_whisper: Any) -> ModelShelf:
     return ModelShelf(store=store, engines=scripted_whisper.folder, clock=MonotonicClock())
 
 
-def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> Recogniser:
-    recogniser = select_recogniser(shelf, profile, model_tier).recogniser
-    assert recogniser is not None
-    return recogniser
+def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> tuple[Recogniser, str]:
+    """Return the recogniser, and why those before it were left out."""
+    selected = select_recogniser(shelf, profile, model_tier)
+    assert selected.recogniser is not None
+    return selected.recogniser, selected.why
 
 
 def profile_with(*tiers: str) -> Profile:
@@ -38,24 +39,23 @@ def test_the_first_tier_that_is_there_is_opened(shelf: ModelShelf, scripted_whis
     scripted_whisper.model("small", "turn left")
     scripted_whisper.model("tiny", "turn right")
     profile = profile_with("whisper-small.en", "small", "tiny")
-    recogniser = open_best(shelf, profile, 0)
+    recogniser, why = open_best(shelf, profile, 0)
     assert recogniser.model.manifest.name == "small"
-    (notice,) = recogniser.notices
-    assert notice == (
+    assert why == (
         "whisper-small.en is not here (vla-deploy models fetch whisper-small.en, or "
         "add whisper-small.en --whisper FOLDER)"
     )
-    assert open_best(shelf, profile, 2).model.manifest.name == "tiny"
-    assert open_best(shelf, profile, 9).model.manifest.name == "tiny"
+    assert open_best(shelf, profile, 2)[0].model.manifest.name == "tiny"
+    assert open_best(shelf, profile, 9)[0].model.manifest.name == "tiny"
 
 
 def test_a_spoiled_model_gives_way_to_the_next(shelf: ModelShelf, scripted_whisper: Any) -> None:
     spoiled = scripted_whisper.model("spoiled", "turn left")
     (spoiled / "model.bin").write_bytes(b"half")
     scripted_whisper.model("tiny", "turn right")
-    recogniser = open_best(shelf, profile_with("spoiled", "tiny"), 0)
+    recogniser, why = open_best(shelf, profile_with("spoiled", "tiny"), 0)
     assert recogniser.model.manifest.name == "tiny"
-    assert "expected SHA-256" in recogniser.notices[0]
+    assert "expected SHA-256" in why
 
 
 def test_a_model_too_large_for_the_memory_that_is_free_gives_way_to_a_smaller_one(
@@ -69,9 +69,9 @@ def test_a_model_too_large_for_the_memory_that_is_free_gives_way_to_a_smaller_on
     book.declare({"ram_mb": 40})
     book.ask("planner", {"ram_mb": 20})
     in_run = dataclasses.replace(shelf, memory=RunMemory(ipc, clock))
-    recogniser = open_best(in_run, profile_with("large", "tiny"), 0)
+    recogniser, why = open_best(in_run, profile_with("large", "tiny"), 0)
     assert recogniser.model.manifest.name == "tiny"
-    assert "needs 30 of ram_mb, but ram_mb is held by planner (20)" in recogniser.notices[0]
+    assert "needs 30 of ram_mb, but ram_mb is held by planner (20)" in why
     assert len(book.look().granted) == 2
     recogniser.close()
     assert [one.holder for one in book.look().granted] == ["planner"]

@@ -24,7 +24,7 @@ from vla_deploy.ipc.page_sound import PageSound, Step
 from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.sound import Playing, SoundBlock
+from vla_deploy.speech.sound import FRAME, Playing, SoundBlock
 from vla_deploy.speech.stop_words.listener import StopWords
 from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.voice.tts import EspeakEngine
@@ -43,7 +43,7 @@ class Listener:
     def start(self, space: SharedSpace) -> None:
         self.space = space
 
-    def feed(self, block: SoundBlock) -> None:
+    def feed(self, block: SoundBlock, playing: Playing | None = None) -> None:
         self.blocks.append(block)
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:
@@ -60,11 +60,11 @@ class Listener:
 
 
 class ScriptedVoice:
-    """Say one thing for as long as the test wants, and keep who barged in."""
+    """Say one thing for as long as the test wants, and keep why it fell silent."""
 
     def __init__(self) -> None:
         self.playing: Playing | None = None
-        self.barged: list[int] = []
+        self.silenced: list[str] = []
 
     def start(self, space: SharedSpace) -> None:
         self.space = space
@@ -72,11 +72,11 @@ class ScriptedVoice:
     def step(self) -> None:
         """Nothing is to be done: `playing` is what the test sets."""
 
-    def cleaned(self, block: SoundBlock) -> SoundBlock:
-        return block
+    def cleaned(self, frame: SoundBlock) -> SoundBlock:
+        return frame
 
-    def barge_in(self, stamp_ns: int) -> None:
-        self.barged.append(stamp_ns)
+    def fall_silent(self, reason: str) -> None:
+        self.silenced.append(reason)
 
     def document(self) -> Mapping[str, Any]:
         return {}
@@ -205,9 +205,9 @@ def test_a_listener_hears_every_block_in_time_at_16_khz(bench: MakeBench, tone: 
     rig = bench(rate_hz=48_000)
     rig.play(tone(1.0, rate_hz=48_000))
     blocks = rig.listener.blocks
-    assert sum(len(block.samples) for block in blocks) == pytest.approx(16_000, abs=50)
-    assert [block.follows for block in blocks] == [False] + 49 * [True]
-    assert blocks[-1].end_ns == pytest.approx(rig.clock.ns, abs=5_000_000)
+    assert sum(len(block.samples) for block in blocks) == pytest.approx(16_000, abs=FRAME)
+    assert [block.follows for block in blocks] == [False] + 30 * [True]
+    assert blocks[-1].end_ns == pytest.approx(rig.clock.ns, abs=32_000_000)
     assert rig.status()["state"] == "listening"
     assert rig.status()["stop_words"]["blocks"] > 0
 
@@ -245,11 +245,10 @@ def test_a_robot_without_a_microphone_says_so_and_runs(context: NodeContext) -> 
 
 
 def test_a_missing_extra_is_told_in_words(
-    bench: MakeBench, tone: Any, monkeypatch: pytest.MonkeyPatch
+    bench: MakeBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     rig = bench(rate_hz=48_000)
-    rig.play(tone(1.0, rate_hz=48_000))
     assert rig.status()["state"] == "deaf"
     assert "pip install 'vla-deploy[speech]'" in rig.status()["why"]
 
@@ -292,11 +291,10 @@ def test_an_unsure_reading_is_asked_again_and_never_carried_out(bench: MakeBench
     rig = bench(sureness=0.6)
     rig.quiet(1.0)
     rig.say("quelle heure est il maintenant", voice="fr")
-    rig.say(TEXT, gain=60.0)
-    french, clipped = rig.told("heard")
-    assert french["verdict"] == clipped["verdict"] == "rejected"
+    rig.say(TEXT)
+    french, english = rig.told("heard")
+    assert french["verdict"] == english["verdict"] == "rejected"
     assert "at least 50% is needed" in french["reason"]
-    assert "overdriven" in clipped["reason"]
     assert rig.told("utterance") == []
     (asked,) = rig.told("say")
     assert "say it again" in asked["text"], "once, not for each"
@@ -350,11 +348,11 @@ def test_the_robot_does_not_heed_itself_but_a_person_who_speaks_into_it(bench: M
     rig.voice.playing = Playing(say_id="s1", text="I will pick up the cup", echo_db=-20.0)
     rig.say("I will pick up the cup and bring it to you right now", gain=0.3)
     assert rig.told("heard") == []
-    assert rig.voice.barged == []
+    assert rig.voice.silenced == []
     assert rig.status()["speaking"] is True
     heard_by_listeners = len(rig.listener.blocks)
     rig.say("robot come over here to me please", gain=4.0)
-    assert len(rig.voice.barged) == 1
+    assert rig.voice.silenced == ["somebody spoke"]
     assert [one["text"] for one in rig.told("utterance")] == ["come here"]
     assert len(rig.listener.blocks) > heard_by_listeners, "stop words stay live"
 
@@ -412,8 +410,6 @@ def test_what_is_said_into_the_page_is_understood_as_soon_as_the_button_is_let_g
     rig.hold(TEXT, rate_hz=rate_hz)
     rig.quiet(0.1)
     assert [one["text"] for one in rig.told("utterance")] == [TEXT]
-    page = rig.status()["page"]
-    assert (page["turns"], page["cut"]) == (1, 0)
 
 
 def test_a_phrase_that_is_cut_off_is_not_carried_out(bench: MakeBench) -> None:
@@ -432,7 +428,8 @@ def test_a_page_that_falls_silent_gives_the_ears_back_after_seconds(bench: MakeB
     rig.hold(TEXT, last=None, share=0.5)
     rig.quiet(4.0)
     assert rig.told("utterance") == []
-    assert (rig.status()["page"]["speaking"], rig.status()["page"]["cut"]) == (False, 1)
+    rig.say(TEXT)
+    assert len(rig.told("utterance")) == 1
 
 
 def test_while_a_person_speaks_into_the_page_the_room_is_heard_for_stop_words_only(
@@ -457,17 +454,17 @@ def test_the_robot_falls_silent_for_whoever_holds_the_button(bench: MakeBench) -
     rig.voice.playing = Playing(say_id="1", text=question, echo_db=-38.0)
     rig.hold(TEXT)
     rig.quiet(0.1)
-    assert len(rig.voice.barged) == 1
+    assert rig.voice.silenced == ["somebody spoke"]
     assert [one["text"] for one in rig.told("utterance")] == [TEXT]
 
 
 def test_without_pyav_a_turn_at_another_rate_is_told_and_dropped(
-    bench: MakeBench, monkeypatch: pytest.MonkeyPatch
+    bench: MakeBench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     rig = bench()
     monkeypatch.setitem(sys.modules, "av", None)
     rig.quiet(1.0)
     rig.hold(TEXT)
     rig.quiet(0.5)
-    assert "pip install" in rig.status()["page"]["why"]
+    assert caplog.text.count("pip install") == 1
     assert rig.told("utterance") == []

@@ -41,8 +41,7 @@ def test_a_text_is_read_with_what_speaks_for_it(scripted_whisper: Any, context: 
     assert reading.text == "pick up the red cup"
     assert -0.3 < reading.log_probability <= 0.0
     assert reading.no_speech < 0.1
-    assert (reading.language, reading.duration_s) == ("en", 1.0)
-    assert recogniser.document()["read"] == 1, "warming up is not counted"
+    assert reading.language == "en"
     recogniser.close()
     with pytest.raises(RunFailed, match="closed"):
         recogniser.read(SECOND)
@@ -98,13 +97,13 @@ class _Spied:
 
 
 def test_what_may_have_been_said_instead_is_told_the_likeliest_first() -> None:
-    windows = [[("red cup", -1.0), ("red cup", -1.1), ("bad cup", -3.0), ("", -3.1),
-                ("red cap", -1.7), ("led cup", -9.0)]]  # fmt: skip
-    assert [(one.text, one.odds) for one in others_of(windows)] == [
+    readings = [("red cup", -1.0), ("red cup", -1.1), ("bad cup", -3.0), ("", -3.1),
+                ("red cap", -1.7), ("led cup", -9.0)]  # fmt: skip
+    assert list(others_of(readings)) == [
         ("red cap", pytest.approx(0.4966, abs=1e-4)),
         ("bad cup", pytest.approx(0.1353, abs=1e-4)),
     ]
-    assert others_of([*windows, *windows]) == others_of([]) == ()
+    assert others_of(readings[:1]) == ()
 
 
 def test_a_wide_search_tells_other_readings_than_the_best(scripted_whisper: Any) -> None:
@@ -115,7 +114,7 @@ def test_a_wide_search_tells_other_readings_than_the_best(scripted_whisper: Any)
     reading = recogniser.read(SECOND)
     recogniser.close()
     assert reading.text == "pick up the red cup"
-    assert all(one.text != reading.text and 0 < one.odds <= 1 for one in reading.others)
+    assert all(text != reading.text and 0 < odds <= 1 for text, odds in reading.others)
 
 
 @pytest.mark.parametrize(("languages", "detections", "language"), [
@@ -138,25 +137,6 @@ def test_the_language_is_found_out_only_where_several_are_declared(
     model.model = _Spied(model.model, is_multilingual=True, detect_language=detect)
     assert recogniser.read(SECOND).language == language
     assert len(asked) == detections
-
-
-def test_hot_words_are_given_to_a_model_that_takes_them(scripted_whisper: Any) -> None:
-    prompts: dict[str, list[int]] = {}
-    for name, takes_them in (("takes", True), ("knows-none", False)):
-        recogniser = opened(scripted_whisper.model(name, "turn left", hot_words=takes_them))
-        model = recogniser._whisper
-        generate = model.model.generate
-
-        def spied(
-            features: Any, asked: Any, name: str = name, generate: Any = generate, **options: Any
-        ) -> Any:
-            prompts[name] = asked[0]
-            return generate(features, asked, **options)
-
-        model.model = _Spied(model.model, generate=spied)
-        recogniser.read(SECOND, "left, left")
-    assert len(prompts["knows-none"]) == 2
-    assert len(prompts["takes"]) > 2 + 2
 
 
 def test_an_unsure_model_has_a_low_log_probability(scripted_whisper: Any) -> None:

@@ -9,7 +9,6 @@ A form of such a word, as in "I have stopped", is no stop word and takes nothing
 import logging
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Final
 
@@ -20,12 +19,13 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.node import NodeContext
-from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.sound import Playing, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter, open_spotter
-from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.words import words_of
 
+ROOM: Final = ""
+PAGE: Final = "page_"
+"""Where a listener listens, as its names begin."""
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
 KEPT: Final = 8
@@ -34,21 +34,6 @@ OVERLAP_NS: Final = NS_PER_S // 2
 TAIL_NS: Final = NS_PER_S // 2
 """For so long what the robot has said may still be heard."""
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ListeningPlace:
-    """Name where a listener listens: in `speech_status`, as a source of stops, and in the log."""
-
-    name: str
-    source: str
-    how: str
-
-
-ROOM: Final = ListeningPlace(name="stop_words", source="voice", how="by voice")
-PAGE: Final = ListeningPlace(
-    name="page_stop_words", source="page_voice", how="by voice into the page"
-)
 
 
 class State(StrEnum):
@@ -71,22 +56,18 @@ class StopWords:
         open_spotter: Callable[[], Spotter],
         settings: SpeechSettings,
         clock: Clock,
-        playing: Callable[[], Playing | None] = lambda: None,
-        place: ListeningPlace = ROOM,
+        place: str = ROOM,
     ) -> None:
-        """Take how the network is opened, which of its thresholds holds, what the robot says."""
-        self.name = place.name
-        self._place = place
+        """Take how the network is opened, and which of its thresholds holds."""
+        self.name, self._source = f"{place}stop_words", f"{place}voice"
         self._open_spotter = open_spotter
         self._sensitivity = settings.stop_words
         self._clock = clock
-        self._playing = playing
         self._say_id = ""
         self._expected: Counter[str] = Counter()
         self._sounds_until_ns = 0
         self._spotter: Spotter | None = None
         self._pressed: deque[Spotted] = deque(maxlen=KEPT)
-        self._counts = {"spotted": 0, "own_voice": 0, "failed_runs": 0}
         self._broken = ""
 
     @property
@@ -98,44 +79,42 @@ class StopWords:
 
     def start(self, space: SharedSpace) -> None:
         """Open button and network; why it cannot be opened is told, and the robot goes on."""
-        self._button = StopButton(space, self._place.source, self._clock)
+        self._button = StopButton(space, self._source, self._clock)
         self._heard = space.ring_writer("heard")
         try:
             self._spotter = self._open_spotter()
-        except (InferenceError, SpeechError) as error:
+        except InferenceError as error:
             self._break(str(error))
         self._warn_if_off()
 
     def adopt(self, settings: SpeechSettings) -> None:
         """Go by the sensitivity of another profile from now on."""
-        changed, self._sensitivity = self._sensitivity != settings.stop_words, settings.stop_words
-        if changed:
-            self._warn_if_off()
+        self._sensitivity = settings.stop_words
+        self._warn_if_off()
 
-    def feed(self, block: SoundBlock) -> None:
-        """Take the next block, and press the button where a stop word was heard in it.
+    def feed(self, frame: SoundBlock, playing: Playing | None = None) -> None:
+        """Take the next frame, and press the button where a stop word was heard in it.
 
-        It runs within the node's step and takes a small part of it.
+        `playing` is what the robot says there. It runs within the node's step and takes a small
+        part of it.
         """
-        self._follow_own_voice()
+        if playing is not None:
+            self._follow_own_voice(playing)
         spotter = self._spotter
         if spotter is None or self._sensitivity == OFF:
             return
-        if not block.follows:
+        if not frame.follows:
             spotter.reset()
         runs = spotter.runs
         try:
             threshold = spotter.thresholds[self._sensitivity]
-            spotted = spotter.feed(block.samples, block.end_ns, threshold)
+            spotted = spotter.feed(frame.samples, frame.end_ns, threshold)
         except RunFailed as error:
-            self._counts["failed_runs"] += 1
             self._break(str(error))
             return
         if spotter.runs > runs:
             self._broken = ""
-        if spotted is not None and self._is_own(spotted):
-            self._counts["own_voice"] += 1
-        elif spotted is not None:
+        if spotted is not None and not self._is_own(spotted):
             self._press(spotted)
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:
@@ -147,14 +126,10 @@ class StopWords:
 
     def document(self) -> Mapping[str, Any]:
         """Return what `speech_status` tells under the listener's name."""
-        newest = self._pressed[-1] if self._pressed else None
         return {
             "state": self.state,
             "why": OFF_WHY if self._sensitivity == OFF else self._broken,
             "sensitivity": self._sensitivity,
-            "words": [] if self._spotter is None else list(self._spotter.words),
-            **self._counts,
-            "newest": None if newest is None else asdict(newest),
         }
 
     def close(self) -> None:
@@ -162,10 +137,7 @@ class StopWords:
         self._button.close()
         self._heard.close()
 
-    def _follow_own_voice(self) -> None:
-        playing = self._playing()
-        if playing is None:
-            return
+    def _follow_own_voice(self, playing: Playing) -> None:
         self._sounds_until_ns = self._clock.now_ns() + TAIL_NS
         if playing.say_id != self._say_id:
             self._say_id = playing.say_id
@@ -180,7 +152,6 @@ class StopWords:
 
     def _press(self, spotted: Spotted) -> None:
         self._button.press(f"heard {spotted.word!r}")
-        self._counts["spotted"] += 1
         self._pressed.append(spotted)
         self._heard.publish(
             {
@@ -197,27 +168,16 @@ class StopWords:
 
     def _break(self, why: str) -> None:
         if not self._broken:
-            _log.error("degraded: nobody can stop the robot %s: %s", self._place.how, why)
+            _log.error("degraded: nobody can stop the robot by %s: %s", self._source, why)
         self._broken = why
 
     def _warn_if_off(self) -> None:
         if self._sensitivity == OFF:
-            _log.warning("degraded: nobody can stop the robot %s: %s", self._place.how, OFF_WHY)
+            _log.warning("degraded: nobody can stop the robot by %s: %s", self._source, OFF_WHY)
 
 
-def build_stop_words(
-    context: NodeContext,
-    profile: Profile,
-    voice: RobotVoice | None = None,
-    place: ListeningPlace = ROOM,
-) -> StopWords:
+def build_stop_words(context: NodeContext, profile: Profile, place: str = ROOM) -> StopWords:
     """Return the listener to a place; it opens the profile's network when the node starts."""
     # It claims no memory: what hears a spoken stop is never refused for want of it.
     shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
-    return StopWords(
-        lambda: open_spotter(shelf, profile),
-        profile.speech,
-        context.clock,
-        lambda: None if voice is None else voice.playing,
-        place,
-    )
+    return StopWords(lambda: open_spotter(shelf, profile), profile.speech, context.clock, place)

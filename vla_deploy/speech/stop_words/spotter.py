@@ -1,6 +1,5 @@
 """Spot words on a stream: frames in, a smoothed score per word out, held against a threshold."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,10 +8,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
+from vla_deploy.inference.errors import ModelMismatch
 from vla_deploy.inference.manifest import KeyWords, Manifest
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession
-from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import Sound, duration_ns
 from vla_deploy.speech.stop_words import features
 
@@ -29,41 +28,36 @@ class Spotted:
 
 
 class Spotter:
-    """Follow one stream of sound at 16 kHz; `score` is that of the likeliest word by now."""
+    """Follow one stream of sound at 16 kHz; `score` is that of the likeliest word by now.
+
+    `thresholds` tell from which score on a word was said, by how easily it is to be taken for said.
+    """
 
     def __init__(self, session: ModelSession, manifest: Manifest) -> None:
         """Take the model and what its manifest says of it.
 
         Raises:
-            SpotterMismatch: it wants other features than there are, or none at all.
+            ModelMismatch: it wants other features than there are, or none at all.
         """
         self._session = session
-        self._words = _checked(manifest)
+        key_words = _checked(manifest)
+        self.words, self.thresholds = key_words.words, key_words.thresholds
+        self._smoothing_frames = key_words.smoothing_frames
         self._input = manifest.inputs[0].name
         self._output = manifest.outputs[0].name
         self._held_frames = int(manifest.inputs[0].shape[2])
         self._moments = int(manifest.outputs[0].shape[2])
         self._step = self._moments * features.STRIDE
         self.runs = 0
-        self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
+        self._refractory_ns = round(key_words.refractory_s * NS_PER_S)
         self.reset()
-
-    @property
-    def thresholds(self) -> Mapping[str, float]:
-        """Return from which score on a word was said, by how easily it is to be taken for said."""
-        return self._words.thresholds
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """Return the words that it knows."""
-        return self._words.words
 
     def reset(self) -> None:
         """Begin anew: what follows has nothing to do with what was heard."""
         self._stream = features.LogMelStream()
         self._frames = features.silence(self._held_frames)
         self._fresh = np.zeros((0, features.BANDS), np.float32)
-        self._scores = np.zeros((0, len(self._words.words)), np.float32)
+        self._scores = np.zeros((0, len(self.words)), np.float32)
         self._quiet_until_ns = 0
         self.score = 0.0
 
@@ -87,9 +81,9 @@ class Spotter:
         outputs = self._session.run({self._input: self._frames.T[None]})
         self.runs += 1
         scores = outputs[self._output][0, 1:].T
-        kept = self._words.smoothing_frames - 1 + self._moments
+        kept = self._smoothing_frames - 1 + self._moments
         self._scores = np.concatenate([self._scores, scores])[-kept:]
-        best = _smoothed(self._scores, self._words.smoothing_frames)
+        best = _smoothed(self._scores, self._smoothing_frames)
         number = int(best.argmax())
         self.score = float(best[number])
         if best[number] < threshold or stamp_ns < self._quiet_until_ns:
@@ -108,15 +102,15 @@ def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
 
 def _checked(manifest: Manifest) -> KeyWords:
     words, shapes = manifest.key_words, [one.shape for one in (*manifest.inputs, *manifest.outputs)]
-    if words is None or words.features != features.NAME:
-        got = "no [key_words]" if words is None else repr(words.features)
-        raise SpotterMismatch(f"{manifest.name}: expected features {features.NAME!r}, got {got}")
     is_counted = all(isinstance(shape[-1], int) for shape in shapes)
-    if len(shapes) != 2 or shapes[0][:2] != (1, features.BANDS) or not is_counted:
-        raise SpotterMismatch(
-            f"{manifest.name}: expected one input of shape (1, {features.BANDS}, frames) and a "
-            f"count of moments, got {shapes}"
+    fits = is_counted and len(shapes) == 2 and shapes[0][:2] == (1, features.BANDS)
+    if words is None or words.features != features.NAME or not fits:
+        got = "no [key_words]" if words is None else f"features {words.features!r}"
+        fault = (
+            f"expected features {features.NAME!r}, one input of shape (1, {features.BANDS}, "
+            f"frames) and a count of moments, got {got} and {shapes}"
         )
+        raise ModelMismatch(manifest.name, (fault,))
     return words
 
 
@@ -124,8 +118,7 @@ def open_spotter(shelf: ModelShelf, profile: Profile) -> Spotter:
     """Open the network that a profile chooses.
 
     Raises:
-        InferenceError: the profile's model cannot be opened.
-        SpotterMismatch: it is not one that a spotter can run.
+        InferenceError: the profile's model cannot be opened, or a spotter cannot run it.
     """
     session = shelf.open(ROLE, profile, 0)
     return Spotter(session, session.model.manifest)

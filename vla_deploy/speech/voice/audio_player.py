@@ -3,26 +3,18 @@
 A sound is handed over bit by bit, so that the robot can fall silent at any moment.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
-import numpy as np
-
 from drivers.audio.base import AudioFormat, AudioOutput, Samples
-from drivers.audio.open_audio import open_audio_output
 from drivers.clock import NS_PER_S, Clock
-from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.robots.description import RobotDescription
-from vla_deploy.speech.microphone import format_of
 from vla_deploy.speech.voice.clip import Wave
 
 LEAD_NS: Final = 3 * NS_PER_S // 20
 """How far ahead of its sounding the speaker gets sound: what is handed over cannot be taken back,
 and a busy computer must not tear holes."""
-_FADE_S: Final = 0.008
 OpenOutput = Callable[[], AudioOutput]
 Note = Callable[[Wave, int, int], None]
 """Take a wave at 16 kHz, the time at which its first sample sounds, and until when it does."""
@@ -79,8 +71,6 @@ class AudioPlayer:
 
     def cut(self) -> None:
         """Play no more of the present sound."""
-        if self.has_begun and not self.away:
-            self._speaker.poll(self._fade_out, 0)
         self._sound = None
 
     def close(self) -> None:
@@ -90,40 +80,18 @@ class AudioPlayer:
     def _feed(self, output: AudioOutput) -> int:
         if self._sound is None:
             return 0
-        now_ns = self._clock.now_ns()
-        ahead_ns = max(self.sounds_until_ns, now_ns) - now_ns
-        due = max(0, (LEAD_NS - ahead_ns) * output.format.rate_hz // NS_PER_S)
-        return self._hand_over(self._sound, output, self._sound.samples[self._at : self._at + due])
-
-    def _fade_out(self, output: AudioOutput) -> int:
-        """Hand over a short fade, which spares the listener a click."""
-        assert self._sound is not None, "only a sound that has begun is cut"
-        count = round(_FADE_S * output.format.rate_hz)
-        rest = self._sound.samples[self._at : self._at + count]
-        fading = np.linspace(1.0, 0.0, len(rest))[:, None]
-        return self._hand_over(self._sound, output, np.rint(rest * fading).astype(np.int16))
-
-    def _hand_over(self, sound: PreparedSound, output: AudioOutput, samples: Samples) -> int:
         starts_ns = max(self.sounds_until_ns, self._clock.now_ns())
-        taken = output.write(samples)
+        ahead_ns = starts_ns - self._clock.now_ns()
+        due = max(0, (LEAD_NS - ahead_ns) * output.format.rate_hz // NS_PER_S)
+        taken = output.write(self._sound.samples[self._at : self._at + due])
         if taken:
             self._at += taken
             self.sounds_until_ns = starts_ns + output.format.duration_ns(taken)
             zero_ns = self.sounds_until_ns - output.format.duration_ns(self._at)
-            self._note(sound.wave, zero_ns, self.sounds_until_ns)
+            self._note(self._sound.wave, zero_ns, self.sounds_until_ns)
         return taken
 
     def _connect(self) -> AudioOutput:
         output = self._open_output()
         self.format = output.format
         return output
-
-
-def linked_speaker(
-    robot: RobotDescription, links: Mapping[str, DeviceLink], clock: Clock
-) -> OpenOutput | None:
-    """Return how to open the speaker by the path of its link; None where there is none."""
-    audio = robot.speaker
-    if audio is None:
-        return None
-    return partial(open_audio_output, links[audio.device].path, clock, format_of(audio))

@@ -5,19 +5,19 @@ import math
 import struct
 import wave
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
-from vla_deploy.speech.errors import SynthesisFailed
+from vla_deploy.speech.errors import VoiceError
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""
 # Silence behind the sound: the transform is a circle, and the end must not ring into the beginning.
 _APART_ROWS: Final = 256
-_BITS: Final = 16
+_MONO_16_BIT: Final = (2, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,10 +39,8 @@ class Clip:
         shared = math.gcd(rate_hz, self.rate_hz)
         step, new_step = self.rate_hz // shared, rate_hz // shared
         blocks = math.ceil((len(self.wave) + _APART_ROWS) / step)
-        padded = np.zeros(blocks * step, np.float32)
-        padded[: len(self.wave)] = self.wave
-        rows = blocks * new_step
-        resampled = np.fft.irfft(_cut(np.fft.rfft(padded), rows), rows) * (new_step / step)
+        spectrum = np.fft.rfft(self.wave, blocks * step)
+        resampled = np.fft.irfft(spectrum, blocks * new_step) * (new_step / step)
         kept = math.ceil(len(self.wave) * new_step / step)
         return Clip(rate_hz=rate_hz, wave=resampled[:kept].astype(np.float32))
 
@@ -53,47 +51,23 @@ class Clip:
         return np.repeat(mono[:, None], format_.channels, axis=1)
 
 
-def _cut(spectrum: NDArray[np.complexfloating[Any, Any]], rows: int) -> NDArray[np.complex128]:
-    """Return a spectrum as long as that of `rows` samples: shortened, or filled with nothing."""
-    wanted = rows // 2 + 1
-    fitted = np.zeros(wanted, np.complex128)
-    kept = min(wanted, len(spectrum))
-    fitted[:kept] = spectrum[:kept]
-    return fitted
-
-
 def read_wav_stream(data: bytes) -> Clip:
     """Return the sound of a WAV from a pipe: to the end of what is there, as its header knows none.
 
     Raises:
-        SynthesisFailed: it is no WAV of 16-bit samples, or has none.
+        VoiceError: it is no WAV of 16-bit samples of one channel, or has none.
     """
     try:
         told = data[:4] + struct.pack("<I", len(data)) + data[8:]
         with wave.open(io.BytesIO(told)) as sound:
-            bits, channels, rate_hz = (
-                8 * sound.getsampwidth(),
-                sound.getnchannels(),
-                sound.getframerate(),
-            )
-            rows = sound.readframes(len(data))
+            form = sound.getsampwidth(), sound.getnchannels()
+            rate_hz, rows = sound.getframerate(), sound.readframes(len(data))
     except (wave.Error, EOFError) as error:
-        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}: {error}") from error
-    if bits != _BITS:
-        raise SynthesisFailed(f"expected PCM of {_BITS} bits, got {bits} bits")
-    return Clip(rate_hz=rate_hz, wave=pcm_wave(rows, channels))
-
-
-def pcm_wave(data: bytes, channels: int = 1) -> Wave:
-    """Return 16-bit little-endian samples as one wave, the mean of the channels.
-
-    Raises:
-        SynthesisFailed: there is not one whole row.
-    """
-    row_bytes = 2 * channels
-    whole = len(data) - len(data) % row_bytes
-    if not whole:
-        raise SynthesisFailed("expected sound, got no sample")
-    rows = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
-    wave: Wave = (rows.mean(axis=1) / 32_768.0).astype(np.float32)
-    return wave
+        raise VoiceError(f"expected a WAV, got {data[:12]!r}: {error}") from error
+    samples = np.frombuffer(rows[: len(rows) // 2 * 2], "<i2")
+    if form != _MONO_16_BIT or not len(samples):
+        raise VoiceError(
+            f"expected 16-bit samples of one channel, got {len(samples)} samples of "
+            f"{8 * form[0]} bits on {form[1]} channels"
+        )
+    return Clip(rate_hz=rate_hz, wave=(samples / 32_768.0).astype(np.float32))

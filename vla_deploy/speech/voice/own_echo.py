@@ -1,4 +1,4 @@
-"""Take the robot's own voice out of what its microphone hears, block by block.
+"""Take the robot's own voice out of what its microphone hears, frame by frame.
 
 What is handed to the speaker is noted with the time at which it will sound; the filter learns what
 arrives of it, takes it out, and says how much may be left. What is no louder than that is the rest
@@ -12,23 +12,27 @@ astray. The same doubt says how much of the echo may be left.
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from vla_deploy.speech.sound import RATE_HZ, SoundBlock, duration_ns
+from vla_deploy.speech.sound import FRAME, RATE_HZ, SoundBlock, duration_ns
 from vla_deploy.speech.voice.clip import Wave
 
 BLOCK: Final = 256
+"""A frame is two of them."""
 PARTITIONS: Final = 16
 _FORGETTING: Final = 0.999
 _FIRST_DOUBT: Final = 1.0
 _NEW_DOUBT: Final = 0.3
 _CONFIRMED_DOUBT: Final = 0.03
 _CONFIRMED_SHARE: Final = 0.4  # what is left is less than the bound by as much, 99 times of 100
+_FITS_RATIO: Final = 8.0  # of powers, 9 dB
+_FITS_AFTER_BLOCKS: Final = 8
+_AUDIBLE_POWER: Final = 1e-6
 _REST_SMOOTHING: Final = 0.8
 _TINY: Final = 1e-9
 HEAD_START_NS: Final = NS_PER_S // 200
@@ -36,11 +40,6 @@ HEAD_START_NS: Final = NS_PER_S // 200
 RINGS_NS: Final = duration_ns(BLOCK * PARTITIONS)
 LEAST_GAIN: Final = 0.1
 _GAIN_FALLS: Final = 0.6  # with each block: a word's end is not cut
-_FRAME_BLOCKS: Final = 5  # as many as may be under way to the judge of one frame
-_MEMORY: Final = 0.02  # of each block in the mean: a second
-_FITS_RATIO: Final = 8.0  # of powers, 9 dB
-_FITS_AFTER_BLOCKS: Final = 8
-_AUDIBLE_POWER: Final = 1e-6
 _SILENT_POWER: Final = 1e-10
 _SAME_NS: Final = NS_PER_S // 10_000
 
@@ -55,32 +54,38 @@ class EchoFilter:
         self._known = np.zeros(2 * BLOCK)
         self._spectra = np.zeros((PARTITIONS, bins), np.complex128)
         self._path = np.zeros((PARTITIONS, bins), np.complex128)
-        self._doubt = np.full((PARTITIONS, bins), _FIRST_DOUBT)
-        self._doubt_before = self._doubt.copy()
-        self._left_share = 1.0
+        self._doubt = self._doubt_before = np.full((PARTITIONS, bins), _FIRST_DOUBT)
+        self._tried = np.zeros(3)
+        self._is_confirmed = False
         self._rest = np.zeros(bins)
 
     def begin(self) -> None:
         """Begin anew with silence; the path is as it was, and may have changed a little."""
         self._known[:] = 0.0
         self._spectra[:] = 0.0
+        self._tried[:], self._is_confirmed = 0.0, False
         self._doubt_before = self._doubt
         self._doubt = np.maximum(self._doubt, _NEW_DOUBT)
-        self._left_share = 1.0
-
-    def confirm(self) -> None:
-        """Take the path for what it was before `begin`: it has been seen to hold."""
-        known = np.maximum(self._doubt_before, _CONFIRMED_DOUBT)
-        self._doubt = np.minimum(self._doubt, known)
-        self._left_share = _CONFIRMED_SHARE
 
     def feed(self, known: Wave, heard: Wave) -> Wave:
         """Return what was heard without the echo of `known`; both are 256 samples of one moment."""
         self._shift_in(known)
         echo = np.fft.irfft((self._path * self._spectra).sum(axis=0))[BLOCK:]
-        rest = heard - echo
+        rest: Wave = (heard - echo).astype(np.float32)
         self._learn(np.fft.rfft(np.concatenate((np.zeros(BLOCK), rest))))
-        return rest.astype(np.float32)
+        if np.mean(known**2) > _AUDIBLE_POWER:
+            self._confirm(heard, rest)
+        return rest
+
+    def _confirm(self, heard: Wave, rest: Wave) -> None:
+        """Take the path for what it was before `begin`, once it has been seen to hold."""
+        self._tried += 1.0, np.dot(heard, heard), np.dot(rest, rest)
+        blocks, heard_power, rest_power = self._tried
+        fits = blocks >= _FITS_AFTER_BLOCKS and heard_power > _FITS_RATIO * rest_power
+        if fits and not self._is_confirmed:
+            self._is_confirmed = True
+            before = np.maximum(self._doubt_before, _CONFIRMED_DOUBT)
+            self._doubt = np.minimum(self._doubt, before)
 
     def _shift_in(self, known: Wave) -> None:
         self._known[:BLOCK] = self._known[BLOCK:]
@@ -92,7 +97,8 @@ class EchoFilter:
         self._rest += (1.0 - _REST_SMOOTHING) * (np.abs(rest) ** 2 - self._rest)
         powers = np.abs(self._spectra) ** 2
         left = (powers * self._doubt).sum(axis=0)
-        self.left_power = self._left_share * float(left.sum()) / BLOCK**2
+        share = _CONFIRMED_SHARE if self._is_confirmed else 1.0
+        self.left_power = share * float(left.sum()) / BLOCK**2
         gain = self._doubt / (left + self._rest + _TINY)
         taps = np.fft.irfft(gain * self._spectra.conj() * rest, axis=1)
         taps[:, BLOCK:] = 0.0
@@ -116,29 +122,12 @@ class OwnEcho:
     """Follow speaker and microphone."""
 
     def __init__(self) -> None:
+        self.left_db = _db(0.0)
+        """How loud what is left of the echo may be in the newest frame, RMS against full scale."""
         self._filter = EchoFilter()
         self._played: deque[_Played] = deque()
-        self._pending = np.zeros(0, np.float32)
-        self._pending_ns = 0
         self._is_active = False
-        self._follows = False
-        self._is_confirmed = False
-        self._tried_powers = np.zeros(2)
-        self._tried_blocks = 0
         self._gain = 1.0
-        self._left: deque[float] = deque(maxlen=_FRAME_BLOCKS)
-        self._heard_power = 0.0
-        self._rest_power = 0.0
-
-    @property
-    def reduction_db(self) -> float:
-        """Return by how much what was heard while the robot spoke has become less by it."""
-        return _db(self._heard_power) - _db(self._rest_power)
-
-    @property
-    def left_db(self) -> float:
-        """Return how loud what is left of the echo may be now, RMS against full scale."""
-        return _db(max(self._left, default=0.0))
 
     def note(self, wave: Wave, zero_ns: int, until_ns: int) -> None:
         """Take what was handed to the speaker: `wave` at 16 kHz, from `zero_ns` to `until_ns`."""
@@ -149,72 +138,27 @@ class OwnEcho:
         from_ns = zero_ns if last is None else max(zero_ns, last.until_ns)
         self._played.append(_Played(wave=wave, zero_ns=zero_ns, from_ns=from_ns, until_ns=until_ns))
 
-    def clean(self, block: SoundBlock) -> SoundBlock | None:
-        """Return what remains of the stream; None while less than a block waits for the rest.
-
-        Samples are neither lost nor moved: while the robot is silent they pass at once, while it
-        speaks they come in blocks of 16 ms.
-        """
-        self._forget_before(block.stamp_ns - RINGS_NS)
+    def clean(self, frame: SoundBlock) -> SoundBlock:
+        """Return a frame without the echo in it; while the robot is silent, as it is."""
+        self._forget_before(frame.stamp_ns - RINGS_NS)
         if not self._played:
-            return self._pass_on(block)
-        if not self._is_active or not block.follows:
-            self._begin(block)
-        pending = np.concatenate((self._pending, block.samples))
-        whole = len(pending) - len(pending) % BLOCK
-        starts_ns, self._pending = self._pending_ns, pending[whole:]
-        if not whole:
-            return None
-        self._pending_ns += duration_ns(whole)
-        parts = [
-            self._clean(pending[at : at + BLOCK], starts_ns + duration_ns(at))
-            for at in range(0, whole, BLOCK)
-        ]
-        follows, self._follows = self._follows, True
-        return SoundBlock(stamp_ns=starts_ns, samples=np.concatenate(parts), follows=follows)
+            self._is_active, self.left_db = False, _db(0.0)
+            return frame
+        if not self._is_active or not frame.follows:
+            self._filter.begin()
+            self._is_active, self._gain = True, 1.0
+        parts, left_power = [], 0.0
+        for at in range(0, FRAME, BLOCK):
+            known = self._known(frame.stamp_ns + duration_ns(at) + HEAD_START_NS)
+            rest = self._filter.feed(known, frame.samples[at : at + BLOCK])
+            parts.append(self._turned_down(rest))
+            left_power = max(left_power, self._filter.left_power)
+        self.left_db = _db(left_power)
+        return replace(frame, samples=np.concatenate(parts))
 
-    def _begin(self, block: SoundBlock) -> None:
-        self._filter.begin()
-        self._pending, self._pending_ns = self._pending[:0], block.stamp_ns
-        self._follows = block.follows
-        self._is_active, self._gain = True, 1.0
-        self._is_confirmed, self._tried_powers, self._tried_blocks = False, np.zeros(2), 0
-
-    def _pass_on(self, block: SoundBlock) -> SoundBlock:
-        """Return a block as it is, behind what still waits."""
-        waiting, self._pending = self._pending, self._pending[:0]
-        self._is_active = False
-        self._left.clear()
-        if not len(waiting) or not block.follows:
-            return block
-        return SoundBlock(
-            stamp_ns=self._pending_ns, samples=np.concatenate((waiting, block.samples))
-        )
-
-    def _clean(self, heard: Wave, stamp_ns: int) -> Wave:
-        known = self._known(stamp_ns + HEAD_START_NS)
-        rest = self._filter.feed(known, heard)
-        powers = [float(np.mean(wave**2)) for wave in (known, heard, rest)]
-        if powers[0] > _AUDIBLE_POWER:
-            self._heard_power += _MEMORY * (powers[1] - self._heard_power)
-            self._rest_power += _MEMORY * (powers[2] - self._rest_power)
-            self._try(powers[1], powers[2])
-        self._left.append(self._filter.left_power)
-        return self._turned_down(rest, powers[2])
-
-    def _try(self, heard_power: float, rest_power: float) -> None:
-        """Find out whether the path still holds: the speaker may have begun later than before."""
-        self._tried_blocks += 1
-        self._tried_powers += heard_power, rest_power
-        heard, rest = self._tried_powers
-        fits = self._tried_blocks >= _FITS_AFTER_BLOCKS and heard > _FITS_RATIO * rest
-        if fits and not self._is_confirmed:
-            self._is_confirmed = True
-            self._filter.confirm()
-
-    def _turned_down(self, rest: Wave, power: float) -> Wave:
+    def _turned_down(self, rest: Wave) -> Wave:
         """Return a block at the share of it that is no echo; the gain changes within it."""
-        left = self._filter.left_power
+        left, power = self._filter.left_power, float(np.mean(rest**2))
         other_ratio = max(0.0, 1.0 - left / power) if power > _SILENT_POWER else 0.0
         wanted = max(LEAST_GAIN, other_ratio**0.5, _GAIN_FALLS * self._gain)
         gains = np.linspace(self._gain, wanted, len(rest), dtype=np.float32)

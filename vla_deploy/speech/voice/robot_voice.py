@@ -1,8 +1,7 @@
-"""Say aloud what the topic `say` asks for: one order after the other, and silent at a word."""
+"""Say aloud what the topic `say` asks for: one text after the other, and silent at a word."""
 
 import logging
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,33 +13,29 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.description import VoiceSettings
-from vla_deploy.speech.errors import EngineMissing, OrderRefused, VoiceError
+from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.say_queue import (
-    LONGEST_ID,
-    LONGEST_WAIT_NS,
-    Order,
-    SayQueue,
-    read_order,
-)
-from vla_deploy.speech.voice.tts import Engine, chosen_engine
+from vla_deploy.speech.voice.tts import ESPEAK, EspeakEngine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""
-_FIRST_WORDS: Final = "hello"
+LONGEST_LETTERS: Final = 400
+"""More is cut at a word: half a minute of talk is enough, and the text is shown whole elsewhere."""
+LONGEST_ID: Final = 80
+MOST_WAITING: Final = 16
 _REASON_LETTERS: Final = 200  # of any alphabet, a slot holds them
 _log = logging.getLogger(__name__)
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True, eq=False)
 class _Saying:
-    """Hold what is being said: it is in preparation first, and `sound` comes with its end."""
+    """Hold what waits to be said, or is: it is `prepared` first, then it plays."""
 
-    order: Order
-    prepared: "Future[PreparedSound]"
-    sound: PreparedSound | None = None
+    say_id: str
+    text: str
+    prepared: "Future[PreparedSound] | None" = None
     has_begun: bool = False
 
 
@@ -53,7 +48,7 @@ class RobotVoice:
 
     def __init__(
         self,
-        engine: Engine,
+        engine: EspeakEngine,
         open_output: OpenOutput,
         clock: Clock,
         aside: Executor,
@@ -66,26 +61,26 @@ class RobotVoice:
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
         self._player = AudioPlayer(open_output, clock, self._echo.note)
-        self._waiting = SayQueue()
+        self._waiting: list[_Saying] = []
         self._saying: _Saying | None = None
-        self._sounding: Order | None = None
-        self._missing = ""
-        self._counts: Counter[str] = Counter()
+        self._sounding: _Saying | None = None
 
     @property
     def playing(self) -> Playing | None:
         """Return what sounds at this moment, the room's answer to it included."""
-        order, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
-        if order is None or self._clock.now_ns() >= until_ns:
+        saying, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
+        if saying is None or self._clock.now_ns() >= until_ns:
             return None
-        return Playing(say_id=order.say_id, text=order.text, echo_db=self._echo.left_db)
+        return Playing(say_id=saying.say_id, text=saying.text, echo_db=self._echo.left_db)
 
     def start(self, space: SharedSpace) -> None:
-        """Open the topics, and try the engine for the first time."""
+        """Open the topics, and look for the engine."""
         self._orders = space.ring_reader("say", from_start=False)
         self._operator = space.ring_reader("operator", from_start=False)
         self._events = space.ring_writer("voice_event")
-        self._aside.submit(self._engine.synthesise, _FIRST_WORDS).add_done_callback(self._tried)
+        missing = self._engine.missing()
+        if missing:
+            _log.error("degraded: the robot has no voice: %s", missing)
 
     def step(self) -> None:
         """Take what is to be said, and hand the speaker what it has room for."""
@@ -93,43 +88,28 @@ class RobotVoice:
             if event.payload.get("act") == ESTOP:
                 self.fall_silent("the robot was stopped")
         for event in self._orders.drain():
-            self._take(event.payload, event.stamp_ns)
-        oldest_ns = self._clock.now_ns() - LONGEST_WAIT_NS
-        waited = f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s"
-        self._drop(lambda order: order.given_ns < oldest_ns, waited)
+            self._take(event.payload)
         if self._saying is None:
             self._begin_next()
         self._player.step()
         if self._saying is not None:
             self._advance(self._saying)
 
-    def cleaned(self, block: SoundBlock) -> SoundBlock | None:
-        """Return what the microphone heard without what the robot says; None while that waits."""
-        return self._echo.clean(block)
-
-    def barge_in(self, stamp_ns: int) -> None:
-        """Fall silent: a person has spoken into what the robot says, from `stamp_ns` on."""
-        late_s = (self._clock.now_ns() - stamp_ns) / NS_PER_S
-        self.fall_silent(f"somebody spoke, noticed after {late_s:.2f} s")
+    def cleaned(self, frame: SoundBlock) -> SoundBlock:
+        """Return a frame of the microphone without what the robot says."""
+        return self._echo.clean(frame)
 
     def fall_silent(self, reason: str) -> None:
         """Break off what is being said and drop what waits."""
-        self._drop(lambda _: True, reason)
+        self._drop(self._waiting, reason)
         self._break_off(reason)
 
     def document(self) -> dict[str, Any]:
         """Return what `speech_status` tells under "voice"."""
-        why = self._missing or self._player.away
-        state = "missing" if self._missing else "away" if why else "ready"
-        return {
-            "state": state,
-            "why": why,
-            "engine": self._engine.name,
-            "volume": self._volume_ratio,
-            "waiting": len(self._waiting),
-            "echo_reduction_db": round(self._echo.reduction_db, 1),
-            "counts": dict(self._counts),
-        }
+        missing = self._engine.missing()
+        why = missing or self._player.away
+        state = "missing" if missing else "away" if why else "ready"
+        return {"state": state, "why": why, "waiting": len(self._waiting)}
 
     def close(self) -> None:
         """Fall silent and release everything; closing twice is allowed."""
@@ -137,40 +117,37 @@ class RobotVoice:
         self._player.close()
         self._aside.shutdown(wait=False, cancel_futures=True)
 
-    def _take(self, payload: dict[str, Any], stamp_ns: int) -> None:
-        try:
-            order = read_order(payload, stamp_ns)
-        except OrderRefused as error:
-            _log.warning("say: %s", error)
-            self._publish(str(payload.get("say_id", ""))[:LONGEST_ID], "failed", str(error))
-            return
-        said = None if self._saying is None else self._saying.order
-        if order.withdraws:
-            self._drop(lambda waiting: waiting.say_id == order.say_id, "it was taken back")
-            if said is not None and said.say_id == order.say_id:
-                self._break_off("it was taken back")
-            return
-        if order.interrupt and said is not None and order.priority >= said.priority:
-            self._break_off(f"{order.say_id} came first")
-        dropped = self._waiting.add(order)
-        if dropped is not None:
-            self._publish(dropped.say_id, "dropped", "too much waits to be said")
+    def _take(self, payload: Mapping[str, Any]) -> None:
+        say_id, text = str(payload.get("say_id", ""))[:LONGEST_ID], payload.get("text")
+        if payload.get("cancel") is True:
+            self._take_back(say_id)
+        elif not isinstance(text, str) or not text.strip():
+            self._publish(say_id, "failed", f"text: expected words, got {text!r:.100}")
+        elif len(self._waiting) == MOST_WAITING:
+            self._publish(say_id, "dropped", "too much waits to be said")
+        else:
+            self._waiting.append(_Saying(say_id=say_id, text=_spoken(text)))
 
-    def _drop(self, is_dropped: Callable[[Order], bool], reason: str) -> None:
-        for order in self._waiting.drop(is_dropped):
-            self._publish(order.say_id, "dropped", reason)
+    def _take_back(self, say_id: str) -> None:
+        reason = "it was taken back"
+        self._drop([one for one in self._waiting if one.say_id == say_id], reason)
+        if self._saying is not None and self._saying.say_id == say_id:
+            self._break_off(reason)
+
+    def _drop(self, dropped: list[_Saying], reason: str) -> None:
+        self._waiting = [waiting for waiting in self._waiting if waiting not in dropped]
+        for waiting in dropped:
+            self._publish(waiting.say_id, "dropped", reason)
 
     def _begin_next(self) -> None:
-        order = self._waiting.take()
-        if order is None:
+        if not self._waiting:
             return
-        format_ = self._player.format
+        saying, format_ = self._waiting.pop(0), self._player.format
         if format_ is None or self._player.away:
-            self._publish(order.say_id, "failed", self._player.away)
-            return
-        self._saying = _Saying(
-            order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
-        )
+            self._publish(saying.say_id, "failed", self._player.away)
+        else:
+            saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
+            self._saying = saying
 
     def _prepare(self, text: str, format_: AudioFormat) -> PreparedSound:
         clip = self._engine.synthesise(text)
@@ -178,30 +155,26 @@ class RobotVoice:
         return PreparedSound(samples=clip.samples(format_, self._volume_ratio), wave=wave)
 
     def _advance(self, saying: _Saying) -> None:
-        if saying.sound is None:
-            self._play_once_prepared(saying)
-            return
-        if self._player.away:
+        if saying.prepared is not None:
+            self._play_once_done(saying, saying.prepared)
+        elif self._player.away:
             self._end(saying, "failed", self._player.away)
         elif not saying.has_begun and self._player.has_begun:
             saying.has_begun = True
-            self._sounding = saying.order
-            self._publish(saying.order.say_id, "began", "")
+            self._sounding = saying
+            self._publish(saying.say_id, "began", "")
         elif self._player.is_done:
-            cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
-            self._end(saying, "finished", cut)
+            self._end(saying, "finished", "")
 
-    def _play_once_prepared(self, saying: _Saying) -> None:
-        if not saying.prepared.done():
+    def _play_once_done(self, saying: _Saying, prepared: "Future[PreparedSound]") -> None:
+        if not prepared.done():
             return
         try:
-            saying.sound = saying.prepared.result()
+            self._player.play(prepared.result())
         except VoiceError as error:
-            self._missing = str(error) if isinstance(error, EngineMissing) else self._missing
             self._end(saying, "failed", str(error))
             return
-        self._missing = ""
-        self._player.play(saying.sound)
+        saying.prepared = None
         self._player.step()
 
     def _break_off(self, reason: str) -> None:
@@ -212,18 +185,16 @@ class RobotVoice:
     def _end(self, saying: _Saying, event: str, reason: str) -> None:
         self._player.cut()
         self._saying = None
-        self._publish(saying.order.say_id, event, reason)
-
-    def _tried(self, first_words: "Future[Any]") -> None:
-        """Remember why the engine cannot speak; called beside the steps, once."""
-        error = None if first_words.cancelled() else first_words.exception()
-        if isinstance(error, VoiceError):
-            self._missing = str(error)
-            _log.error("degraded: the robot has no voice: %s", error)
+        self._publish(saying.say_id, event, reason)
 
     def _publish(self, say_id: str, event: str, reason: str) -> None:
-        self._counts[event] += 1
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
+
+
+def _spoken(text: str) -> str:
+    """Return a text as it is said; `red_cup` is two words."""
+    said = " ".join(text.replace("_", " ").split())
+    return said if len(said) <= LONGEST_LETTERS else said[:LONGEST_LETTERS].rsplit(" ", 1)[0]
 
 
 def build_voice(
@@ -232,5 +203,10 @@ def build_voice(
     """Return the voice of a robot; None where it has no speaker."""
     if open_output is None:
         return None
-    engine = chosen_engine(settings)
+    engine = EspeakEngine(
+        voice=settings.voice,
+        words_per_minute=settings.words_per_minute,
+        pitch=settings.pitch,
+        program=settings.program or ESPEAK,
+    )
     return RobotVoice(engine, open_output, clock, aside, volume_ratio=settings.volume_ratio)

@@ -36,9 +36,7 @@ class Ear:
         self._open_spotter = open_spotter
 
     def listen(self, sensitivity: str = "normal") -> StopWords:
-        self.listener = StopWords(
-            self._open_spotter, settings(sensitivity), self.clock, lambda: self.playing
-        )
+        self.listener = StopWords(self._open_spotter, settings(sensitivity), self.clock)
         self.listener.start(self.space)
         return self.listener
 
@@ -48,7 +46,7 @@ class Ear:
             samples = random.normal(0.0, level, BLOCK).astype(np.float32)
             block = SoundBlock(stamp_ns=self.clock.ns, samples=samples, follows=follows)
             self.clock.ns += duration_ns(BLOCK)
-            self.listener.feed(block)
+            self.listener.feed(block, self.playing)
 
     def word(self) -> None:
         self.hear(0.3, 0.3)
@@ -113,11 +111,10 @@ def test_it_stays_live_while_the_robot_speaks(ear: Ear) -> None:
 
 
 def test_a_stop_word_of_its_own_is_taken_off_once_and_the_next_one_counts(ear: Ear) -> None:
-    listener = ear.listen()
+    ear.listen()
     ear.playing = speaking("All right, I stop.")
     ear.word()
     assert ear.presses() == []
-    assert listener.document()["own_voice"] == 1
     ear.word()
     assert len(ear.presses()) == 1
 
@@ -190,18 +187,8 @@ def test_a_model_that_fails_under_way_is_told_until_it_runs_again(
     scorer.is_broken = True
     ear.hear(0.5, 0.0)
     assert listener.document()["state"] == "broken"
-    assert listener.document()["failed_runs"] > 0
     assert caplog.text.count("nobody can stop the robot by voice") == 1
     scorer.is_broken = False
     ear.word()
     assert listener.state is State.LIVE
     assert len(ear.presses()) == 1
-
-
-def test_the_status_tells_words_sensitivity_and_the_newest_stop(ear: Ear) -> None:
-    listener = ear.listen("high")
-    ear.word()
-    document = listener.document()
-    assert (document["state"], document["sensitivity"]) == ("live", "high")
-    assert document["words"] == ["stop", "halt"]
-    assert document["newest"]["word"] == "stop"

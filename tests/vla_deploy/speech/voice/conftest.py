@@ -14,7 +14,7 @@ from sim_twin.sensors.sound import SpeakerDevice
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.voice.robot_voice import RobotVoice
-from vla_deploy.speech.voice.tts import Engine, EspeakEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 STEP_NS = NS_PER_S // 50
 FORMAT = AudioFormat(rate_hz=16_000)
@@ -26,7 +26,9 @@ class VoiceRig:
     format = FORMAT
     step_ns = STEP_NS
 
-    def __init__(self, folder: Path, clock: ManualClock, engine: Engine | None = None) -> None:
+    def __init__(
+        self, folder: Path, clock: ManualClock, engine: EspeakEngine | None = None
+    ) -> None:
         self.clock = clock
         self.speaker = SpeakerDevice(FORMAT)
         self.is_plugged = True
@@ -87,7 +89,7 @@ class VoiceRig:
 def make_rig(tmp_path: Path, clock: ManualClock) -> Iterator[Callable[..., VoiceRig]]:
     made: list[VoiceRig] = []
 
-    def make(engine: Engine | None = None) -> VoiceRig:
+    def make(engine: EspeakEngine | None = None) -> VoiceRig:
         made.append(VoiceRig(tmp_path, clock, engine))
         return made[-1]
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
-from vla_deploy.speech.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.voice.clip import Clip, read_wav_stream
-from vla_deploy.speech.voice.tts import EspeakEngine, PiperEngine
+from vla_deploy.speech.voice.tts import EspeakEngine
 
 
 def wav(rows: bytes, *, channels: int = 1, bits: int = 16, told_bytes: int = 0x7FFFF000) -> bytes:
@@ -32,13 +32,6 @@ def wav(rows: bytes, *, channels: int = 1, bits: int = 16, told_bytes: int = 0x7
     )
 
 
-def program(folder: Path, script: str) -> str:
-    path = folder / "engine"
-    path.write_text(f"#!/bin/sh\n{script}\n")
-    path.chmod(0o755)
-    return str(path)
-
-
 def test_espeak_speaks_and_faster_is_shorter() -> None:
     slow = EspeakEngine(words_per_minute=120).synthesise("put it in the box")
     fast = EspeakEngine(words_per_minute=220).synthesise("put it in the box")
@@ -54,15 +47,15 @@ def test_text_is_never_taken_for_an_option_or_for_phonemes() -> None:
 
 
 def test_a_missing_program_says_how_to_get_it(tmp_path: Path) -> None:
-    with pytest.raises(EngineMissing, match="apt install espeak-ng"):
+    with pytest.raises(VoiceError, match="apt install espeak-ng"):
         EspeakEngine(program=str(tmp_path / "none")).synthesise("hello")
     (tmp_path / "plain").write_text("text")
-    with pytest.raises(EngineMissing, match="Permission denied"):
+    with pytest.raises(VoiceError, match="Permission denied"):
         EspeakEngine(program=str(tmp_path / "plain")).synthesise("hello")
 
 
 def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
-    with pytest.raises(SynthesisFailed, match="voice does not exist"):
+    with pytest.raises(VoiceError, match="voice does not exist"):
         EspeakEngine(voice="klingon-orc").synthesise("hello")
 
 
@@ -71,56 +64,21 @@ def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
     [
         (b"", "expected a WAV"),
         (b"<html>not found</html>", "expected a WAV"),
-        (wav(b""), "no sample"),
+        (wav(b""), "got 0 samples"),
         (wav(b"\0" * 8, bits=24), "24 bits"),
+        (wav(b"\0" * 8, channels=2), "2 channels"),
         (wav(b"\0" * 8)[:30], "expected a WAV"),
     ],
 )
 def test_what_is_no_sound_is_refused(data: bytes, told: str) -> None:
-    with pytest.raises(SynthesisFailed, match=told):
+    with pytest.raises(VoiceError, match=told):
         read_wav_stream(data)
 
 
 def test_lengths_in_the_header_are_not_believed() -> None:
     rows = struct.pack("<4h", 0, 16_384, -16_384, 8_192)
     assert read_wav_stream(wav(rows)).wave.tolist() == [0.0, 0.5, -0.5, 0.25]
-    assert read_wav_stream(wav(rows, channels=2)).wave.tolist() == [0.25, -0.125]
     assert read_wav_stream(wav(rows + b"\1")).wave.tolist() == [0.0, 0.5, -0.5, 0.25]
-
-
-def test_piper_is_a_process_with_its_voice_beside_it(tmp_path: Path) -> None:
-    voice = tmp_path / "amy.onnx"
-    voice.write_bytes(b"")
-    engine = PiperEngine(
-        voice=str(voice),
-        words_per_minute=320,
-        program=program(
-            tmp_path,
-            """
-        [ "$*" = "--model $(dirname "$0")/amy.onnx --output_raw --length_scale 0.500" ] || exit 3
-        [ "$(cat)" = "hello there" ] || exit 4
-        printf '\\000\\100\\000\\300'
-    """,
-        ),
-    )
-    with pytest.raises(EngineMissing, match=r"audio\.sample_rate"):
-        engine.synthesise("hello")
-    Path(f"{voice}.json").write_text('{"audio": {"sample_rate": 22050}}')
-    sound = engine.synthesise("hello\nthere")
-    assert (sound.rate_hz, sound.wave.tolist()) == (22_050, [0.5, -0.5])
-
-
-def test_a_missing_piper_or_voice_says_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(EngineMissing, match="expected the path of a piper"):
-        PiperEngine(voice=str(tmp_path / "none.onnx")).synthesise("hello")
-    voice = tmp_path / "amy.onnx"
-    voice.write_bytes(b"")
-    Path(f"{voice}.json").write_text('{"audio": {"sample_rate": 22050}}')
-    with pytest.raises(EngineMissing, match=r"pipx install piper-tts"):
-        PiperEngine(voice=str(voice), program="no-such-piper").synthesise("hello")
-    broken = PiperEngine(voice=str(voice), program=program(tmp_path, "echo no >&2; exit 7"))
-    with pytest.raises(SynthesisFailed, match="ended with 7: no"):
-        broken.synthesise("hello")
 
 
 @pytest.mark.parametrize(("rate_hz", "new_rate_hz"), [(22_050, 16_000), (8_000, 48_000)])

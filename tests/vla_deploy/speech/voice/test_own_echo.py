@@ -7,13 +7,12 @@ import pytest
 
 from sim_twin.sound.acoustics import Acoustics, path, through
 from sim_twin.sound.talker import Talker, arrival
-from vla_deploy.speech.sound import RATE_HZ, SoundBlock, duration_ns
+from vla_deploy.speech.sound import FRAME, RATE_HZ, SoundBlock, duration_ns, level_db
 from vla_deploy.speech.voice.clip import Wave
 from vla_deploy.speech.voice.own_echo import OwnEcho
 from vla_deploy.speech.voice.tts import EspeakEngine
 
 ROOM = Acoustics()
-STEP = 320
 SENTENCES = ("I have put the red cup into the box", "now I go back to the kitchen table")
 
 
@@ -28,36 +27,34 @@ def echo_of(wave: Wave, late_rows: int = 0) -> Wave:
 
 
 class Ear:
-    """Let a robot that speaks hear itself, in blocks of 20 ms."""
+    """Let a robot that speaks hear itself."""
 
     def __init__(self) -> None:
         self.echo = OwnEcho()
         self.now_ns = 10**9
-        self.blocks = self.louder = 0
+        self.frames = self.louder = 0
         self._random = np.random.default_rng(0)
 
     def speak(self, wave: Wave, heard: Wave) -> Wave:
         """Play `wave` while `heard` arrives; return what remains of it."""
         zero_ns = self.now_ns
         parts: list[Wave] = []
-        rows = -(-(len(heard) + RATE_HZ) // STEP) * STEP
+        rows = -(-(len(heard) + RATE_HZ) // FRAME) * FRAME
         noisy = self._random.standard_normal(rows) * 12 / 32_768
         noisy[: len(heard)] += heard
-        for at in range(0, rows, STEP):
+        for at in range(0, rows, FRAME):
             until = min(len(wave), at + 2_400)
             self.echo.note(wave, zero_ns, zero_ns + duration_ns(until))
-            block = SoundBlock(
+            frame = SoundBlock(
                 stamp_ns=zero_ns + duration_ns(at),
-                samples=noisy[at : at + STEP].astype(np.float32),
+                samples=noisy[at : at + FRAME].astype(np.float32),
                 follows=at > 0,
             )
-            cleaned = self.echo.clean(block)
-            if cleaned is not None:
-                assert cleaned.stamp_ns == zero_ns + duration_ns(sum(map(len, parts)))
-                parts.append(cleaned.samples)
-                self.blocks += 1
-                level_db = 10 * np.log10(np.mean(cleaned.samples**2) + 1e-12)
-                self.louder += level_db > max(self.echo.left_db, -65.0)
+            cleaned = self.echo.clean(frame)
+            assert cleaned.stamp_ns == frame.stamp_ns
+            parts.append(cleaned.samples)
+            self.frames += 1
+            self.louder += level_db(cleaned.samples) > max(self.echo.left_db, -65.0)
         self.now_ns = zero_ns + duration_ns(rows)
         return np.concatenate(parts)
 
@@ -74,7 +71,6 @@ def test_an_echo_is_learnt_and_from_then_on_taken_out() -> None:
         reductions.append(weaker_db(echo_of(wave), ear.speak(wave, echo_of(wave))))
     assert reductions[0] > 3.0
     assert min(reductions[2:]) > 10.0
-    assert ear.echo.reduction_db > 10.0
 
 
 def test_what_a_person_says_into_it_stands_out() -> None:
@@ -92,7 +88,7 @@ def test_what_a_person_says_into_it_stands_out() -> None:
     assert weaker_db(person, rest - person) > weaker_db(person, spoilt) + 7.0
 
 
-@pytest.mark.parametrize("late_rows", [0, 3, 40, 160])
+@pytest.mark.parametrize("late_rows", [0, 3, 40, 160, 2_400])
 def test_what_is_left_of_the_echo_is_never_louder_than_told(late_rows: int) -> None:
     ear = Ear()
     for sentence in SENTENCES:
@@ -100,26 +96,13 @@ def test_what_is_left_of_the_echo_is_never_louder_than_told(late_rows: int) -> N
     ear.louder = 0
     for sentence in SENTENCES:
         ear.speak(spoken(sentence), echo_of(spoken(sentence), late_rows))
-    assert ear.louder < 0.03 * ear.blocks
+    assert ear.louder < 0.03 * ear.frames
 
 
-def test_while_the_robot_is_silent_everything_passes_at_once_and_as_it_is() -> None:
+def test_while_the_robot_is_silent_everything_passes_as_it_is() -> None:
     echo = OwnEcho()
-    block = SoundBlock(stamp_ns=10**9, samples=np.ones(STEP, np.float32))
-    assert echo.clean(block) is block
-
-
-def test_a_gap_in_the_stream_is_passed_on_as_one() -> None:
-    echo = OwnEcho()
-    wave = spoken("hello")
-    echo.note(wave, 10**9, 2 * 10**9)
-    told = []
-    for at, follows in ((0, True), (320, True), (4_000, False), (4_320, True)):
-        samples = np.ones(STEP, np.float32)
-        stamp_ns = 10**9 + duration_ns(at)
-        told.append(echo.clean(SoundBlock(stamp_ns=stamp_ns, samples=samples, follows=follows)))
-    assert [one.follows for one in told if one is not None] == [True, True, False, True]
-    assert [len(one.samples) for one in told if one is not None] == [256, 256, 256, 256]
+    frame = SoundBlock(stamp_ns=10**9, samples=np.ones(FRAME, np.float32))
+    assert echo.clean(frame) is frame
 
 
 def test_a_sound_that_is_no_echo_passes_while_the_robot_speaks() -> None:
