@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 OTHER: Final = "jetson_orin_nano_8gb"
 SWITCH_MS: Final = 90_000
-LESS_IS_SEEN: Final = 'inherits = "shipped"\nperception_rate_hz = 1\n'
+LESS_IS_SEEN: Final = 'inherits = "shipped"\nperception_rate_hz = 0.5\n'
 
 
 def choose(page: Page, name: str) -> None:

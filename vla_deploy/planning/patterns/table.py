@@ -84,9 +84,9 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
      rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
     (rf"{_CARRY} {_THING} back", "put", {"where": "back"}),
     # --- give, bring
-    (rf"(?:give|hand|bring|fetch|get) me {_THINGS}|(?:give|hand) {_THINGS} to me|"
+    (rf"(?:give|hand|pass|bring|fetch|get) me {_THINGS}|(?:give|hand) {_THINGS} to me|"
      rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|(?:fetch|bring) {_THINGS}|"
-     rf"(?:can|could) i have {_THINGS}|hand over {_THINGS}", "bring", {}),
+     rf"(?:can|could) i have {_THINGS}|hand over {_THINGS}|hand {_THING} over", "bring", {}),
     (r"let go(?: of (?:it|that|them))?", "give", {}),
     # --- put, take
     (rf"{_PUT} {_MOVED}(?: down)? {_INTO} {_WHERE}", "put", {}),
