@@ -22,18 +22,14 @@ from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 pytestmark = [
     pytest.mark.gl,
     pytest.mark.stack,
+    pytest.mark.slow,  # every day a flight is replayed in the browser
     pytest.mark.timeout(300),
     pytest.mark.twin(profile=str(Path(__file__).parents[1] / "coarse.toml")),
 ]
 
 JOBS = [
     pytest.param("turn left, then look around", {"turn", "look_at"}, id="turn and look"),
-    pytest.param(
-        "pick up the red cup and put it in the box",
-        {"pick_up", "place"},
-        id="main job",
-        marks=pytest.mark.slow,  # a minute and a half of the wall's time
-    ),
+    pytest.param("pick up the red cup and put it in the box", {"pick_up", "place"}, id="main job"),
 ]
 SPEED = 8
 # What nobody says while all goes well, and without ROS: stops, another profile, a replay, talk.

@@ -93,6 +93,7 @@ def test_it_is_built_anew_when_a_definition_changes_and_not_before(define, build
     assert len([one for one in (tmp_path / "built").iterdir() if one.is_dir()]) == 2
 
 
+@pytest.mark.slow
 def test_a_build_that_is_killed_leaves_nothing_that_looks_whole(
     define, build, command, ros_graph, tmp_path
 ) -> None:
@@ -112,6 +113,7 @@ def test_a_build_that_is_killed_leaves_nothing_that_looks_whole(
     assert not (tmp_path / "built" / "building").exists()
 
 
+@pytest.mark.slow
 def test_two_at_a_time_build_once(define, command, ros_graph) -> None:
     package = define(files=TINY)
     both = [
