@@ -11,6 +11,7 @@ import json
 import math
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -44,6 +45,7 @@ class Client(Node):  # type: ignore[misc]
         # On the twin, time is the twin's.
         super().__init__("somebody", parameter_overrides=[Parameter("use_sim_time", value=True)])
         self.joints: dict[str, float] = {}
+        self._told: deque[dict[str, float]] = deque(maxlen=20)
         self._action_clients: dict[str, ActionClient] = {}
         self.speed_m_s = self.turn_rad_s = self.x_m = self.y_m = 0.0
         self.create_subscription(JointState, "/joint_states", self._take_joints, SOME)
@@ -68,6 +70,18 @@ class Client(Node):  # type: ignore[misc]
             return looks > 50
 
         return self.until(stands)
+
+    def at_rest(self, *names: str) -> list[float]:
+        """Return where joints have come to rest: what is told of them may lag behind a result."""
+
+        def rest() -> bool:
+            told = [[one[name] for one in self._told] for name in names]
+            is_still = all(max(seen) - min(seen) < 0.002 for seen in told if seen)
+            return is_still and len(self._told) == self._told.maxlen
+
+        self._told.clear()
+        assert self.until(rest), "no rest in time"
+        return [self.joints[name] for name in names]
 
     def await_result(self, future: Any) -> Any:
         assert self.until(future.done), "no answer in time"
@@ -120,6 +134,7 @@ class Client(Node):  # type: ignore[misc]
 
     def _take_joints(self, message: JointState) -> None:
         self.joints = dict(zip(message.name, message.position, strict=True))
+        self._told.append(self.joints)
 
     def _take_odometry(self, message: Odometry) -> None:
         self.speed_m_s = message.twist.twist.linear.x
@@ -156,7 +171,7 @@ def trajectories(client: Client) -> dict[str, Any]:
         return client.goal(FollowJointTrajectory, HEAD_ACTION, goal, **options)
 
     done = pursue(follow(point(1.0, 0.3, 0.3), point(2.0, 0.5, 0.2)))
-    reached = [client.joints[joint] for joint in HEAD]
+    reached = client.at_rest(*HEAD)
     narrow = follow(point(4.0, -0.5, 0.2))
     narrow.path_tolerance = [JointTolerance(name="head_pan", position=1e-4)]
     off_path = pursue(narrow)
@@ -169,7 +184,7 @@ def trajectories(client: Client) -> dict[str, Any]:
         second.update(pursue(follow(point(4.0, 0.0, 0.2))))
 
     superseded = pursue(follow(point(8.0, -0.5, 0.2)), then=supersede)
-    last = [client.joints[joint] for joint in HEAD]
+    last = client.at_rest(*HEAD)
     cancelled = pursue(follow(point(8.0, 0.8, 0.2)), cancel_when=lambda _told: True)
     return {
         "done": done,
@@ -180,7 +195,7 @@ def trajectories(client: Client) -> dict[str, Any]:
         "second": second,
         "last": last,
         "cancelled": cancelled,
-        "stopped_at": client.joints["head_pan"],
+        "stopped_at": client.at_rest("head_pan")[0],
     }
 
 
@@ -252,11 +267,11 @@ def grippers(client: Client) -> dict[str, Any]:
     parallel.command.name, parallel.command.position = ["left_gripper"], [0.03]
     return {
         "classic": client.goal(GripperCommand, "/left_gripper_controller/gripper_cmd", classic),
-        "gap_m": 2.0 * client.joints["left_gripper"],
+        "gap_m": 2.0 * client.at_rest("left_gripper")[0],
         "parallel": client.goal(
             ParallelGripperCommand, "/left_gripper_parallel_controller/gripper_cmd", parallel
         ),
-        "gap_then_m": 2.0 * client.joints["left_gripper"],
+        "gap_then_m": 2.0 * client.at_rest("left_gripper")[0],
     }
 
 
@@ -367,7 +382,7 @@ def joint_commands(client: Client) -> dict[str, Any]:
         publisher.publish(JointState(name=["head_pan"], position=[value]))
         client.until(lambda: False, 0.05)
     client.until(lambda: abs(client.joints["head_pan"] - 0.4) < 0.02, 20.0)
-    reached = client.joints["head_pan"]
+    (reached,) = client.at_rest("head_pan")
     for bad in (
         JointState(name=["head_pan"], position=[math.nan]),
         JointState(name=["head_pan"], position=[9.0]),
@@ -376,7 +391,7 @@ def joint_commands(client: Client) -> dict[str, Any]:
     ):
         publisher.publish(bad)
         client.until(lambda: False, 0.3)
-    return {"reached": reached, "then": client.joints["head_pan"]}
+    return {"reached": reached, "then": client.at_rest("head_pan")[0]}
 
 
 def watched_goal(client: Client) -> dict[str, Any]:
