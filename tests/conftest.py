@@ -4,6 +4,7 @@ import fcntl
 import gc
 import json
 import os
+import socket
 import subprocess
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -54,7 +55,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection() -> None:
-    """Let no search for garbage run over ten thousand tests while they are gathered."""
+    """Disable garbage collection while ten thousand tests are collected."""
     gc.disable()
 
 
@@ -67,6 +68,17 @@ def pytest_collection_finish() -> None:
 
 
 TREES = Path(__file__).parent / "platforms" / "trees"
+
+
+@pytest.fixture(scope="session")
+def unused_port() -> Callable[[], int]:
+    """Find a TCP port of loopback that nobody listens on."""
+
+    def find() -> int:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            return int(server.getsockname()[1])
+
+    return find
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,8 @@
 """The dashboard commands and stops the robot, and the robot does not need the dashboard."""
 
 import json
-import socket
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
@@ -25,13 +24,8 @@ MOVING_RAD_S = 1.0
 STANDSTILL_RAD_S = 0.05
 
 
-def unused_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
-
-
 @pytest.fixture(scope="module")
-def stack(coarse: str) -> Iterator[ProcessStack]:
+def stack(coarse: str, unused_port: Callable[[], int]) -> Iterator[ProcessStack]:
     """The real processes, armed: each test leaves them so, but for the last."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
         base = Path(folder) / "base"

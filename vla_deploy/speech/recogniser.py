@@ -106,7 +106,7 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     provider, declared = _provider(choice, runtime), model.manifest.whisper
     assert declared is not None, "only manifests of a Whisper come here"
     try:
-        whisper = runtime.Whisper(
+        whisper = runtime.WhisperRuntime(
             model.folder,
             trimmed=declared.context == Context.TRIMMED,
             device=_DEVICES[provider],

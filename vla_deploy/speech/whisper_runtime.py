@@ -36,7 +36,7 @@ _FRAMES_PER_STATE: Final = 2
 _PLAIN_SUPPRESSED: Final = [-1]  # those that a model's own files name
 
 
-class Whisper:
+class WhisperRuntime:
     """Read phrases of one window of sound, and keep what else the search found.
 
     With `trimmed` weights the encoder is given the sound's own frames and a little silence only;

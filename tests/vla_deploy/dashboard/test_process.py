@@ -70,13 +70,10 @@ def set_port(base: Path, port: int, more: str = "") -> None:
     (config_dir_of(base) / "dashboard.toml").write_text(text)
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return server.getsockname()[1]
-
-
-def test_it_serves_by_tcp_and_by_its_socket_and_ends_at_once_with_a_client_that_stays(base):
-    set_port(base, free_port())
+def test_it_serves_by_tcp_and_by_its_socket_and_ends_at_once_with_a_client_that_stays(
+    base, unused_port
+):
+    set_port(base, unused_port())
     process = Process(base)
     host, port = process.url()
     staying = HTTPConnection(host, port, timeout=10)
@@ -126,9 +123,11 @@ def certified(base):
     return settings, ssl.create_default_context(cafile=str(certificate))
 
 
-def test_with_a_certificate_everything_goes_by_tls_and_nothing_without(base, certified):
+def test_with_a_certificate_everything_goes_by_tls_and_nothing_without(
+    base, certified, unused_port
+):
     settings, trusting = certified
-    set_port(base, free_port(), settings)
+    set_port(base, unused_port(), settings)
     process = Process(base)
     host, port = process.url()
     secure = HTTPSConnection(host, port, timeout=10, context=trusting)
