@@ -31,7 +31,7 @@ from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detect
 from vla_deploy.perception.geometry_grid import geometry_grid
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.supports import find_supports
-from vla_deploy.state_dir import user_base
+from vla_deploy.runtime.state_dir import user_base
 
 FIRST_FRESH: Final = 20_000
 """Number of the first held-out stage that belongs to no other set of images."""

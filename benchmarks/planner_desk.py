@@ -15,14 +15,14 @@ from benchmarks.planner_told import executor_document, scene_document
 from benchmarks.planner_world import World
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import load_profile
-from vla_deploy.aside import beside
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import Event, IpcError, SharedSpace
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import open_local_models, open_planner
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.runtime.executors import worker_thread
+from vla_deploy.runtime.node import NodeContext
 
 ANSWER_LIMIT_S: Final = 20.0
 # No state of a user: what ships is measured.
@@ -170,7 +170,9 @@ class Desk:
         base = self._context.run_dir.parent
         local, away = opened(self._context.profile)
         planner = open_planner(robot, profile.planning, self._clock, base, local, away)
-        return PlannerNode(self._context, robot, planner, beside("plan", self._context.clock, 0.2))
+        return PlannerNode(
+            self._context, robot, planner, worker_thread("plan", self._context.clock, 0.2)
+        )
 
     def _start_anew(self) -> None:
         self.node.stop()

@@ -10,12 +10,12 @@ from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.runtime.state_dir import user_base
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
 from vla_deploy.speech.sound import FRAME, FRAME_S, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, open_spotter
 from vla_deploy.speech.verdict import Verdict
-from vla_deploy.state_dir import user_base
 
 SPOTTER, WORDS = "spotter", "words"
 

@@ -17,8 +17,8 @@ from sim_twin.lines import MemoryLine
 from sim_twin.schedule import Closable, Schedule
 from sim_twin.servos import WireTiming
 from sim_twin.twin import Twin
-from vla_deploy.node import Node, NodeContext
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import Node, NodeContext
 
 
 class MemoryOpener:

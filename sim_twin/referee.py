@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_twin.errors import RefereeRefusal, TwinError, Unreachable
-from vla_deploy.json_line import ask_by_line
+from vla_deploy.client.unix_rpc import request
 
 REFEREE_SOCKET = "referee"
 FILM_SOCKET = "film"
@@ -45,7 +45,7 @@ def ask(run_dir: Path, op: str, **arguments: Any) -> dict[str, Any]:
         raise RefereeRefusal(f"no operation {op!r}; there are {', '.join(_SOCKET_AND_ARGUMENTS)}")
     path = run_dir / "dev" / _SOCKET_AND_ARGUMENTS[op][0]
     try:
-        answer = ask_by_line(path, {"op": op, **arguments})
+        answer = request(path, {"op": op, **arguments})
     except OSError as error:
         reason = error.strerror or error
         raise Unreachable(f"{path}: {reason}; expected a running twin, start one") from error

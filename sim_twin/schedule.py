@@ -6,7 +6,7 @@ from typing import Protocol
 
 from drivers.clock import NS_PER_S
 from sim_twin.clock import Simulation
-from vla_deploy.node import Node
+from vla_deploy.runtime.node import Node
 
 
 class Closable(Protocol):

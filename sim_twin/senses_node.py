@@ -8,10 +8,10 @@ from drivers.imu.base import Imu
 from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
 from vla_deploy.ipc import BY_NAME, SharedSpace
-from vla_deploy.node import NodeContext
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
+from vla_deploy.runtime.node import NodeContext
 
 LOOK_PERIOD_S: Final = 1.0 / BY_NAME["near_obstacles"].rate_hz
 

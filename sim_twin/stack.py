@@ -12,12 +12,12 @@ from sim_twin.senses_node import SensesNode
 from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.streams import streamed_microphone, streamed_speaker
 from sim_twin.sound.talker import Talker, arrival
-from vla_deploy.aside import AtOnce
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import Node
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.planning.node import PlannerNode
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import Node
 from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
@@ -156,7 +156,7 @@ class LockstepStack(LockstepControl):
     def _speech(self) -> Node:
         context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot
         speaker = streamed_speaker(robot, devices, context.clock)
-        voice = build_voice(robot.voice, speaker, context.clock, AtOnce())
+        voice = build_voice(robot.voice, speaker, context.clock, InlineExecutor())
         return SpeechNode(
             context,
             robot,

@@ -13,7 +13,7 @@ from drivers.clock import Clock
 from sim_twin.campaigns.clock_shift import CannotShift, ClockShift
 from sim_twin.campaigns.talk import Talk
 from sim_twin.campaigns.working_robot import WorkingRobot
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.supervisor.crash_reports import crash_folder
 
 COOL_C: Final = 45.0

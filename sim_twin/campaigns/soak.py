@@ -16,7 +16,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import Case, Report
 from sim_twin.campaigns.selection import chosen
 from sim_twin.stack import LockstepStack, NotReady
-from vla_deploy.heap import give_large_blocks_back
+from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0
 LEAST_JOBS_RATIO: Final = 0.8

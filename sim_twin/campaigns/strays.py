@@ -6,7 +6,7 @@ from typing import Final
 
 import psutil
 
-from vla_deploy.logs import RUN_ID_VARIABLE
+from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor.orphans import PROCESS_VARIABLE
 
 MARK: Final = "VLA_CAMPAIGN_ROBOT"

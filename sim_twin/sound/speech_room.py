@@ -12,10 +12,10 @@ from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.lines import MemoryLine
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.talker import Talker, arrival
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import Announced, Announcer, SharedSpace
-from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import StopWords
 from vla_deploy.speech.voice.robot_voice import build_voice
@@ -99,7 +99,7 @@ class SpeechRoom:
                 robot.voice,
                 lambda: PcmOutput(self._line(self.mouth), clock, _FORMAT),
                 clock,
-                AtOnce(),
+                InlineExecutor(),
             ),
             stop_words=stop_words,
         )

@@ -12,7 +12,7 @@ import pytest
 
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.dashboard.settings import SETTINGS_FILE
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 pytestmark = [
     pytest.mark.gl,

@@ -13,7 +13,7 @@ import pytest
 
 from platforms import load_profile
 from sim_twin.process_stack import ProcessStack
-from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 

@@ -22,7 +22,7 @@ from drivers.twin_clock import TwinClock
 from drivers.twin_page import TIME_SOCKET, Op, TimeRole, pack
 from sim_twin.governor import Governor
 from sim_twin.pacer import Pacer
-from vla_deploy.aside import TwinWorker, beside
+from vla_deploy.runtime.executors import TwinWorker, worker_thread
 
 MS = 1_000_000
 STEP_NS = 2 * MS
@@ -250,7 +250,7 @@ def test_work_in_a_thread_is_done_when_declared_whatever_it_took(
 ) -> None:
     clock, took_s = TwinClock(folder), iter((0.15, 0.0))
     clock.join(TimeRole(name="perception", order=2), os.getpid())
-    with beside("network", clock, 0.1) as network:
+    with worker_thread("network", clock, 0.1) as network:
         assert isinstance(network, TwinWorker)
         for _ in range(2):
             began_ns = clock.now_ns()
@@ -266,7 +266,7 @@ def test_work_in_a_thread_is_done_when_declared_whatever_it_took(
 
 def test_work_that_fails_or_is_cancelled_says_so(metronome: Metronome, folder: Path) -> None:
     clock = TwinClock(folder)
-    network = beside("network", clock, 0.01)
+    network = worker_thread("network", clock, 0.01)
     failed = network.submit(int, "no number")
     begun = threading.Event()
     busy = network.submit(lambda: begun.set() or time.sleep(0.2))

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.action_words import action_words
 from vla_deploy.cli.aloud import USUAL_VOICE
 from vla_deploy.cli.demo_sound import MotionWatch, SpokenCommand, await_ears
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -26,6 +25,7 @@ from vla_deploy.cli.narrate import line_of
 from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments, add_twin_arguments
 from vla_deploy.cli.session import Session
+from vla_deploy.client.action_words import action_words
 from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor

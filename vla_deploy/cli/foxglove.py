@@ -8,7 +8,7 @@ from typing import Any
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.cli.watched_run import watched_run
-from vla_deploy.node import run_node
+from vla_deploy.runtime.node import run_node
 from vla_deploy.telemetry.foxglove import FoxgloveNode
 from vla_deploy.telemetry.recording.settings import read_settings
 

@@ -10,8 +10,8 @@ from typing import Any
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
-from vla_deploy.logs import LOGS_DIR
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.supervisor.log_files import (
     LogLine,
     LogTail,

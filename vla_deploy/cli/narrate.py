@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from vla_deploy.action_words import action_words
+from vla_deploy.client.action_words import action_words
 
 SIGNS: Mapping[str, str] = {
     "active": "…",

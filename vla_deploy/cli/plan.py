@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
-from vla_deploy.action_words import action_words
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.client.action_words import action_words
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.confirmation import confirmation_of

@@ -12,8 +12,8 @@ from drivers.twin_page import TwinPace
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.run_parameters import with_parameters
-from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
-from vla_deploy.logs import journal_stream
+from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.logs import journal_stream
 from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.profile_choice import start_profile

@@ -31,7 +31,7 @@ from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOT_FILE, robot_file
 from vla_deploy.robots.overrides import OVERRIDES_FILE, read_overrides
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.runtime import default_base, free_base
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.json_line import ask_by_line
+from vla_deploy.client.unix_rpc import request
 
 _SOCKET: Final = Path("dev") / "referee"
 
@@ -28,7 +28,7 @@ def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
             "start one: vla-deploy run --twin"
         )
     try:
-        answer = ask_by_line(path, {"op": op, **details})
+        answer = request(path, {"op": op, **details})
     except OSError as error:
         raise CommandFailed(f"{path}: {error.strerror or error}; is the twin alive?") from error
     if not answer.pop("ok"):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vla_deploy.cli.session import Session
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 
 
 def watched_run(session: Session) -> NodeContext:

@@ -8,10 +8,10 @@ from drivers.opener import PathOpener
 from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
 from vla_deploy.control.node import ControlNode
-from vla_deploy.node import NodeContext
-from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 
 
 def build(context: NodeContext) -> ControlNode:

@@ -30,9 +30,9 @@ from vla_deploy.control.switching_off import SwitchingOff
 from vla_deploy.control.telemetry import Telemetry, TickClock
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NodeContext
-from vla_deploy.power_off import power_off_asked
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.power_off import power_off_asked
 from vla_deploy.safety import Cause
 
 _RAMP_DOWN_S = 3.0

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from platforms import Profile, ProfileError
-from vla_deploy.node import NeedsRestart
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.node import NeedsRestart
 
 STATUS_HZ: Final = 20.0
 # A cycle's share of the servo bus: one sync write and one fast sync read, by the servo.

@@ -8,8 +8,8 @@ from vla_deploy.dashboard.errors import DashboardError
 from vla_deploy.dashboard.node import DashboardNode
 from vla_deploy.dashboard.serving import serve
 from vla_deploy.dashboard.settings import read_settings
-from vla_deploy.node import Node, NodeContext
-from vla_deploy.process_main import main
+from vla_deploy.runtime.node import Node, NodeContext
+from vla_deploy.runtime.process_main import main
 
 
 class Dashboard:

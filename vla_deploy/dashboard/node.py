@@ -15,7 +15,7 @@ from vla_deploy.dashboard.serving import Door
 from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.dashboard.tls import server_context
 from vla_deploy.ipc import CellWriter
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
 STATUS_TOPIC: Final = "dashboard_status"

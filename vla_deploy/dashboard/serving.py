@@ -20,7 +20,7 @@ from vla_deploy.dashboard.access.connections import (
     bounded_by,
 )
 from vla_deploy.dashboard.live.wire import LiveProtocol
-from vla_deploy.node import Node
+from vla_deploy.runtime.node import Node
 
 GOODBYE_S: Final = 1  # for requests that are under way at the end
 _KEEP_ALIVE_S: Final = 10

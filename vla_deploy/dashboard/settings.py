@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.dashboard.errors import SettingsInvalid
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 SETTINGS_FILE: Final = "dashboard.toml"
 _LAST_PORT: Final = 65535

@@ -14,7 +14,7 @@ from platforms.board import Board, identify
 from platforms.tree import Missing, Tree
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import RobotDescription
-from vla_deploy.state_dir import system_models_dir
+from vla_deploy.runtime.state_dir import system_models_dir
 
 COMMAND_TIMEOUT_S: Final = 10.0
 UNLIMITED: Final = -1

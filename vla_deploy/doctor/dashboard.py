@@ -10,7 +10,7 @@ from vla_deploy.dashboard.settings import SETTINGS_FILE, DashboardSettings, read
 from vla_deploy.dashboard.tls import server_context
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, fail, ok, warn
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.runtime import default_base, running
 
 _NAME: Final = "dashboard"

@@ -7,10 +7,10 @@ from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
+from vla_deploy.runtime.state_dir import engines_dir_of
 from vla_deploy.speech.stop_words.listener import OFF
 from vla_deploy.speech.stop_words.spotter import open_spotter
-from vla_deploy.state_dir import engines_dir_of
 from vla_deploy.supervisor.runtime import default_base
 
 NAME: Final = "spoken stop"

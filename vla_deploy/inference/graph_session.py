@@ -12,7 +12,7 @@ from vla_deploy.inference.graph_check import tensors_of
 from vla_deploy.inference.manifest import Tensor
 from vla_deploy.inference.opening import open_graph
 from vla_deploy.inference.runtime import SESSION_ERRORS, available_providers
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 
 class GraphSession:

@@ -29,7 +29,7 @@ from vla_deploy.inference.runtime import (
     SessionOptions,
 )
 from vla_deploy.inference.store import Model
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 _FATAL_ONLY: Final = 4  # what goes wrong is raised, and told once
 _HASH_DIGITS: Final = 12

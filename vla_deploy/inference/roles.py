@@ -11,7 +11,7 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.memory_claims import LoadedT, RunMemory
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import Model, ModelStore
-from vla_deploy.state_dir import engines_dir_of, models_dir_of
+from vla_deploy.runtime.state_dir import engines_dir_of, models_dir_of
 
 _log = logging.getLogger(__name__)
 

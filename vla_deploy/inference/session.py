@@ -18,7 +18,7 @@ from vla_deploy.inference.opening import Opened, open_with_choice
 from vla_deploy.inference.runtime import SESSION_ERRORS, available_providers
 from vla_deploy.inference.stats import SessionStats, resident_mb
 from vla_deploy.inference.store import Model
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 Arrays = Mapping[str, NDArray[Any]]
 WARM_UP_RUNS: Final = 2  # the first one lays out the memory that the next ones use

@@ -39,7 +39,7 @@ class MemoryKeeper:
         store: MemoryStore,
         space: SharedSpace,
         clock: Clock,
-        aside: Executor,
+        executor: Executor,
         *,
         run_id: str,
         places: Mapping[str, Point],
@@ -47,7 +47,7 @@ class MemoryKeeper:
     ) -> None:
         self._store = store
         self._clock = clock
-        self._aside = aside
+        self._executor = executor
         self._run_id = run_id
         self._places = dict(places)
         self._wall_s = wall_s
@@ -82,7 +82,7 @@ class MemoryKeeper:
         if self._writing is not None:
             wait([self._writing])
         self._write(self._clock.now_ns())
-        self._aside.shutdown(wait=True)
+        self._executor.shutdown(wait=True)
         self._store.close()
 
     def document(self) -> dict[str, Any]:
@@ -167,7 +167,7 @@ class MemoryKeeper:
         self._batch = self._ended, self._changed
         self._ended, self._changed = [], {}
         episodes, things = self._batch
-        self._writing = self._aside.submit(self._store.add, episodes, list(things.values()))
+        self._writing = self._executor.submit(self._store.add, episodes, list(things.values()))
 
     def _settle(self, writing: "Future[None]", now_ns: int) -> None:
         self._writing = None

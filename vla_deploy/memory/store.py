@@ -13,7 +13,7 @@ from vla_deploy.memory.episode import Episode, LastSeen, Outcome, Recollection
 from vla_deploy.memory.errors import MemoryUnusable, NoSuchEpisode
 from vla_deploy.memory.schema import open_file
 from vla_deploy.memory.search import search, vectors_of
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 
 FILE_NAME: Final = "memory.sqlite3"
 MOST_EPISODES: Final = 5_000

@@ -13,7 +13,7 @@ from vla_deploy.model_servers.exchange import Reply
 from vla_deploy.model_servers.formats.base import Json
 from vla_deploy.model_servers.json_answer import strict_json
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 _PASSING: Final = frozenset({408, 425, 429})
 # Servers repeat a wrong key, or the half of it, in what they say about it.

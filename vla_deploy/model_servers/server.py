@@ -32,7 +32,7 @@ from vla_deploy.model_servers.settings import ServerSettings
 class ModelServer:
     """Hold one declared server and how it has been doing; threads may share it.
 
-    Calls block: ask from beside a process' steps, as `vla_deploy.aside` runs work.
+    Calls block: ask from beside a process' steps, as `vla_deploy.runtime.executors` runs work.
     """
 
     def __init__(

@@ -13,7 +13,7 @@ from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.servers_file import SERVERS_FILE, read_servers
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

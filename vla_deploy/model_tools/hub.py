@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, ToolMissing
 from vla_deploy.inference.file_check import sha256_of
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 TIMEOUT_S: Final = 20.0
 _BYTES_PER_GB: Final = 1e9

@@ -7,12 +7,12 @@ from typing import Final
 from drivers.opener import PathOpener
 from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
-from vla_deploy.aside import beside
-from vla_deploy.node import NodeContext
 from vla_deploy.perception.node import PerceptionNode
-from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
+from vla_deploy.runtime.executors import worker_thread
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 
 DETECTION_S: Final = 0.1
 """What the network takes for an image, of simulated time."""
@@ -27,7 +27,7 @@ def build(context: NodeContext) -> PerceptionNode:
     )
     profile = load_profile(context.profile)
     return PerceptionNode(
-        context, robot, profile, opener, beside("network", context.clock, DETECTION_S)
+        context, robot, profile, opener, worker_thread("network", context.clock, DETECTION_S)
     )
 
 

@@ -14,10 +14,10 @@ from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.one_line import one_line
 from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detector
 from vla_deploy.perception.detectors.image_input import Image
 from vla_deploy.perception.network_view import NetworkView
+from vla_deploy.runtime.one_line import one_line
 
 LATE_NS: Final = NS_PER_S
 """An image is looked at by form alone when the network has not answered within this time."""

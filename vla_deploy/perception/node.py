@@ -10,11 +10,9 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from drivers.opener import DeviceOpener
 from platforms import Profile
-from vla_deploy.aside import AtOnce
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.node import NodeContext
 from vla_deploy.perception.body_state import BodyState
 from vla_deploy.perception.eyes import Eyes, Network, open_network
 from vla_deploy.perception.looking import Looking
@@ -22,6 +20,8 @@ from vla_deploy.perception.sensors import Sensors
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world.surfaces import furniture_points
 
 STALE_SCAN_NS = round(BY_NAME["scan"].deadline_s * NS_PER_S)
@@ -70,7 +70,7 @@ class PerceptionNode:
         self._sensors = Sensors(robot, model, devices, context.clock, rate_hz)
         self._body = BodyState(robot, model)
         self._whereabouts = Whereabouts(robot, model, self._space)
-        self._eyes = Eyes(AtOnce() if executor is None else executor, context.clock)
+        self._eyes = Eyes(InlineExecutor() if executor is None else executor, context.clock)
         furniture = furniture_points(robot.places)
         self._looking = Looking(self._body, self._whereabouts, self._eyes, furniture)
         self._recall_scene()

@@ -4,13 +4,13 @@ import sys
 from typing import Final
 
 from platforms import load_profile
-from vla_deploy.aside import beside
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.prohibitions import Prohibitions
-from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.executors import worker_thread
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 
 PLANNING_S: Final = 0.2
 """What a plan of the parser on board takes, of simulated time."""
@@ -22,7 +22,7 @@ def build(context: NodeContext) -> PlannerNode:
     profile, base = load_profile(context.profile), context.run_dir.parent
     planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
     memory = open_memory(profile.planning, base)
-    executor = beside("plan", context.clock, PLANNING_S)
+    executor = worker_thread("plan", context.clock, PLANNING_S)
     return PlannerNode(context, robot, planner, executor, memory, Prohibitions.of_base(base))
 
 

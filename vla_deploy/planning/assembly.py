@@ -18,12 +18,12 @@ from vla_deploy.inference.store import Model
 from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
-from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.chat_model import LocalModel, ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.one_line import one_line
 
 ROLE: Final = "planner"
 _log = logging.getLogger(__name__)

@@ -7,12 +7,10 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.aside import AtOnce, background
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.keeper import MemoryKeeper
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
 from vla_deploy.planning.dialogue.command import (
@@ -28,6 +26,8 @@ from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world.surfaces import furniture_points
 
 UTTERANCE_AGE_S: Final = 5.0
@@ -57,7 +57,7 @@ class PlannerNode:
         self._robot = robot
         self._run_dir = context.run_dir
         self._planner = planner or Planner(context.clock)
-        self._executor = executor or AtOnce()
+        self._executor = executor or InlineExecutor()
         self._memory = memory
         self._prohibitions = prohibitions
         self._keeper: MemoryKeeper | None = None
@@ -81,7 +81,7 @@ class PlannerNode:
                 self._memory,
                 self._space,
                 self._clock,
-                background(self._clock),
+                low_priority_thread(self._clock),
                 run_id=self._run_dir.name,
                 places=furniture_points(self._robot.places),
                 wall_s=unix_s,

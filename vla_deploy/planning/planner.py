@@ -12,7 +12,6 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.one_line import one_line
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import (
@@ -38,6 +37,7 @@ from vla_deploy.planning.prohibitions import held_to
 from vla_deploy.planning.scope import guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
+from vla_deploy.runtime.one_line import one_line
 
 WITHIN_S: Final = 20.0
 # What language models leave of the time to the command parser, which needs a fraction of that.

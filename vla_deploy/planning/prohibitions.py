@@ -21,7 +21,7 @@ from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import WORDS
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.symbolic.state import thing_of
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS
 

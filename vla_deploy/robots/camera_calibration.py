@@ -18,12 +18,12 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.one_line import one_line
 from vla_deploy.robots.description import Camera, LensCalibration, Mounting
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.lens_schema import lens_faults
 from vla_deploy.robots.replacing import replace_text
 from vla_deploy.robots.schema import NUMBER, TEXT, Check, Fault, Shape, check_record, is_number
+from vla_deploy.runtime.one_line import one_line
 
 LENS_FILE: Final = "camera.yaml"
 MOUNTING_FILE: Final = "camera_mounting.toml"

@@ -3,9 +3,9 @@
 import sys
 
 from platforms.profile import load_profile
-from vla_deploy.node import NodeContext
-from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 from vla_deploy.skills.node import ExecutorNode
 
 

@@ -21,9 +21,9 @@ from vla_deploy.ipc import (
 )
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import Plan
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import Held, SkillContext

@@ -5,11 +5,11 @@ from typing import Final
 
 from drivers.audio.open_audio import open_audio_input, open_audio_output
 from platforms import load_profile
-from vla_deploy.aside import beside
-from vla_deploy.node import NodeContext
-from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
+from vla_deploy.runtime.executors import worker_thread
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 from vla_deploy.speech.microphone import linked
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
@@ -28,14 +28,14 @@ def build(context: NodeContext) -> SpeechNode:
     profile = load_profile(context.profile)
     clock = context.clock
     speaker = linked(robot.speaker, open_audio_output, links, clock)
-    voice = build_voice(robot.voice, speaker, clock, beside("voice", clock, SYNTHESIS_S))
+    voice = build_voice(robot.voice, speaker, clock, worker_thread("voice", clock, SYNTHESIS_S))
     return SpeechNode(
         context,
         robot,
         profile,
         linked(robot.microphone, open_audio_input, links, clock),
-        beside("recogniser", clock, RECOGNITION_S),
-        beside("loader", clock, LOADING_S),
+        worker_thread("recogniser", clock, RECOGNITION_S),
+        worker_thread("loader", clock, LOADING_S),
         voice=voice,
         stop_words=build_stop_words(context, profile),
         page_stop_words=build_stop_words(context, profile, place=PAGE),

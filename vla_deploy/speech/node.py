@@ -7,13 +7,13 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import BY_NAME, CellWriter, SharedSpace
-from vla_deploy.node import NodeContext
-from vla_deploy.one_line import one_line
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.event_publisher import SpeechEvents
@@ -67,8 +67,8 @@ class SpeechNode:
         self._robot = robot
         self._profile = profile
         self._shelf = shelf or ModelShelf.of_run(context.run_dir, context.clock)
-        self._executor = AtOnce() if executor is None else executor
-        self._loader = AtOnce() if loader is None else loader
+        self._executor = InlineExecutor() if executor is None else executor
+        self._loader = InlineExecutor() if loader is None else loader
         self._voice = voice
         self._stop_words, self._page_stop_words = stop_words, page_stop_words
         self._listeners = tuple(one for one in (stop_words, page_stop_words) if one is not None)

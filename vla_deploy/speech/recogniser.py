@@ -8,7 +8,6 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import ModelChoice
-from vla_deploy.aside import background
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
@@ -16,7 +15,8 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.providers import CPU, CUDA
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.speech.errors import import_extra
 from vla_deploy.speech.sound import RATE_HZ, Sound
 from vla_deploy.speech.transcript import Transcript, confidence
@@ -101,7 +101,7 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     runtime = import_extra(_RUNTIME, "turning speech into text needs faster-whisper")
     # Hashing half a gigabyte gives way to the steps. The model itself is made by this thread, since
     # the threads that it starts inherit the priority, and phrases are to be read without delay.
-    with background(MonotonicClock()) as thread:
+    with low_priority_thread(MonotonicClock()) as thread:
         thread.submit(check_parts, model).result()
     provider, declared = _provider(choice, runtime), model.manifest.whisper
     assert declared is not None, "only manifests of a Whisper come here"

@@ -8,7 +8,7 @@ import numpy as np
 from drivers.audio.wav import read_wav
 from drivers.clock import Clock
 from platforms import Profile
-from vla_deploy.aside import AtOnce
+from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.speech.asr_pipeline import AsrPipeline
 from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.model_selection import SelectedRecogniser
@@ -47,7 +47,7 @@ def open_hearing(selected: SelectedRecogniser, profile: Profile, clock: Clock) -
         SpeechMissing: faster-whisper is not installed.
         InferenceError: its voice network cannot be opened.
     """
-    queue = TranscriptionQueue(AtOnce(), clock)
+    queue = TranscriptionQueue(InlineExecutor(), clock)
     queue.selected = selected
     return AsrPipeline(open_voice_activity(), queue, profile.speech)
 

@@ -4,8 +4,8 @@ import sys
 
 from vla_deploy.dashboard.settings import read_settings
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NodeContext
-from vla_deploy.process_main import main
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 from vla_deploy.stop_door.node import StopDoorNode
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import TOPICS, Kind, SharedSpace
-from vla_deploy.logs import LOGS_DIR
+from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.supervisor.lifecycle import RUNNING, Record, State
 from vla_deploy.supervisor.log_files import as_line, last_output, read_log
 from vla_deploy.supervisor.options import RunOptions

@@ -11,8 +11,8 @@ from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from vla_deploy.gateways.ros.errors import RosGatewayError
 from vla_deploy.gateways.ros.launching import launch_environment
-from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.robots.ros_settings import RosSettings
+from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.runtime.twin_members import MEMBERSHIPS
 from vla_deploy.supervisor.lifecycle import Act, Action, Seen
 from vla_deploy.supervisor.liveness import Liveness, Vital

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vla_deploy.logs import LOGS_DIR
+from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.supervisor.log_files import as_line, last_output, read_log
 
 LAST_LINES = 12

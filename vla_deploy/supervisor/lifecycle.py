@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.supervisor.table import GivingUp, ProcessSpec, RestartPolicy
 
 ABORT_GRACE_NS = NS_PER_S

@@ -6,7 +6,7 @@ from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.supervisor.status_line import with_late
 
 NS_PER_US = 1000

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 import psutil
 
-from vla_deploy.logs import RUN_ID_VARIABLE
+from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 
 PROCESS_VARIABLE = "VLA_DEPLOY_PROCESS"
 _TERM_WAIT_S = 1.0

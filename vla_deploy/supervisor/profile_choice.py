@@ -8,8 +8,8 @@ from typing import Final
 
 from platforms import ProfileError, load_profile
 from platforms.board import identify
-from vla_deploy.one_line import one_line
-from vla_deploy.state_dir import library_dir_of
+from vla_deploy.runtime.one_line import one_line
+from vla_deploy.runtime.state_dir import library_dir_of
 from vla_deploy.supervisor.runtime import default_base
 
 _NAME: Final = "profile.json"

@@ -39,7 +39,7 @@ class ProfileSwitch:
         clock: Clock,
         choice: ProfileChoice,
         power: PowerSwitch,
-        aside: Executor,
+        executor: Executor,
         watch_s: float = profile_change.WATCH_S,
         on_change: Callable[[Profile], None] | None = None,
         fault: str = "",
@@ -55,7 +55,7 @@ class ProfileSwitch:
         self._clock = clock
         self._choice = choice
         self._power = power
-        self._aside = aside
+        self._executor = executor
         self._watch_ns = _ns(watch_s)
         self._on_change = on_change
         self._power_set: Future[str] | None = None
@@ -98,8 +98,8 @@ class ProfileSwitch:
         return self._to_restart(change, members)
 
     def close(self) -> None:
-        """Give up what runs aside."""
-        self._aside.shutdown(wait=False, cancel_futures=True)
+        """Give up what the executor runs."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     # --- a request ----------------------------------------------------------------------------
 
@@ -151,7 +151,7 @@ class ProfileSwitch:
             self._set_power(change)
 
     def _settle_restarts(self, change: Change) -> dict[str, str]:
-        """Put who may be restarted aside, and return the refusals that remain."""
+        """Set aside who may be restarted, and return the refusals that remain."""
         refusals = dict(change.refusals)
         for name, reason in change.refusals.items():
             if not change.answers[name]["restart"]:
@@ -168,7 +168,7 @@ class ProfileSwitch:
     def _set_power(self, change: Change) -> None:
         change.enter(Phase.SET_POWER, self._clock.now_ns(), _ns(profile_change.SET_POWER_S))
         change.power_before = self._power.current() if change.target.power_mode else ""
-        self._power_set = self._aside.submit(self._power.set, change.target.power_mode)
+        self._power_set = self._executor.submit(self._power.set, change.target.power_mode)
 
     def _setting_power(self, change: Change, _: Mapping[str, Member]) -> None:
         assert self._power_set is not None
@@ -263,7 +263,7 @@ class ProfileSwitch:
         change.failure = failure
         self._put_in_force(self._kept, self._kept_profile)
         self._power_set = (
-            self._aside.submit(self._power.set, change.power_before)
+            self._executor.submit(self._power.set, change.power_before)
             if change.power_before
             else None
         )

@@ -12,11 +12,11 @@ from drivers.twin_clock import TwinClock, clock_of
 from drivers.twin_page import PAGE_FILE, TIME_LINK, TimePage
 from platforms import Profile
 from platforms.power_switch import PowerSwitch
-from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.journal import JOURNAL_SOCKET
-from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
 from vla_deploy.robots.ros_settings import RosSettings
+from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.runtime.journal import JOURNAL_SOCKET
+from vla_deploy.runtime.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
 from vla_deploy.runtime.twin_members import SUPERVISOR
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.crash_reports import CrashReports, crash_folder
@@ -97,7 +97,7 @@ class Run:
             probe_root=options.probe_root,
         )
         self.directives = Directives(self.space)
-        power, aside = PowerSwitch(), background(clock)
+        power, executor = PowerSwitch(), low_priority_thread(clock)
         self.switch = ProfileSwitch(
             options.profile,
             profile(),
@@ -105,7 +105,7 @@ class Run:
             clock,
             choice_of(options.runtime_base),
             power,
-            aside,
+            executor,
             on_change=self.budgets.adopt,
             fault=options.profile_fault,
         )
@@ -120,7 +120,7 @@ class Run:
         journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
         self._log = RunLog(origin, run_dir / LOGS_DIR, journal, clock)
         self._log.__enter__()
-        aside.submit(set_at_start, power, profile().power_mode)
+        executor.submit(set_at_start, power, profile().power_mode)
         if options.profile_fault:
             _log.error("%s; the run takes %s", options.profile_fault, options.profile)
         for note in options.notes:

@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.state_dir import state_dir_of, user_base
+from vla_deploy.runtime.state_dir import state_dir_of, user_base
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.orphans import end_orphans
 from vla_deploy.supervisor.proc_files import read_stat

@@ -3,8 +3,8 @@
 import sys
 import time
 
-from vla_deploy.node import NodeContext
-from vla_deploy.process_main import main
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.runtime.process_main import main
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.node import RecorderNode
 from vla_deploy.telemetry.recording.building import rolling_recorder

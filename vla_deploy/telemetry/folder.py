@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.telemetry.errors import FlightMissing
 
 _log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.logs import LOGS_DIR
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import ExtraMissing
 from vla_deploy.telemetry.following import Following
 from vla_deploy.telemetry.recording.batch import Drafter

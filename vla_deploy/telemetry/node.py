@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.memory import Memory
 from vla_deploy.telemetry.recording.recorder import RollingRecorder

@@ -30,8 +30,8 @@ from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.passwords import stored_form
 from vla_deploy.dashboard.settings import SETTINGS_FILE
+from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.speech.voice.tts import EspeakEngine
-from vla_deploy.state_dir import config_dir_of
 
 CHROMIUM: Final = "/usr/bin/chromium"
 DESKTOP: Final = ViewportSize(width=1440, height=900)

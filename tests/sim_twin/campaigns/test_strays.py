@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from sim_twin.campaigns.strays import MARK, strays
-from vla_deploy.logs import RUN_ID_VARIABLE
+from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor.orphans import PROCESS_VARIABLE
 
 pytestmark = pytest.mark.stack

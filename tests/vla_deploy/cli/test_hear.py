@@ -13,7 +13,7 @@ from drivers.audio.wav import WavOutput
 from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.cli.main import main
-from vla_deploy.state_dir import models_dir_of
+from vla_deploy.runtime.state_dir import models_dir_of
 
 Hear = Callable[..., tuple[int, str, str]]
 

@@ -5,7 +5,7 @@ import cv2
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.state_dir import models_dir_of
+from vla_deploy.runtime.state_dir import models_dir_of
 
 SHIPPED = {"command_parser", "commands-whisper", "detector", "stop_words"}
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.state_dir import models_dir_of
+from vla_deploy.runtime.state_dir import models_dir_of
 
 Vla = Callable[..., tuple[int, str, str]]
 

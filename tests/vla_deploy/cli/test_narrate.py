@@ -1,7 +1,7 @@
 import pytest
 
-from vla_deploy.action_words import action_words
 from vla_deploy.cli.narrate import line_of
+from vla_deploy.client.action_words import action_words
 
 PICK = {"skill": "pick_up", "parameters": {"object": "red cup"}}
 

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 SERVER = """
 [servers.bench]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
 
 
 @pytest.mark.stack

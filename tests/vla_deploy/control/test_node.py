@@ -14,8 +14,8 @@ from platforms import load_profile
 from vla_deploy.control.payload import PRESS_M
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.power_off import ask_power_off
 from vla_deploy.robots.description import StopCategory
+from vla_deploy.runtime.power_off import ask_power_off
 
 ELBOW, PITCH = "left_elbow", "left_shoulder_pitch"
 STANDSTILL_RAD_S = 0.02

@@ -5,8 +5,8 @@ import pytest
 from platforms import ProfileError, load_profile
 from vla_deploy.control.retuning import retuned, tuning_of
 from vla_deploy.control.telemetry import TickClock
-from vla_deploy.node import NeedsRestart
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import NeedsRestart
 
 ROBOT = load_robot("butler")
 DESKTOP = load_profile("desktop")

@@ -5,7 +5,7 @@ import pytest
 from vla_deploy.dashboard.errors import PortTaken
 from vla_deploy.dashboard.node import DashboardNode
 from vla_deploy.dashboard.settings import DashboardSettings
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 
 
 class Broken:

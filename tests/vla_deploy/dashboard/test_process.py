@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 pytestmark = [pytest.mark.stack]
 

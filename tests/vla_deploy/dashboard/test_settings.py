@@ -4,7 +4,7 @@ import pytest
 
 from vla_deploy.dashboard.errors import SettingsInvalid
 from vla_deploy.dashboard.settings import DashboardSettings, read_settings
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.doctor import dashboard as check
 from vla_deploy.doctor.finding import Level
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 
 
 @pytest.fixture

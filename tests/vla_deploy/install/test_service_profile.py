@@ -40,7 +40,7 @@ def test_on_this_computer_the_choice_is_the_services_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     choose(tmp_path / "library", CHOSEN)
-    monkeypatch.setattr("vla_deploy.state_dir._ROOT_LIBRARY", tmp_path / "library")
+    monkeypatch.setattr("vla_deploy.runtime.state_dir._ROOT_LIBRARY", tmp_path / "library")
     assert service_profile("", Layout()).name == CHOSEN
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore, Outcome
 from vla_deploy.memory.keeper import AGAIN_S, MOST_OPEN, MOST_THINGS, MemoryKeeper
+from vla_deploy.runtime.executors import InlineExecutor
 
 PLAN = {"goal": "the cup is in the box", "reasoning": "one red cup", "actions": []}
 PLACES = {"coffee_table": (2.2, 1.5)}
@@ -42,7 +42,7 @@ class Desk:
             self.store,
             self.space,
             self.clock,
-            AtOnce(),
+            InlineExecutor(),
             run_id="run-1",
             places=PLACES,
             wall_s=lambda: 1000.0 + self.clock.ns / NS_PER_S,

@@ -12,7 +12,7 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest_schema import is_name
 from vla_deploy.model_tools import hub as hub_client
 from vla_deploy.model_tools.published import LANGUAGE_MODELS, WHISPERS, PublishedModel
-from vla_deploy.state_dir import models_dir_of
+from vla_deploy.runtime.state_dir import models_dir_of
 
 Vla = Callable[..., tuple[int, str, str]]
 NAME = "llama-3.2-1b-cpu"

@@ -10,17 +10,17 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world import Snapshot, Thing
 
 
@@ -87,13 +87,13 @@ class Desk:
         run_dir: Path,
         clock: StepClock,
         *slow: Any,
-        aside: Executor,
+        executor: Executor,
         check: Any = checked,
         memory: MemoryStore | None = None,
     ) -> None:
         self.clock = clock
         self._check = check
-        self.aside = aside
+        self.executor = executor
         self.memory = memory
         self._space = SharedSpace(run_dir / "ipc", clock)
         self._context = NodeContext(
@@ -114,7 +114,7 @@ class Desk:
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
         planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
-        self.planner = PlannerNode(self._context, butler(), planner, self.aside, self.memory)
+        self.planner = PlannerNode(self._context, butler(), planner, self.executor, self.memory)
         self.planner.start()
         return self.planner
 
@@ -178,11 +178,18 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
 
     def open_desk(
         *slow: Any,
-        aside: Executor | None = None,
+        executor: Executor | None = None,
         check: Any = checked,
         memory: MemoryStore | None = None,
     ) -> Desk:
-        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce(), check=check, memory=memory)
+        desk = Desk(
+            tmp_path,
+            clock,
+            *slow,
+            executor=executor or InlineExecutor(),
+            check=check,
+            memory=memory,
+        )
         opened.append(desk)
         desk.control("armed")
         return desk

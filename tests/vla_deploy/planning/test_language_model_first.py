@@ -162,7 +162,7 @@ def test_a_check_is_made_outside_the_steps_and_a_stop_overtakes_it(
 ) -> None:
     model = back_end("model", propose(TO_HALL))
     model.is_language_model = True
-    desk = open_desk(model, aside=later)
+    desk = open_desk(model, executor=later)
     desk.sees("red cup_1", "blue cup_2")
     desk.give(text=BOTH)
     assert [one["event"] for one in desk.answers()] == ["planning"]

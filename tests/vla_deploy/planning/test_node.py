@@ -147,7 +147,7 @@ def test_a_restarted_planner_hands_on_a_stop_that_came_while_it_was_away(desk):
 def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
     open_desk, later, back_end, propose
 ):
-    desk = open_desk(back_end("model", propose(("wait", {"duration_s": 1.0}))), aside=later)
+    desk = open_desk(back_end("model", propose(("wait", {"duration_s": 1.0}))), executor=later)
     desk.give(text="sing a sea shanty")
     assert [one["event"] for one in desk.answers()] == ["planning"]
     desk.start()
@@ -173,7 +173,7 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
     closed = []
     model = back_end("model", propose(("wait", {"duration_s": 1.0})))
     model.close = lambda: closed.append("model")
-    desk = open_desk(model, aside=later)
+    desk = open_desk(model, executor=later)
     desk.give(text="sing a sea shanty")
     desk.answers()
     node = desk.planner

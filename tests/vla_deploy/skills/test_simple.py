@@ -11,10 +11,10 @@ from drivers.audio.wav import WavOutput
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.simple import speak
@@ -47,7 +47,7 @@ class Talk:
         self.context.link.acting = "a1"
 
     def give_voice(self) -> None:
-        self.voice = RobotVoice(EspeakEngine(), self._open, self.clock, AtOnce())
+        self.voice = RobotVoice(EspeakEngine(), self._open, self.clock, InlineExecutor())
         self.voice.start(self.space)
         self.step_voice()
 

@@ -7,7 +7,7 @@ import pytest
 from drivers.audio.base import Samples
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 
 
 def sine(seconds: float, hz: float = 440.0, rate_hz: int = 16_000, level: float = 0.25) -> Samples:

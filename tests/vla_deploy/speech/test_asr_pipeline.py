@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from platforms import load_profile
-from vla_deploy.aside import AtOnce
+from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.speech.asr_pipeline import STOPPED, AsrPipeline, HeardPhrase
 from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.recogniser import Recogniser
@@ -57,7 +57,7 @@ def heard(
 ) -> list[tuple[float, HeardPhrase]]:
     """Return what is told of words that are spoken for so long, and when, from their beginning."""
     clock = StreamClock()
-    queue = TranscriptionQueue(AtOnce(), clock)
+    queue = TranscriptionQueue(InlineExecutor(), clock)
     reader = cast("Recogniser", Reader(words, log_probability))
     queue.selected = SelectedRecogniser(recogniser=reader)
     activity = cast("VoiceActivity", LoudnessVad())

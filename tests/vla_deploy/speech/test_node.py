@@ -21,8 +21,8 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.page_sound import PageSound, Step
-from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import FRAME, Playing, SoundBlock
 from vla_deploy.speech.stop_words.listener import StopWords

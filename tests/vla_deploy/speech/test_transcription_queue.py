@@ -8,8 +8,8 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
+from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.model_selection import SelectedRecogniser
 from vla_deploy.speech.transcript import Transcript
@@ -158,7 +158,7 @@ def test_a_failing_network_is_told(
 
 
 def test_without_a_network_each_phrase_is_refused_with_the_reason(clock: ManualClock) -> None:
-    queue = TranscriptionQueue(AtOnce(), clock)
+    queue = TranscriptionQueue(InlineExecutor(), clock)
     queue.selected = SelectedRecogniser(recogniser=None, why="commands-whisper: no such model")
     queue.draft(phrase(1, 0.9))
     expected = "no model turns speech into text: commands-whisper: no such model"

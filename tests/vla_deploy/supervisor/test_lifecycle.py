@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.supervisor.lifecycle import (
     ABORT_GRACE_NS,
     Act,

@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.foxglove import FoxgloveNode
 from vla_deploy.telemetry.recording.settings import FoxgloveSettings
 

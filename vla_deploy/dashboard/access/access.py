@@ -12,7 +12,6 @@ from starlette.requests import cookie_parser
 from starlette.types import Receive, Send
 
 from drivers.clock import Clock, MonotonicClock
-from vla_deploy.aside import background
 from vla_deploy.dashboard.access.accounts import Accounts, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.asked import Asked
@@ -39,6 +38,7 @@ from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.access.rules import AccessRules
 from vla_deploy.dashboard.access.sessions import Sessions
 from vla_deploy.dashboard.access.tenure import Tenure
+from vla_deploy.runtime.executors import low_priority_thread
 
 CSRF_HEADER: Final = "x-csrf-token"
 _COOKIE: Final = "vla_session"
@@ -76,7 +76,7 @@ class Access:
     @classmethod
     def of_base(cls, base: Path, rules: AccessRules, clock: Clock) -> Self:
         """Return the access to the robot that runs in a runtime directory."""
-        audit = AuditLog.of_base(base, clock, background(MonotonicClock()))
+        audit = AuditLog.of_base(base, clock, low_priority_thread(MonotonicClock()))
         return cls(rules, AccountsFile.of_base(base), audit, clock)
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from vla_deploy.dashboard.access.accounts import Accounts
 from vla_deploy.dashboard.access.errors import AccountsUnusable
 from vla_deploy.dashboard.access.private_file import give, turn
-from vla_deploy.state_dir import access_dir_of
+from vla_deploy.runtime.state_dir import access_dir_of
 
 FILE_NAME: Final = "accounts.json"
 _MOST_BYTES: Final = 2**20

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.aside import AtOnce
 from vla_deploy.dashboard.access.accounts import wall_s
 from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome
 from vla_deploy.dashboard.access.audit_file import AuditFile
-from vla_deploy.state_dir import access_dir_of
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.state_dir import access_dir_of
 
 FILE_NAME: Final = "audit.jsonl"
 FOLD_S: Final = 60.0
@@ -36,7 +36,7 @@ class AuditLog:
     ) -> None:
         self._file = file
         self._clock = clock
-        self._executor = executor or AtOnce()
+        self._executor = executor or InlineExecutor()
         self._now_s = now_s
         self._lock = threading.Lock()
         self._folded: OrderedDict[tuple[str, ...], tuple[int, int]] = OrderedDict()

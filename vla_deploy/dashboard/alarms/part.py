@@ -10,7 +10,7 @@ from vla_deploy.dashboard.alarms.alarm_file import AlarmFile
 from vla_deploy.dashboard.alarms.desk import AlarmDesk
 from vla_deploy.dashboard.alarms.listening import Listener
 from vla_deploy.dashboard.alarms.live_feed import AlarmFeed
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 
 _FILE: Final = "dashboard/alarms.json"
 

@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.telemetry.metrics import READ_TOPICS, Looker, Readings, read
 from vla_deploy.telemetry.trends import SeriesMaker, TrendStore, TrendsUnavailable
 

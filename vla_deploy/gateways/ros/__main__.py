@@ -6,8 +6,8 @@ The interpreter is that of ROS's environment; the supervisor finds it.
 import sys
 
 from vla_deploy.gateways.ros.errors import RosGatewayError, RosNotFound
-from vla_deploy.node import Node, NodeContext
-from vla_deploy.process_main import main
+from vla_deploy.runtime.node import Node, NodeContext
+from vla_deploy.runtime.process_main import main
 
 
 def build(context: NodeContext) -> Node:

@@ -20,9 +20,9 @@ from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.ipc import CellWriter
-from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
 STATUS_TOPIC: Final = "ros_status"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vla_deploy.inference.errors import ModelFileSpoiled, ToolMissing
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.runtime import SESSION_ERRORS
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 
 # Activation and weight types, as onnxruntime names them.
 TYPES: Final[Mapping[Variant, tuple[str, str]]] = {

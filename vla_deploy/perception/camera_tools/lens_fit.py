@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.one_line import one_line
 from vla_deploy.perception.camera_tools.board import Array, View
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.selecting import MIN_VIEWS, require_variety
+from vla_deploy.runtime.one_line import one_line
 
 MODELS: Final = {"plumb_bob": 5, "rational_polynomial": 8}
 """ROS' names of the distortion models, and their numbers of coefficients."""

@@ -17,11 +17,11 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.picture import small_jpeg
 from vla_deploy.model_servers.server import ModelServer
-from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
+from vla_deploy.runtime.one_line import one_line
 
 SURE: Final = 0.75
 """A plan of which a model is less sure is read back before anything moves."""

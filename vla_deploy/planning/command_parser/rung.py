@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Final
 
 from platforms import ModelChoice
-from vla_deploy.action_words import skill_words
+from vla_deploy.client.action_words import skill_words
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
 from vla_deploy.inference.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.inference.manifest import Certainty, Use
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.one_line import one_line
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
@@ -39,6 +38,7 @@ from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import order_of, proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
+from vla_deploy.runtime.one_line import one_line
 
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"

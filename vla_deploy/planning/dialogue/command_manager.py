@@ -10,7 +10,6 @@ from threading import Event
 from typing import Any, Final
 
 from drivers.clock import Clock
-from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
@@ -35,6 +34,7 @@ from vla_deploy.planning.recovery.strategies import recover
 from vla_deploy.planning.understanding import Candidate, Outcome, Verdict, judge_answer
 from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+from vla_deploy.runtime.executors import InlineExecutor
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -233,7 +233,7 @@ class CommandManager:
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
-        error = AtOnce().submit(work).exception()
+        error = InlineExecutor().submit(work).exception()
         if error is not None:
             _log.error("planning %r failed", command.text, exc_info=error)
             self.metrics.failed += 1

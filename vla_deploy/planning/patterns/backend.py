@@ -3,7 +3,7 @@
 from string import digits
 from typing import Final
 
-from vla_deploy.action_words import skill_words
+from vla_deploy.client.action_words import skill_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step

@@ -18,7 +18,7 @@ from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.sound import Playing, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter, open_spotter
 from vla_deploy.speech.words import words_of

@@ -42,8 +42,8 @@ class _Saying:
 class RobotVoice:
     """Speak, a little in each step.
 
-    Text becomes sound beside the steps, by `aside`. A speaker that is away is tried again; what is
-    to be said meanwhile fails at once, and says why.
+    `executor` turns text into sound between the steps. A speaker that is away is tried again; what
+    is to be said meanwhile fails at once, and says why.
     """
 
     def __init__(
@@ -51,12 +51,12 @@ class RobotVoice:
         engine: EspeakEngine,
         open_output: OpenOutput,
         clock: Clock,
-        aside: Executor,
+        executor: Executor,
         *,
         volume_ratio: float = 1.0,
     ) -> None:
         self._engine = engine
-        self._aside = aside
+        self._executor = executor
         self._clock = clock
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
@@ -115,7 +115,7 @@ class RobotVoice:
         """Fall silent and release everything; closing twice is allowed."""
         self._player.cut()
         self._player.close()
-        self._aside.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, payload: Mapping[str, Any]) -> None:
         say_id, text = str(payload.get("say_id", ""))[:LONGEST_ID], payload.get("text")
@@ -146,7 +146,7 @@ class RobotVoice:
         if format_ is None or self._player.away:
             self._publish(saying.say_id, "failed", self._player.away)
         else:
-            saying.prepared = self._aside.submit(self._prepare, saying.text, format_)
+            saying.prepared = self._executor.submit(self._prepare, saying.text, format_)
             self._saying = saying
 
     def _prepare(self, text: str, format_: AudioFormat) -> PreparedSound:
@@ -198,7 +198,7 @@ def _spoken(text: str) -> str:
 
 
 def build_voice(
-    settings: VoiceSettings, open_output: OpenOutput | None, clock: Clock, aside: Executor
+    settings: VoiceSettings, open_output: OpenOutput | None, clock: Clock, executor: Executor
 ) -> RobotVoice | None:
     """Return the voice of a robot; None where it has no speaker."""
     if open_output is None:
@@ -209,4 +209,4 @@ def build_voice(
         pitch=settings.pitch,
         program=settings.program or ESPEAK,
     )
-    return RobotVoice(engine, open_output, clock, aside, volume_ratio=settings.volume_ratio)
+    return RobotVoice(engine, open_output, clock, executor, volume_ratio=settings.volume_ratio)

@@ -5,7 +5,7 @@ import subprocess
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.voice.clip import Clip, read_wav_stream
 

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Final
 
-from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.logs import LOGS_DIR
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import SettingsInvalid
 from vla_deploy.telemetry.recording.collecting import Collector
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
@@ -31,7 +31,7 @@ def rolling_recorder(
     *,
     settings: RecordingSettings | None = None,
     folder: RecordingFolder | None = None,
-    aside: Executor | None = None,
+    executor: Executor | None = None,
 ) -> RollingRecorder:
     """Return the recorder of a run; what is not given comes from the run's own folders.
 
@@ -57,7 +57,7 @@ def rolling_recorder(
         context.clock,
         new_tape=new_tape,
         new_collector=new_collector,
-        aside=aside or background(context.clock, WRITING_S),
+        executor=executor or low_priority_thread(context.clock, WRITING_S),
         always=chosen.wish if chosen.always else None,
     )
 

@@ -15,11 +15,11 @@ BACKLOG_BYTES: Final = 24 * 2**20
 class Feed:
     """Hand batches to the writer's thread; beyond a bounded backlog they are dropped, counted."""
 
-    def __init__(self, tape: Tape, collector: Collector, aside: Executor) -> None:
+    def __init__(self, tape: Tape, collector: Collector, executor: Executor) -> None:
         self.is_fresh = True
         self._tape = tape
         self._collector = collector
-        self._aside = aside
+        self._executor = executor
         self._backlog: deque[tuple[Future[None], int]] = deque()
         self._dropped = 0
 
@@ -37,7 +37,7 @@ class Feed:
         if self.backlog_bytes + batch.size_bytes > BACKLOG_BYTES:
             self._dropped += batch.count
             return
-        self._backlog.append((self._aside.submit(self._tape.write, batch), batch.size_bytes))
+        self._backlog.append((self._executor.submit(self._tape.write, batch), batch.size_bytes))
 
     def give_up_backlog(self) -> None:
         """Drop what waits to be written: the file is to be finished now."""
@@ -46,7 +46,7 @@ class Feed:
 
     def close(self) -> "Future[None]":
         """Have the file finished; what still waits is written first."""
-        return self._aside.submit(self._tape.close)
+        return self._executor.submit(self._tape.close)
 
     @property
     def backlog_bytes(self) -> int:

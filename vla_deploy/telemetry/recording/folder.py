@@ -3,7 +3,7 @@
 import logging
 from pathlib import Path
 
-from vla_deploy.state_dir import library_dir_of
+from vla_deploy.runtime.state_dir import library_dir_of
 from vla_deploy.telemetry.folder import NumberedFolder
 from vla_deploy.telemetry.recording.recovery import recover
 

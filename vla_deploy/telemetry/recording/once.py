@@ -7,7 +7,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.logs import LOGS_DIR
+from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.following import Following
 from vla_deploy.telemetry.recording.batch import Drafter

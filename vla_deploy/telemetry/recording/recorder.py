@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.following import Value
 from vla_deploy.telemetry.recording.collecting import Collector
@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 
 class RollingRecorder:
-    """Own at most one recording; `aside` is the thread that writes it."""
+    """Own at most one recording; `executor` is the thread that writes it."""
 
     def __init__(
         self,
@@ -34,14 +34,14 @@ class RollingRecorder:
         *,
         new_tape: Callable[[RecordingWish], Tape],
         new_collector: Callable[[RecordingWish], Collector],
-        aside: Executor,
+        executor: Executor,
         always: RecordingWish | None = None,
     ) -> None:
         self._space = space
         self._clock = clock
         self._new_tape = new_tape
         self._new_collector = new_collector
-        self._aside = aside
+        self._executor = executor
         self._always = always
         self._feed: Feed | None = None
         self._wish = RecordingWish()
@@ -86,7 +86,7 @@ class RollingRecorder:
                 closing.result(timeout=CLOSE_TIMEOUT_S)
         except NotInTime:
             _log.warning("the disk is too slow to finish the recording; the next run recovers it")
-        self._aside.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def document(self, now_ns: int) -> dict[str, Any]:
         """Return what `recording_status` tells."""
@@ -134,7 +134,7 @@ class RollingRecorder:
         if wish is None:
             return
         self._refused, self._wish = "", wish
-        self._feed = Feed(self._new_tape(wish), self._new_collector(wish), self._aside)
+        self._feed = Feed(self._new_tape(wish), self._new_collector(wish), self._executor)
         if wish.duration_s is not None:
             self._ends_ns = self._clock.now_ns() + round(wish.duration_s * NS_PER_S)
         _log.info("recording %s for %s", ", ".join(wish.topics), wish.source or "nobody named")

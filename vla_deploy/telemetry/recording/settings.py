@@ -8,7 +8,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from vla_deploy.state_dir import config_dir_of
+from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.telemetry.errors import SettingsInvalid
 from vla_deploy.telemetry.folder import Bounds
 from vla_deploy.telemetry.recording.request import RecordingWish

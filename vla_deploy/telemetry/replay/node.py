@@ -8,8 +8,8 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.replay_mark import mark_replay
-from vla_deploy.logs import LOGS_DIR
-from vla_deploy.one_line import one_line
+from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.one_line import one_line
 from vla_deploy.telemetry.channels import channels_of
 from vla_deploy.telemetry.errors import ReplayRefused
 from vla_deploy.telemetry.replay.feeder import LASTING, Feeder, fed_topics

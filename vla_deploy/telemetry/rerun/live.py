@@ -6,8 +6,8 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.logs import LOGS_DIR
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.following import Following
 from vla_deploy.telemetry.recording.batch import Drafter
 from vla_deploy.telemetry.recording.collecting import Collector

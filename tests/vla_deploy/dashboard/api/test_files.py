@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.runtime.state_dir import state_dir_of
 
 NAME = "000007-estop.mcap"
 

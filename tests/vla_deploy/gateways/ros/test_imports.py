@@ -23,7 +23,7 @@ for name in sys.argv[1:]:
     importlib.import_module(name)
 tops = lambda: {name.partition(".")[0] for name in sys.modules}
 before = tops()
-import vla_deploy.process_main
+import vla_deploy.runtime.process_main
 import vla_deploy.gateways.ros as gateway
 modules = [one.name for one in pkgutil.walk_packages(gateway.__path__, gateway.__name__ + ".")]
 for name in modules:

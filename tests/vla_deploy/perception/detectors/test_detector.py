@@ -8,14 +8,14 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from platforms import Profile, load_profile
-from vla_deploy.adapting import AdaptingNode
-from vla_deploy.aside import background
 from vla_deploy.inference.errors import ManifestInvalid, ModelUnknown, RunFailed
 from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.perception.detectors.detector import Detector, open_detector
+from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.runtime.reconfigurable_node import ReconfigurableNode
 
 NO_HOST = type("NoHost", (), {"obstacles": lambda *_: (), "apply": lambda *_: ()})()
 
@@ -158,9 +158,9 @@ def test_a_model_that_does_not_run_as_asked_is_told_to_the_log(shelf, profile, c
 def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, shelf, profile, rgb):
     clock = MonotonicClock()
     looker = Looker(shelf, profile, rgb)
-    first, aside = looker.detector, background(MonotonicClock())
-    node = AdaptingNode(
-        "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, aside=aside
+    first, executor = looker.detector, low_priority_thread(MonotonicClock())
+    node = ReconfigurableNode(
+        "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, executor=executor
     )
     node.start()
     directives = SharedSpace(tmp_path, clock).cell_writer("resource_directives")
@@ -184,14 +184,14 @@ def test_a_model_that_cannot_be_opened_leaves_the_present_one_at_work(
     clock = MonotonicClock()
     looker = Looker(shelf, profile, rgb)
     (tmp_path / "models" / "small" / "model.toml").write_text("role = 'detector'")
-    node = AdaptingNode(
+    node = ReconfigurableNode(
         "perception",
         looker,
         profile,
         ipc=tmp_path,
         clock=clock,
         host=NO_HOST,
-        aside=background(MonotonicClock()),
+        executor=low_priority_thread(MonotonicClock()),
     )
     node.start()
     SharedSpace(tmp_path, clock).cell_writer("resource_directives").put_document(

@@ -198,7 +198,9 @@ def test_a_setback_that_a_cancel_has_overtaken_starts_nothing(open_desk, said):
 
 
 def test_a_stop_ends_the_search_for_another_plan(open_desk, later, back_end, propose):
-    desk = open_desk(back_end("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
+    desk = open_desk(
+        back_end("model", propose(("navigate_to", {"place": "bedroom"}))), executor=later
+    )
     desk.give(text="go to the kitchen")
     desk.answers()
     (second,) = set_back(desk, desk.plans()[0])

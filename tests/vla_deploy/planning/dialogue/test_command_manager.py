@@ -20,7 +20,7 @@ def events(told: list[dict]) -> list[tuple[str, str]]:
 def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
     open_desk, later, back_end, propose
 ):
-    desk = open_desk(back_end("model", propose(GO), Declined("no idea")), aside=later)
+    desk = open_desk(back_end("model", propose(GO), Declined("no idea")), executor=later)
     desk.give(text="sing one")
     desk.give(command_id="c2", text="sing two")
     desk.give(command_id="c3", text="go to the kitchen")
@@ -35,7 +35,7 @@ def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
 def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
     open_desk, later, back_end, propose
 ):
-    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk = open_desk(back_end("model", propose(GO)), executor=later)
     desk.give(text="sing one")
     desk.answers()
     desk.give(command_id="c2", text="go to the kitchen")
@@ -44,7 +44,7 @@ def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
 
 def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_end, propose):
     model = back_end("model", propose(GO))
-    desk = open_desk(model, aside=later)
+    desk = open_desk(model, executor=later)
     desk.give(text="sing one")
     desk.give(command_id="c2", text="go to the kitchen")
     desk.answers()
@@ -58,7 +58,7 @@ def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_e
 
 
 def test_to_forbid_something_ends_what_is_planned(open_desk, later, back_end, propose):
-    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk = open_desk(back_end("model", propose(GO)), executor=later)
     desk.give(text="sing one")
     desk.answers()
     desk.give(command_id="c2", text="stay out of the kitchen")
@@ -70,7 +70,7 @@ def test_to_forbid_something_ends_what_is_planned(open_desk, later, back_end, pr
 
 
 def test_too_many_commands_are_refused_at_once(open_desk, later, back_end, propose):
-    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk = open_desk(back_end("model", propose(GO)), executor=later)
     for number in range(10):
         desk.give(command_id=f"c{number}", text=f"sing {number}")
     refused = [one for one in desk.answers() if one["event"] == "rejected"]
@@ -149,7 +149,7 @@ class TestObjecting:
         assert desk.plans() == [{"command_id": "c2-stops", "cancel": True}]
 
     def test_it_overtakes_what_is_planned(self, open_desk, later, back_end, propose):
-        desk = open_desk(back_end("model", propose(GO)), aside=later)
+        desk = open_desk(back_end("model", propose(GO)), executor=later)
         desk.give(text="sing one")
         desk.answers()
         desk.give(command_id="c2", text="don't do that")
@@ -520,7 +520,7 @@ class TestSpokenCommands:
         assert desk.said_aloud() == [str(WHICH), Says.LEFT]
 
     def test_a_long_wait_is_announced_once(self, open_desk, later, back_end, propose):
-        desk = open_desk(back_end("model", propose(GO)), aside=later)
+        desk = open_desk(back_end("model", propose(GO)), executor=later)
         desk.give(text="sing one", source="voice")
         desk.answers()
         assert desk.said_aloud() == []

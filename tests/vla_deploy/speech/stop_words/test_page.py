@@ -17,8 +17,8 @@ from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.inference.manifest import Manifest
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.page_sound import PageSound, Step
-from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.listener import PAGE, StopWords, build_stop_words

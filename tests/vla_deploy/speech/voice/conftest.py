@@ -11,8 +11,8 @@ from drivers.errors import DeviceMissing
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.lines import MemoryLine
 from sim_twin.sensors.sound import SpeakerDevice
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.voice.tts import EspeakEngine
 
@@ -35,7 +35,7 @@ class VoiceRig:
         self.line: MemoryLine | None = None
         self.space = SharedSpace(folder / "ipc", clock)
         self.voice = RobotVoice(
-            engine or EspeakEngine(), self._open, clock, AtOnce(), volume_ratio=0.8
+            engine or EspeakEngine(), self._open, clock, InlineExecutor(), volume_ratio=0.8
         )
         self.voice.start(self.space)
         self._say = self.space.ring_writer("say")

@@ -11,12 +11,12 @@ from drivers.clock import NS_PER_S, Clock
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
 from sim_twin.lockstep import Lockstep
-from vla_deploy.adapting import AdaptingNode
-from vla_deploy.aside import AtOnce
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NeedsRestart, Node
 from vla_deploy.planning.node import PlannerNode
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NeedsRestart, Node
+from vla_deploy.runtime.reconfigurable_node import ReconfigurableNode
 from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.supervisor.profile_change import Member
 from vla_deploy.supervisor.profile_choice import ProfileChoice
@@ -144,9 +144,11 @@ def adapting(
     ipc: Path,
     clock: Clock,
     kernel: Kernel,
-    aside: Executor,
-) -> AdaptingNode:
-    return AdaptingNode(name, node, profile, ipc=ipc, clock=clock, host=kernel, aside=aside)
+    executor: Executor,
+) -> ReconfigurableNode:
+    return ReconfigurableNode(
+        name, node, profile, ipc=ipc, clock=clock, host=kernel, executor=executor
+    )
 
 
 class Bench:
@@ -167,8 +169,8 @@ class Bench:
         self.dead: set[str] = set()
         self.workers = {name: Worker() for name in ("control", "perception", "planner", "executor")}
         self.kernels = {name: Kernel() for name in self.workers}
-        self.asides: dict[str, Executor] = {name: AtOnce() for name in self.workers}
-        self.nodes: dict[str, AdaptingNode] = {}
+        self.asides: dict[str, Executor] = {name: InlineExecutor() for name in self.workers}
+        self.nodes: dict[str, ReconfigurableNode] = {}
         for name in self.workers:
             self.start(name, profile)
         self.adopted: list[tuple[str, set[str]]] = []
@@ -190,7 +192,7 @@ class Bench:
         self.nodes[name].start()
 
     def supervise(
-        self, profile: str, fault: str = "", aside: Executor | None = None
+        self, profile: str, fault: str = "", executor: Executor | None = None
     ) -> Supervision:
         switch = ProfileSwitch(
             profile,
@@ -199,7 +201,7 @@ class Bench:
             self.clock,
             self.choice,
             PowerSwitch(self.root, (str(self.root / "nvpmodel"),)),
-            aside or AtOnce(),
+            executor or InlineExecutor(),
             on_change=lambda adopted: self.adopted.append((adopted.name, self.names())),
             fault=fault,
         )
@@ -252,7 +254,7 @@ class TwinRig:
             "executor": ExecutorNode(step.context, step.robot, declared.executor_rate_hz),
         }
         for name, node in nodes.items():
-            step.add(adapting(name, node, declared, ipc, step.clock, Kernel(), AtOnce()))
+            step.add(adapting(name, node, declared, ipc, step.clock, Kernel(), InlineExecutor()))
         switch = ProfileSwitch(
             profile,
             declared,
@@ -260,7 +262,7 @@ class TwinRig:
             step.clock,
             ProfileChoice(folder / "state" / "profile.json"),
             PowerSwitch(folder / "root"),
-            AtOnce(),
+            InlineExecutor(),
             watch_s=0.1,
         )
         members = {name: Member(pid=1, started_under=profile) for name in nodes}

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.node import NeedsRestart
+from vla_deploy.runtime.node import NeedsRestart
 from vla_deploy.supervisor.profile_change import Member
 
 NAMES = ("control", "perception", "planner", "executor")
@@ -239,7 +239,7 @@ def test_a_restarted_process_that_dies_takes_all_of_them_back(bench, profiles, p
 
 
 def test_a_process_that_dies_before_it_is_to_be_restarted_ends_the_change(bench, profiles):
-    bench.supervision = bench.supervise(profiles["swift"], aside=Never())
+    bench.supervision = bench.supervise(profiles["swift"], executor=Never())
     bench.workers["planner"].refusal = NeedsRestart("other threads")
     bench.desk.request(profiles["calm"], allow_restart=True)
     bench.reach("set power mode")

@@ -11,9 +11,9 @@ import pytest
 from mcap.reader import make_reader
 
 from drivers.clock import NS_PER_S
-from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.memory import Memory
 from vla_deploy.telemetry.recording.building import rolling_recorder
 from vla_deploy.telemetry.recording.folder import RecordingFolder
@@ -62,7 +62,7 @@ class Rig:
         self.recorder: RollingRecorder
         self._open: list[RollingRecorder] = []
 
-    def begin(self, aside: Executor | None = None, **settings: Any) -> None:
+    def begin(self, executor: Executor | None = None, **settings: Any) -> None:
         chosen = RecordingSettings(**{"spare_mb": 0.0, **settings})
         self.folder = RecordingFolder(self.folder_path, chosen.bounds)
         self.recorder = rolling_recorder(
@@ -71,10 +71,10 @@ class Rig:
             lambda: WALL_NS + self.clock.now_ns(),
             settings=chosen,
             folder=self.folder,
-            aside=aside or AtOnce(),
+            executor=executor or InlineExecutor(),
         )
         self.recorder.start()
-        if aside is None:
+        if executor is None:
             self._open.append(self.recorder)
 
     def close(self) -> None:

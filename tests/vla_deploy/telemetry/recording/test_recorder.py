@@ -163,7 +163,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_what_is_lost_is_counted(
 ) -> None:
     monkeypatch.setattr(feed, "BACKLOG_BYTES", 2000)
     stuck = Stuck()
-    rig.begin(aside=stuck)
+    rig.begin(executor=stuck)
     rig.ask(topics=["base_state"])
     rig.run(4.0)
     told = rig.told()
@@ -178,7 +178,7 @@ def test_the_end_of_the_run_finishes_the_file_before_what_still_waits(
 ) -> None:
     monkeypatch.setattr(recorder, "CLOSE_TIMEOUT_S", 0.0)
     stuck = Stuck()
-    rig.begin(aside=stuck)
+    rig.begin(executor=stuck)
     rig.ask(topics=["base_state"])
     rig.run(0.5)
     rig.recorder.stop()

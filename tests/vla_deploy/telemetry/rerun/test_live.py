@@ -3,7 +3,7 @@
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.node import NodeContext
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.recording.selection import Selection
 from vla_deploy.telemetry.rerun.live import RerunNode
 from vla_deploy.telemetry.rerun.showing import Showing

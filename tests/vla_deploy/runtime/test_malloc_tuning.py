@@ -9,7 +9,7 @@ import pytest
 _PROBE: Final = """
 import ctypes, sys
 import numpy as np
-from vla_deploy.heap import give_large_blocks_back
+from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 class Told(ctypes.Structure):
     _fields_ = [(name, ctypes.c_size_t) for name in (

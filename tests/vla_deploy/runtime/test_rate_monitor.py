@@ -1,9 +1,9 @@
 from drivers.clock import NS_PER_S
-from vla_deploy.pace import Pace, Watch
+from vla_deploy.runtime.rate_monitor import RateMonitor, TrialMonitor
 
 
 def test_the_pace_of_late_is_the_share_of_steps_that_were_made() -> None:
-    pace = Pace()
+    pace = RateMonitor()
     assert pace.ratio == 1.0
     for step in range(1000):
         pace.note(step * NS_PER_S // 10, period_s=0.05)
@@ -11,7 +11,7 @@ def test_the_pace_of_late_is_the_share_of_steps_that_were_made() -> None:
 
 
 def test_four_of_five_usual_steps_are_enough_and_three_are_not() -> None:
-    watch = Watch(1, 0, usual_hz=5.0)
+    watch = TrialMonitor(1, 0, usual_hz=5.0)
     for _ in range(3):
         watch.note()
     assert watch.fault(NS_PER_S, 0.2) == "steps at 3.0 Hz, expected 4.0 Hz"
@@ -20,7 +20,7 @@ def test_four_of_five_usual_steps_are_enough_and_three_are_not() -> None:
 
 
 def test_a_second_look_counts_anew() -> None:
-    watch = Watch(1, 0, usual_hz=5.0)
+    watch = TrialMonitor(1, 0, usual_hz=5.0)
     watch.again(NS_PER_S)
     for _ in range(4):
         watch.note()
@@ -28,4 +28,4 @@ def test_a_second_look_counts_anew() -> None:
 
 
 def test_a_trial_shorter_than_a_step_is_not_divided_by_nothing() -> None:
-    assert Watch(1, 0, usual_hz=5.0).fault(0, 0.2) == "steps at 0.0 Hz, expected 4.0 Hz"
+    assert TrialMonitor(1, 0, usual_hz=5.0).fault(0, 0.2) == "steps at 0.0 Hz, expected 4.0 Hz"

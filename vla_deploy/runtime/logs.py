@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from drivers.clock import Clock
-from vla_deploy.journal import JOURNAL_SOCKET, JournalHandler
+from vla_deploy.runtime.journal import JOURNAL_SOCKET, JournalHandler
 
 RUN_ID_VARIABLE = "VLA_DEPLOY_RUN_ID"
 """Every process of a run carries the run's id in its environment, by which it is found again."""

@@ -6,10 +6,10 @@ import pytest
 from drivers.clock import MonotonicClock
 from platforms import Profile, load_profile
 from platforms.profile_source import read_source
-from vla_deploy.adapting import TIER_RETRY_NS, AdaptingNode
-from vla_deploy.aside import AtOnce, background
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import run_node
+from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
+from vla_deploy.runtime.node import run_node
+from vla_deploy.runtime.reconfigurable_node import TIER_RETRY_NS, ReconfigurableNode
 
 
 class StepClock:
@@ -85,15 +85,17 @@ def clock() -> StepClock:
 
 @pytest.fixture
 def adapted(tmp_path, clock):
-    def adapted(node: Plain, name: str = "planner", aside: Executor | None = None) -> AdaptingNode:
-        wrapped = AdaptingNode(
+    def adapted(
+        node: Plain, name: str = "planner", executor: Executor | None = None
+    ) -> ReconfigurableNode:
+        wrapped = ReconfigurableNode(
             name,
             node,
             load_profile("desktop"),
             ipc=tmp_path,
             clock=clock,
             host=Host(),
-            aside=aside or AtOnce(),
+            executor=executor or InlineExecutor(),
         )
         wrapped.start()
         return wrapped
@@ -152,18 +154,18 @@ def test_control_is_never_slowed(adapted, direct):
 
 
 def test_a_smaller_model_is_prepared_aside_and_taken_between_two_steps(adapted, direct):
-    inner, aside = WithModels(), Later()
-    node = adapted(inner, aside=aside)
+    inner, executor = WithModels(), Later()
+    node = adapted(inner, executor=executor)
     direct({}, {"planner": 1})
     node.step()
     assert inner.model == "tier 0", "it goes on with the old one while the new one is loaded"
-    aside.do()
+    executor.do()
     assert inner.model == "tier 0", "never in the middle of a step"
     node.step()
     assert (inner.model, inner.loaded) == ("tier 1", ["tier 1"])
     direct({}, {})
     node.step()
-    aside.do()
+    executor.do()
     node.step()
     assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
 
@@ -201,13 +203,13 @@ def test_what_could_not_be_loaded_is_tried_again_after_a_while(adapted, direct, 
 def test_a_tier_that_was_loaded_for_another_profile_is_discarded_and_loaded_anew(
     adapted, direct, change
 ):
-    inner, aside = WithModels(), Later()
-    node = adapted(inner, aside=aside)
+    inner, executor = WithModels(), Later()
+    node = adapted(inner, executor=executor)
     direct({}, {"planner": 1})
     node.step()
     change("prepare")
     node.step()
-    aside.do()
+    executor.do()
     node.step()
     assert inner.model == "tier 0", "not in the middle of a change"
     change("commit")
@@ -217,7 +219,7 @@ def test_a_tier_that_was_loaded_for_another_profile_is_discarded_and_loaded_anew
     assert node.profile.name == "desktop"
     assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
     node.step()
-    aside.do()
+    executor.do()
     node.step()
     assert (inner.model, inner.loaded) == ("tier 1", ["tier 1"])
 
@@ -231,7 +233,7 @@ def test_a_node_without_models_follows_any_tier(adapted, direct):
 
 
 def test_work_in_the_background_gets_its_result_or_its_error():
-    with background(MonotonicClock()) as pool:
+    with low_priority_thread(MonotonicClock()) as pool:
         assert pool.submit(lambda: 7).result(timeout=10) == 7
         assert isinstance(pool.submit(lambda: 1 / 0).exception(timeout=10), ZeroDivisionError)
 

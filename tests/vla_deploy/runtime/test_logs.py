@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy import logs
-from vla_deploy.journal import JournalHandler, encode, priority
-from vla_deploy.logs import LogOrigin, RunLog, journal_stream
+from vla_deploy.runtime import logs
+from vla_deploy.runtime.journal import JournalHandler, encode, priority
+from vla_deploy.runtime.logs import LogOrigin, RunLog, journal_stream
 
 ORIGIN = LogOrigin(process="control", robot="butler", run_id="run-1")
 log = logging.getLogger("vla_deploy.test_logs")
@@ -202,7 +202,7 @@ SCRIPT = """
 import logging, sys
 from pathlib import Path
 from drivers.clock import MonotonicClock
-from vla_deploy.logs import process_log
+from vla_deploy.runtime.logs import process_log
 with process_log("planner", "butler", Path(sys.argv[1]), MonotonicClock()):
     logging.getLogger("x").error("gone")
 """

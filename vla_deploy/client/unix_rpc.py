@@ -10,7 +10,7 @@ TIMEOUT_S: Final = 10.0
 _CHUNK_BYTES: Final = 65_536
 
 
-def ask_by_line(path: Path, question: Mapping[str, Any]) -> dict[str, Any]:
+def request(path: Path, question: Mapping[str, Any]) -> dict[str, Any]:
     """Return the answer of whoever listens at `path`.
 
     Raises:

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.state_dir import (
+from vla_deploy.runtime.state_dir import (
     config_dir_of,
     engines_dir_of,
     models_dir_of,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.json_line import ask_by_line
+from vla_deploy.client.unix_rpc import request
 
 
 class Listener:
@@ -51,15 +51,15 @@ def torn(tmp_path: Path) -> Iterator[Listener]:
 
 
 def test_an_answer_in_pieces_is_one_answer(whole: Listener) -> None:
-    assert ask_by_line(whole.path, {"op": "count", "of": "ä"}) == {"ok": True, "n": 3}
+    assert request(whole.path, {"op": "count", "of": "ä"}) == {"ok": True, "n": 3}
     assert json.loads(whole.heard) == {"op": "count", "of": "ä"}
 
 
 def test_an_answer_that_ends_too_early_is_none(torn: Listener) -> None:
     with pytest.raises(ConnectionError, match="hung up"):
-        ask_by_line(torn.path, {"op": "count"})
+        request(torn.path, {"op": "count"})
 
 
 def test_where_nobody_listens_there_is_no_answer(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
-        ask_by_line(tmp_path / "s", {})
+        request(tmp_path / "s", {})

@@ -11,9 +11,9 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
-from vla_deploy import host_settings
-from vla_deploy.aside import background
-from vla_deploy.host_settings import HostSettings
+from vla_deploy.runtime import host_settings
+from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.runtime.host_settings import HostSettings
 
 NICE = os.getpriority(os.PRIO_PROCESS, os.getpid())
 
@@ -93,7 +93,7 @@ def test_threads_that_have_put_themselves_aside_keep_their_nice(monkeypatch, pro
     gate = threading.Event()
     sharing = threading.Thread(target=gate.wait, daemon=True)
     sharing.start()
-    with background(MonotonicClock()) as executor:
+    with low_priority_thread(MonotonicClock()) as executor:
         aside = executor.submit(threading.get_native_id).result()
         asked = {}
         monkeypatch.setattr(os, "setpriority", lambda _, thread, nice: asked.update({thread: nice}))
@@ -129,7 +129,7 @@ def test_control_gets_the_profiles_realtime_priority_and_its_other_threads_go_be
 SCRIPT = """
 import os, sys, threading
 from platforms import load_profile
-from vla_deploy.host_settings import HostSettings
+from vla_deploy.runtime.host_settings import HostSettings
 
 gate = threading.Event()
 thread = threading.Thread(target=gate.wait)

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from drivers import errors
 from vla_deploy.inference.errors import ModelFileSpoiled
-from vla_deploy.process_main import main
+from vla_deploy.runtime.process_main import main
 
 TROUBLES = {kind.__name__: kind for kind in errors.DriverError.__subclasses__()}
 

@@ -12,8 +12,8 @@ from platforms import Profile
 from platforms.profile import profile_from
 from platforms.profile_source import Source
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import Adaptable, NeedsRestart, Node, Slowable
-from vla_deploy.pace import Pace, Watch
+from vla_deploy.runtime.node import Adaptable, NeedsRestart, Node, Slowable
+from vla_deploy.runtime.rate_monitor import RateMonitor, TrialMonitor
 
 TIER_RETRY_NS: Final = 30 * NS_PER_S
 _UNSLOWED: Final = "control"
@@ -42,10 +42,10 @@ class _Change:
     way_back: "tuple[Profile, Any] | None" = None
 
 
-class AdaptingNode:
+class ReconfigurableNode:
     """Wrap a node; the supervisor's topics say when it prepares, commits, or goes back.
 
-    Preparation runs in `aside`; everything else happens between two steps of the node.
+    Preparation runs in `executor`; everything else happens between two steps of the node.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class AdaptingNode:
         ipc: Path,
         clock: Clock,
         host: Host,
-        aside: Executor,
+        executor: Executor,
     ) -> None:
         self._name = name
         self._node = node
@@ -65,16 +65,16 @@ class AdaptingNode:
         self._ipc = ipc
         self._clock = clock
         self._host = host
-        self._aside = aside
+        self._executor = executor
         self._rate_ratio = 1.0
-        self._pace = Pace()
+        self._pace = RateMonitor()
         self._tier = self._wanted_tier = 0
         self._tier_loading = 0
         self._tier_due_ns = 0
         self._tier_future: Future[tuple[Profile, Any]] | None = None
         self._directives_sequence = -1
         self._change: _Change | None = None
-        self._watch: Watch | None = None
+        self._watch: TrialMonitor | None = None
         self._handlers: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
             "prepare": self._on_prepare,
             "commit": self._on_commit,
@@ -117,7 +117,7 @@ class AdaptingNode:
     def stop(self) -> None:
         """Stop the node; what is being prepared is given up."""
         self._node.stop()
-        self._aside.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
         if hasattr(self, "_space"):
             self._space.close()
 
@@ -126,7 +126,7 @@ class AdaptingNode:
     def _on_prepare(self, message: Mapping[str, Any]) -> None:
         self._abandon()
         source = Source.of_values(message["profile"], message["values"])
-        future = self._aside.submit(self._prepare, source, self._tier)
+        future = self._executor.submit(self._prepare, source, self._tier)
         self._change = _Change(change_id=message["change_id"], future=future)
 
     def _prepare(self, source: Source, tier: int) -> tuple[Profile, Any]:
@@ -180,7 +180,7 @@ class AdaptingNode:
             self._watch.again(self._clock.now_ns())
 
     def _begin_watch(self, change_id: int, kept_ratio: float) -> None:
-        self._watch = Watch(change_id, self._clock.now_ns(), kept_ratio / self.period_s)
+        self._watch = TrialMonitor(change_id, self._clock.now_ns(), kept_ratio / self.period_s)
 
     def _on_validate(self, message: Mapping[str, Any]) -> None:
         watch, change_id = self._watch, message["change_id"]
@@ -267,7 +267,7 @@ class AdaptingNode:
     def _load_tier(self, tier: int) -> None:
         profile = self._profile
         self._tier_loading = tier
-        self._tier_future = self._aside.submit(lambda: (profile, self._prepared(profile, tier)))
+        self._tier_future = self._executor.submit(lambda: (profile, self._prepared(profile, tier)))
 
     def _take_tier(self, future: "Future[tuple[Profile, Any]]") -> None:
         error, tier = future.exception(), self._tier_loading

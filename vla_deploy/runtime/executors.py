@@ -16,7 +16,7 @@ _NICE: Final = 10
 _BACKGROUND_S: Final = 0.5
 
 
-class AtOnce(Executor):
+class InlineExecutor(Executor):
     """Run work at once, on the thread that hands it in: for work of a fraction of a period."""
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> "Future[T]":
@@ -140,7 +140,7 @@ def _fulfil(
         future.set_result(result)
 
 
-def beside(name: str, clock: Clock, computing_s: float) -> Executor:
+def worker_thread(name: str, clock: Clock, computing_s: float) -> Executor:
     """Return one thread of the same priority as the steps: for work that they wait for.
 
     On the twin's time a piece of work takes `computing_s`, as it may on a robot's computer.
@@ -148,7 +148,7 @@ def beside(name: str, clock: Clock, computing_s: float) -> Executor:
     return _timed(name, clock, computing_s, ThreadPoolExecutor(1, thread_name_prefix=name))
 
 
-def background(clock: Clock, computing_s: float = _BACKGROUND_S) -> Executor:
+def low_priority_thread(clock: Clock, computing_s: float = _BACKGROUND_S) -> Executor:
     """Return one thread that lets the steps of its process go first."""
     thread = ThreadPoolExecutor(1, thread_name_prefix="prepare", initializer=_give_way)
     return _timed("background", clock, computing_s, thread)

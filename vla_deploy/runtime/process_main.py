@@ -12,22 +12,22 @@ from drivers.clock import Clock
 from drivers.errors import DeviceBusy, DeviceMissing, DriverError, LinkLost, NoReply
 from drivers.twin_clock import TwinClock, clock_of
 from platforms import ProfileError, load_profile
-from vla_deploy.adapting import AdaptingNode
-from vla_deploy.aside import AtOnce, background
-from vla_deploy.exit_codes import (
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.ipc import IpcError
+from vla_deploy.navigation.errors import MapInvalid
+from vla_deploy.robots import RobotFileError
+from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
+from vla_deploy.runtime.exit_codes import (
     EXIT_CONFIGURATION,
     EXIT_CRASHED,
     EXIT_DEVICE_ABSENT,
     EXIT_OK,
 )
-from vla_deploy.heap import give_large_blocks_back
-from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
-from vla_deploy.inference.errors import InferenceError
-from vla_deploy.ipc import IpcError
-from vla_deploy.logs import process_log
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.node import Node, NodeContext, run_node
-from vla_deploy.robots import RobotFileError
+from vla_deploy.runtime.host_settings import REALTIME_PROCESS, HostSettings
+from vla_deploy.runtime.logs import process_log
+from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
+from vla_deploy.runtime.node import Node, NodeContext, run_node
+from vla_deploy.runtime.reconfigurable_node import ReconfigurableNode
 from vla_deploy.runtime.twin_members import MEMBERSHIPS, STOPPING_NS, WATCHERS
 
 READY_DIR = "ready"
@@ -89,13 +89,13 @@ def main(
 
 def _adapting(
     name: str, build: Callable[[NodeContext], Node], context: NodeContext
-) -> AdaptingNode:
+) -> ReconfigurableNode:
     """Set this process up for the profile, build its node and let it follow later profiles."""
     profile = load_profile(context.profile)
     host = HostSettings(name)
     for refused in host.apply(profile):
         _log.warning("degraded: %s", refused)
-    return AdaptingNode(
+    return ReconfigurableNode(
         name,
         build(context),
         profile,
@@ -103,7 +103,9 @@ def _adapting(
         clock=context.clock,
         host=host,
         # Control prepares two numbers; a thread that holds the interpreter could cost it a tick.
-        aside=AtOnce() if name == REALTIME_PROCESS else background(context.clock),
+        executor=InlineExecutor()
+        if name == REALTIME_PROCESS
+        else low_priority_thread(context.clock),
     )
 
 

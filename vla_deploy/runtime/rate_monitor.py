@@ -8,7 +8,7 @@ _MIN_RATE_RATIO: Final = 0.8
 _PACE_WEIGHT: Final = 0.01
 
 
-class Pace:
+class RateMonitor:
     """Measure which share of its steps a node makes: one that was slow before may stay so."""
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Pace:
         self._last_ns = now_ns
 
 
-class Watch:
+class TrialMonitor:
     """Count the steps that are made under a profile on trial, where `usual_hz` are to be had."""
 
     def __init__(self, change_id: int, began_ns: int, usual_hz: float) -> None:
