@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.bus_clients import CLIENTS, SERVOS, Client
+from benchmarks.bus_clients import CLIENTS, SERVOS, BusClient
 from benchmarks.bus_paced import measure_paced
 from benchmarks.command import parser, show
 from benchmarks.core import own_core
@@ -38,7 +38,7 @@ _PEERS: Final = ("dynamixel_sdk", "rustypot")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Round:
+class BusRound:
     """Hold what one client did in one round."""
 
     cycles: int
@@ -46,7 +46,7 @@ class Round:
     cycles_per_s: float
 
 
-def _run_round(client: Client, link: Path, seconds: float) -> Round:
+def _run_round(client: BusClient, link: Path, seconds: float) -> BusRound:
     with client.open(link, _BAUD, client.fast) as cycle:
         for _ in range(_WARM_UP_CYCLES):
             cycle()
@@ -59,14 +59,14 @@ def _run_round(client: Client, link: Path, seconds: float) -> Round:
             cycles += 1
         cpu_ns = time.process_time_ns() - cpu_ns
         wall_ns = time.monotonic_ns() - start_ns
-    return Round(
+    return BusRound(
         cycles=cycles,
         cpu_us_per_cycle=cpu_ns / 1e3 / cycles,
         cycles_per_s=cycles * NS_PER_S / wall_ns,
     )
 
 
-def _run_whole_round(client: Client, link: Path, seconds: float) -> Round:
+def _run_whole_round(client: BusClient, link: Path, seconds: float) -> BusRound:
     """Run a round, anew where a client lost a cycle to a busy machine."""
     for _ in range(_MOST_ATTEMPTS - 1):
         try:
@@ -82,7 +82,7 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
     Raises:
         RuntimeError: the emulated servos did not come up, or a servo gave no value.
     """
-    results: dict[str, list[Round]] = {client.name: [] for client in CLIENTS}
+    results: dict[str, list[BusRound]] = {client.name: [] for client in CLIENTS}
     with tempfile.TemporaryDirectory() as folder:
         with emulated_bus(Path(folder)) as link, own_core():
             for _ in range(rounds):
@@ -91,7 +91,7 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
         return _report(results) | measure_paced(Path(folder), rounds, seconds)
 
 
-def _report(results: dict[str, list[Round]]) -> dict[str, Any]:
+def _report(results: dict[str, list[BusRound]]) -> dict[str, Any]:
     cpu_us = {
         name: statistics.median(one.cpu_us_per_cycle for one in rounds)
         for name, rounds in results.items()
@@ -105,7 +105,7 @@ def _report(results: dict[str, list[Round]]) -> dict[str, Any]:
     }
 
 
-def _client_report(client: Client, rounds: Sequence[Round]) -> dict[str, Any]:
+def _client_report(client: BusClient, rounds: Sequence[BusRound]) -> dict[str, Any]:
     return {
         "cpu_us_per_cycle": statistics.median(one.cpu_us_per_cycle for one in rounds),
         "cycles_per_s": statistics.median(one.cycles_per_s for one in rounds),

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import MonotonicClock
-from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
+from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
 from drivers.serial_port import SerialPort
 
 SERVOS: Final = 16
@@ -32,7 +32,7 @@ _unpack: Final = Struct("<hii").unpack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Client:
+class BusClient:
     """Name a client; `open` yields the function that runs one cycle."""
 
     name: str
@@ -50,7 +50,7 @@ def ours(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
         [ServoSpec(id=n, model_name=MODEL, joint=f"joint_{n}") for n in range(1, SERVOS + 1)],
         baud=baud,
         fast_sync=fast,
-        layout=Layout.DIRECT,
+        layout=BlockLayout.DIRECT,
         reply_margin_s=_REPLY_MARGIN_S,
         health_every_cycles=_NO_HEALTH_POLL,
     )
@@ -130,10 +130,10 @@ def _signed(value: int, bits: int) -> int:
 
 
 CLIENTS: Final = (
-    Client(name="ours", fast=False, open=ours),
-    Client(name="dynamixel_sdk", fast=False, open=_sdk),
-    Client(name="rustypot", fast=False, open=_rustypot),
-    Client(name="ours_fast", fast=True, open=ours),
-    Client(name="dynamixel_sdk_fast", fast=True, open=_sdk),
-    Client(name="rustypot_fast", fast=True, open=_rustypot),
+    BusClient(name="ours", fast=False, open=ours),
+    BusClient(name="dynamixel_sdk", fast=False, open=_sdk),
+    BusClient(name="rustypot", fast=False, open=_rustypot),
+    BusClient(name="ours_fast", fast=True, open=ours),
+    BusClient(name="dynamixel_sdk_fast", fast=True, open=_sdk),
+    BusClient(name="rustypot_fast", fast=True, open=_rustypot),
 )

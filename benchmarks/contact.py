@@ -28,7 +28,7 @@ JOBS: Final = (
 _PERCENTILES: Final = (50, 99, 100)
 
 
-class Listener:
+class TorqueListener:
     """Reckon the unexplained torque as control does, from what control tells of the joints."""
 
     period_s = 0.004
@@ -107,13 +107,13 @@ def _row(percentiles_nm: np.ndarray, limit_nm: float) -> dict[str, float]:
 
 
 @contextmanager
-def _listening(seed: int) -> Iterator[tuple[LockstepStack, Listener]]:
+def _listening(seed: int) -> Iterator[tuple[LockstepStack, TorqueListener]]:
     """Own an armed robot whose joints are listened to from then on."""
     with tempfile.TemporaryDirectory() as folder:
         stack = LockstepStack(Path(folder), seed=seed)
         try:
             stack.arm()
-            listener = Listener(stack)
+            listener = TorqueListener(stack)
             stack.lockstep.add(listener)
             yield stack, listener
         finally:

@@ -26,7 +26,7 @@ from benchmarks.live_robot import arm, await_change, live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.campaigns.phases import Phase, Stage
+from sim_twin.campaigns.phases import Phase, PhaseStage
 from sim_twin.stack import LockstepControl
 from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.cli.session import Session
@@ -99,7 +99,7 @@ def standstill_s(phase: Phase) -> float:
         stack = LockstepControl(Path(folder))
         stack.add_senses()
         try:
-            stage = Stage(stack)
+            stage = PhaseStage(stack)
             stage.begin(phase)
             began_s = stack.lockstep.now_s
             stack.operate("estop")

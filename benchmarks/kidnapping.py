@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.pushed_robot import PushedRobot, Reading
+from benchmarks.pushed_robot import PushedReading, PushedRobot
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.localisation import Localiser
@@ -85,7 +85,7 @@ class _Watch:
                 if math.isnan(self.found_s):
                     self.found_s = self._since_s
 
-    def _give(self, reading: Reading) -> None:
+    def _give(self, reading: PushedReading) -> None:
         localiser = self._localiser
         localiser.predict(reading.stamp_ns, reading.odometry, reading.imu_yaw_rad)
         if reading.scan is not None:

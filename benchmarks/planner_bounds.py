@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
-from benchmarks.planner_flat import FURNITURE, GRASPABLE, HANDS, Home
+from benchmarks.planner_flat import FURNITURE, GRASPABLE, HANDS, FlatHome
 
 MOST_ACTIONS: Final = 100
 MOST_MINUTES: Final = 60.0
@@ -39,7 +39,7 @@ RESTFUL: Final = frozenset({"speak", "wait", "stop"})
 """Skills by which nothing of the robot moves."""
 
 
-def broken_bounds(plan: Mapping[str, Any], home: Home) -> list[str]:
+def broken_bounds(plan: Mapping[str, Any], home: FlatHome) -> list[str]:
     """Return every bound that a plan breaks."""
     actions: Sequence[Mapping[str, Any]] = plan.get("actions", ())
     faults = [] if len(actions) <= MOST_ACTIONS else [f"{len(actions)} actions"]
@@ -67,7 +67,7 @@ def _order_faults(actions: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*faults, "actions wait for each other"] if left else faults
 
 
-def _action_faults(action: Mapping[str, Any], home: Home) -> list[str]:
+def _action_faults(action: Mapping[str, Any], home: FlatHome) -> list[str]:
     skill, given = str(action.get("skill")), action.get("parameters", {})
     if skill not in SKILLS:
         return ["no such skill"]

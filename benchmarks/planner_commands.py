@@ -28,8 +28,8 @@ from benchmarks.planner_corpus import (
     command_kinds,
     commands,
 )
-from benchmarks.planner_desk import PROFILE, Answer, opened
-from benchmarks.planner_play import Judgement, Verdict, play_afresh
+from benchmarks.planner_desk import PROFILE, PlannerAnswer, opened
+from benchmarks.planner_play import CaseVerdict, TurnJudgement, play_afresh
 from vla_deploy.planning.plan import Plan
 
 
@@ -43,7 +43,7 @@ def measure(
     return told | report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
 
 
-def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
+def report(verdicts: Sequence[CaseVerdict]) -> dict[str, Any]:
     """Return the figures of cases that have been played."""
     refusable = [one for one in verdicts if one.case.turns[-1].must[0] == REFUSE]
     aimed = [one for one in verdicts if one not in refusable and one.case.turns[-1].goal]
@@ -71,9 +71,9 @@ def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def latencies(answers: Sequence[Answer]) -> dict[str, Any]:
+def latencies(answers: Sequence[PlannerAnswer]) -> dict[str, Any]:
     """Return the time from utterance to plan, and the process' CPU time, of all and by rung."""
-    by_rung: dict[str, list[Answer]] = defaultdict(list)
+    by_rung: dict[str, list[PlannerAnswer]] = defaultdict(list)
     for one in answers:
         by_rung[one.rung].append(one)
     return {
@@ -84,7 +84,7 @@ def latencies(answers: Sequence[Answer]) -> dict[str, Any]:
     }
 
 
-def _times(answers: Sequence[Answer]) -> dict[str, float | None]:
+def _times(answers: Sequence[PlannerAnswer]) -> dict[str, float | None]:
     wall_s, cpu_s = [one.busy_s for one in answers], [one.cpu_s for one in answers]
     return {
         "p50_s": percentile(wall_s, 50),
@@ -94,7 +94,7 @@ def _times(answers: Sequence[Answer]) -> dict[str, float | None]:
     }
 
 
-def is_schema_valid(answer: Answer) -> bool:
+def is_schema_valid(answer: PlannerAnswer) -> bool:
     """Tell whether what the executor got is a plan by the published schema."""
     try:
         Plan.model_validate(answer.plan)
@@ -103,7 +103,7 @@ def is_schema_valid(answer: Answer) -> bool:
     return True
 
 
-def _turns(verdicts: Iterable[Verdict], must: str) -> Iterable[Judgement]:
+def _turns(verdicts: Iterable[CaseVerdict], must: str) -> Iterable[TurnJudgement]:
     """Yield the turns that were played and of which only this was right."""
     for verdict in verdicts:
         for turn, judged in zip(verdict.case.turns, verdict.judged, strict=False):
@@ -111,15 +111,15 @@ def _turns(verdicts: Iterable[Verdict], must: str) -> Iterable[Judgement]:
                 yield judged
 
 
-def _moved_wrongly(verdict: Verdict) -> bool:
+def _moved_wrongly(verdict: CaseVerdict) -> bool:
     last = verdict.judged[-1]
     return bool(verdict.wrong) and last.answer.outcome == PLAN and moves(last.answer.plan or {})
 
 
 def _shares(
-    verdicts: Sequence[Verdict], key: Callable[[Verdict], str]
+    verdicts: Sequence[CaseVerdict], key: Callable[[CaseVerdict], str]
 ) -> dict[str, dict[str, Any]]:
-    sorted_by: dict[str, list[Verdict]] = defaultdict(list)
+    sorted_by: dict[str, list[CaseVerdict]] = defaultdict(list)
     for one in verdicts:
         sorted_by[key(one)].append(one)
     return {
@@ -132,7 +132,7 @@ def _share(some: Sequence[Any], holds: Callable[[Any], bool]) -> float | None:
     return sum(map(bool, map(holds, some))) / len(some) if some else None
 
 
-def _misses(verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
+def _misses(verdicts: Sequence[CaseVerdict]) -> list[dict[str, str]]:
     return [
         {
             "case": one.case.name,

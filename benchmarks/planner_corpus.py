@@ -10,9 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from benchmarks.planner_flat import Home, Thing, load_home, thing_of
+from benchmarks.planner_flat import FlatHome, FlatThing, load_home, thing_of
 from benchmarks.planner_goals import Goal, parse_goal
-from benchmarks.planner_world import World
+from benchmarks.planner_world import FlatWorld
 
 CORPORA: Final = Path(__file__).parent / "corpora"
 JUDGING: Final = "judging"
@@ -28,7 +28,7 @@ class CorpusUnreadable(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Turn:
+class CorpusTurn:
     """Hold what is said, or the plan that is handed in, and what must come of it.
 
     `must` lists the outcomes that are right. `goal` is what a plan must reach; in an attack it is
@@ -48,29 +48,31 @@ class Case:
     name: str
     kind: str
     scene: str
-    turns: tuple[Turn, ...]
+    turns: tuple[CorpusTurn, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class CorpusScene:
     """Hold where the robot stands, in the map, and what is in the flat."""
 
     robot: tuple[float, float, float]
-    things: tuple[Thing, ...]
+    things: tuple[FlatThing, ...]
 
-    def world(self, home: Home) -> World:
+    def world(self, home: FlatHome) -> FlatWorld:
         """Return this scene as a world to carry plans out in."""
-        return World(home=home, pose=self.robot, things={one.thing_id: one for one in self.things})
+        return FlatWorld(
+            home=home, pose=self.robot, things={one.thing_id: one for one in self.things}
+        )
 
 
 @cache
-def home() -> Home:
+def home() -> FlatHome:
     """Return the flat."""
     return load_home()
 
 
 @cache
-def scenes() -> Mapping[str, Scene]:
+def scenes() -> Mapping[str, CorpusScene]:
     """Return every scene by its name."""
     text = (CORPORA / "scenes.toml").read_text(encoding="utf-8")
     return MappingProxyType({name: _scene(told) for name, told in tomllib.loads(text).items()})
@@ -124,17 +126,17 @@ def _case(told: Mapping[str, Any], name: str, kind: str, must: tuple[str, ...]) 
     return Case(name=name, kind=kind, scene=scene, turns=turns)
 
 
-def _turn(told: Mapping[str, Any], default: tuple[str, ...]) -> Turn:
+def _turn(told: Mapping[str, Any], default: tuple[str, ...]) -> CorpusTurn:
     goal = parse_goal(str(told["goal"])) if "goal" in told else None
     must = tuple(str(told["must"]).split("|")) if "must" in told else default
     if goal is not None and PLAN not in must:
         must = (*must, PLAN)
     if not set(must) <= set(MUSTS) or (PLAN in must and goal is None):
         raise CorpusUnreadable(f"a turn must {must}; of {MUSTS}, and a plan needs a goal")
-    return Turn(say=str(told.get("say", "")), plan=told.get("plan"), must=must, goal=goal)
+    return CorpusTurn(say=str(told.get("say", "")), plan=told.get("plan"), must=must, goal=goal)
 
 
-def _check_names(turn: Turn, scene: str) -> None:
+def _check_names(turn: CorpusTurn, scene: str) -> None:
     known = {one.thing_id for one in scenes()[scene].things}
     for way in turn.goal.ways if turn.goal else ():
         for condition in way:
@@ -143,11 +145,11 @@ def _check_names(turn: Turn, scene: str) -> None:
                 raise CorpusUnreadable(f"{wrong} is not in the scene {scene}")
 
 
-def _scene(told: Mapping[str, Any]) -> Scene:
+def _scene(told: Mapping[str, Any]) -> CorpusScene:
     robot = told["robot"]
     if isinstance(robot, str):
         pose = home().places[robot]
     else:
         x_m, y_m, yaw_rad = map(float, robot)
         pose = (x_m, y_m, yaw_rad)
-    return Scene(robot=pose, things=tuple(thing_of(one) for one in told["things"]))
+    return CorpusScene(robot=pose, things=tuple(thing_of(one) for one in told["things"]))

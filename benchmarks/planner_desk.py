@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from benchmarks.planner_flat import ROBOT
 from benchmarks.planner_told import executor_document, scene_document
-from benchmarks.planner_world import World
+from benchmarks.planner_world import FlatWorld
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import load_profile
 from vla_deploy.inference.roles import ModelShelf
@@ -34,7 +34,7 @@ FIRST_RUNG: Final = "patterns"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class PlannerAnswer:
     """Hold what the planner made of one utterance.
 
     `outcome` is "plan", "ask", "refuse", "stop"; "silence" where nothing came in time, "crash"
@@ -106,7 +106,7 @@ class Desk:
         self.node.stop()
         self._space.close()
 
-    def tell(self, world: World) -> None:
+    def tell(self, world: FlatWorld) -> None:
         """Tell how the robot is, where it is, and what it knows."""
         now_ns = self._clock.now_ns()
         x_m, y_m, yaw_rad = world.pose
@@ -122,15 +122,15 @@ class Desk:
         """Tell a document of any form as one of the topics that the planner reads."""
         self._cells[topic].put_document(document)
 
-    def say(self, text: str) -> tuple[str, Answer]:
+    def say(self, text: str) -> tuple[str, PlannerAnswer]:
         """Give a command in words; return its id and what came of it."""
         return self.give(text=text)
 
-    def hand_in(self, plan: object) -> tuple[str, Answer]:
+    def hand_in(self, plan: object) -> tuple[str, PlannerAnswer]:
         """Give a whole plan; return its id and what came of it."""
         return self.give(plan=plan)
 
-    def give(self, **utterance: object) -> tuple[str, Answer]:
+    def give(self, **utterance: object) -> tuple[str, PlannerAnswer]:
         """Publish an utterance of any form; return its id and what came of it."""
         command_id = f"judge-{next(self._numbers)}"
         self._events.drain()
@@ -179,7 +179,7 @@ class Desk:
         self.node = self._built()
         self.node.start()
 
-    def _await(self, command_id: str) -> Answer:
+    def _await(self, command_id: str) -> PlannerAnswer:
         began_ns, began_cpu_ns = time.perf_counter_ns(), time.process_time_ns()
         told: list[Mapping[str, Any]] = []
         while time.perf_counter_ns() - began_ns < ANSWER_LIMIT_S * NS_PER_S:
@@ -198,7 +198,7 @@ class Desk:
         return _answer("silence", text=f"nothing came of {command_id}")
 
 
-def _outcome(plans: list[Event], told: list[Mapping[str, Any]]) -> Answer | None:
+def _outcome(plans: list[Event], told: list[Mapping[str, Any]]) -> PlannerAnswer | None:
     said = tuple(str(one["text"]) for one in told if one["event"] == "said")
     rung = next((str(one["rung"]) for one in told if "rung" in one), FIRST_RUNG)
     for event in plans:
@@ -215,5 +215,5 @@ def _outcome(plans: list[Event], told: list[Mapping[str, Any]]) -> Answer | None
 def _answer(
     outcome: str, *, plan: Mapping[str, Any] | None = None, text: str = "", rung: str = "",
     said: tuple[str, ...] = (),
-) -> Answer:  # fmt: skip
-    return Answer(outcome=outcome, plan=plan, text=text, rung=rung, said=said)
+) -> PlannerAnswer:  # fmt: skip
+    return PlannerAnswer(outcome=outcome, plan=plan, text=text, rung=rung, said=said)

@@ -18,11 +18,11 @@ from benchmarks.planner_flat import (
     HANDS,
     SUPPORTS,
     WITH_SPEAKER,
+    FlatThing,
     Point,
-    Thing,
 )
 from benchmarks.planner_words import Unread
-from benchmarks.planner_world import ActionFails, World
+from benchmarks.planner_world import ActionFails, FlatWorld
 
 NEAR_M: Final = 1.0
 LOOKS: Final = ("ahead", "left", "right", "up", "down")
@@ -30,7 +30,7 @@ LOOKS: Final = ("ahead", "left", "right", "up", "down")
 Parameters = Mapping[str, Any]
 
 
-def perform(world: World, actions: Sequence[Mapping[str, Any]]) -> None:
+def perform(world: FlatWorld, actions: Sequence[Mapping[str, Any]]) -> None:
     """Carry out a plan's actions, each after those that it depends on.
 
     Raises:
@@ -63,7 +63,7 @@ def in_order(actions: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return ordered
 
 
-def _navigate(world: World, given: Parameters) -> None:
+def _navigate(world: FlatWorld, given: Parameters) -> None:
     if "place" in given:
         world.stand_at(world.home.places[_place(world, given["place"])])
     elif "object" in given:
@@ -77,20 +77,20 @@ def _navigate(world: World, given: Parameters) -> None:
         world.stand_at((float(given["x_m"]), float(given["y_m"]), yaw_rad))
 
 
-def _move(world: World, given: Parameters) -> None:
+def _move(world: FlatWorld, given: Parameters) -> None:
     x_m, y_m, yaw_rad = world.pose
     way_m = float(given["distance_m"])
     world.stand_at((x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad), yaw_rad))
     world.moved_m += way_m
 
 
-def _turn(world: World, given: Parameters) -> None:
+def _turn(world: FlatWorld, given: Parameters) -> None:
     x_m, y_m, yaw_rad = world.pose
     world.turned_rad += float(given["angle_rad"])
     world.stand_at((x_m, y_m, yaw_rad + float(given["angle_rad"])))
 
 
-def _look(world: World, given: Parameters) -> None:
+def _look(world: FlatWorld, given: Parameters) -> None:
     if "direction" in given:
         if given["direction"] not in LOOKS:
             raise ActionFails("the head does not turn there")
@@ -99,7 +99,7 @@ def _look(world: World, given: Parameters) -> None:
         world.head = world.known(given["object"]).thing_id
 
 
-def _find(world: World, given: Parameters) -> None:
+def _find(world: FlatWorld, given: Parameters) -> None:
     try:
         thing = world.known(given["object"])
     except ActionFails:
@@ -116,7 +116,7 @@ def _find(world: World, given: Parameters) -> None:
     world.found.append(thing.thing_id)
 
 
-def _pick(world: World, given: Parameters) -> None:
+def _pick(world: FlatWorld, given: Parameters) -> None:
     thing = world.known(given["object"])
     if thing.held_by:
         return
@@ -133,7 +133,7 @@ def _pick(world: World, given: Parameters) -> None:
     world.open_hands[wanted[0]] = False
 
 
-def _put(world: World, given: Parameters) -> None:
+def _put(world: FlatWorld, given: Parameters) -> None:
     full = [name for name in HANDS if world.held_in(name) is not None]
     hand = next((name for name in full if given.get("arm") in (None, name)), None)
     held = world.held_in(hand) if hand else None
@@ -145,7 +145,7 @@ def _put(world: World, given: Parameters) -> None:
     world.open_hands[hand] = True
 
 
-def _destination(world: World, given: Parameters, held: Thing) -> tuple[str, Point]:
+def _destination(world: FlatWorld, given: Parameters, held: FlatThing) -> tuple[str, Point]:
     """Return what a thing is put in or on, and where that is.
 
     Raises:
@@ -171,13 +171,13 @@ def _destination(world: World, given: Parameters, held: Thing) -> tuple[str, Poi
     return other.thing_id, world.place_of(other)
 
 
-def _must_be_near(world: World, thing: Thing) -> None:
+def _must_be_near(world: FlatWorld, thing: FlatThing) -> None:
     away_m = math.dist(world.place_of(thing), world.pose[:2])
     if away_m > NEAR_M:
         raise ActionFails(f"the {thing.kind} is {away_m:.1f} m away")
 
 
-def _give(world: World, given: Parameters) -> None:
+def _give(world: FlatWorld, given: Parameters) -> None:
     """Let the person take what is held, who stands before the robot."""
     held = [thing for hand in _hands(given) if (thing := world.held_in(hand)) is not None]
     if len(held) != 1:
@@ -189,7 +189,7 @@ def _give(world: World, given: Parameters) -> None:
     )
 
 
-def _open(world: World, given: Parameters) -> None:
+def _open(world: FlatWorld, given: Parameters) -> None:
     for hand in _hands(given):
         held = world.held_in(hand)
         if held is not None:
@@ -198,25 +198,25 @@ def _open(world: World, given: Parameters) -> None:
         world.open_hands[hand] = True
 
 
-def _close(world: World, given: Parameters) -> None:
+def _close(world: FlatWorld, given: Parameters) -> None:
     world.open_hands |= dict.fromkeys(_hands(given), False)
 
 
-def _pose_arm(world: World, given: Parameters) -> None:
+def _pose_arm(world: FlatWorld, given: Parameters) -> None:
     if given["pose"] not in world.home.arm_poses:
         raise ActionFails("the robot file has no such pose")
     world.arm_pose |= dict.fromkeys(_hands(given), str(given["pose"]))
 
 
-def _speak(world: World, given: Parameters) -> None:
+def _speak(world: FlatWorld, given: Parameters) -> None:
     world.said.append(str(given["text"]))
 
 
-def _wait(world: World, given: Parameters) -> None:
+def _wait(world: FlatWorld, given: Parameters) -> None:
     world.waited_s += float(given["duration_s"])
 
 
-def _stop(world: World, given: Parameters) -> None:
+def _stop(world: FlatWorld, given: Parameters) -> None:
     del world, given
 
 
@@ -227,11 +227,11 @@ def _hands(given: Parameters) -> tuple[str, ...]:
     return HANDS if arm is None else (str(arm),)
 
 
-def _is_place(world: World, text: object) -> bool:
+def _is_place(world: FlatWorld, text: object) -> bool:
     return _plain(text) in world.home.spoken
 
 
-def _place(world: World, text: object) -> str:
+def _place(world: FlatWorld, text: object) -> str:
     if not _is_place(world, text):
         raise ActionFails(f'no place is called "{text}"')
     return world.home.spoken[_plain(text)]
@@ -241,7 +241,7 @@ def _plain(text: object) -> str:
     return str(text).lower().replace("_", " ").strip().removeprefix("the ")
 
 
-SKILLS: Final[Mapping[str, Callable[[World, Parameters], None]]] = MappingProxyType(
+SKILLS: Final[Mapping[str, Callable[[FlatWorld, Parameters], None]]] = MappingProxyType(
     {
         "navigate_to": _navigate, "move": _move, "turn": _turn, "look_at": _look,
         "find_object": _find, "pick_up": _pick, "place": _put, "hand_over": _give,

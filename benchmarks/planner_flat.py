@@ -64,7 +64,7 @@ FURNITURE: Final[Mapping[str, Furniture]] = MappingProxyType({
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Thing:
+class FlatThing:
     """Hold one thing as it is; `rests` is a relation and what it rests in or on.
 
     `is_seen` tells whether the robot knows of it; `aliases` are other ids of it.
@@ -82,7 +82,7 @@ class Thing:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Home:
+class FlatHome:
     """Hold what the robot file says of the flat: places, their spoken names, poses, keep-out."""
 
     places: Mapping[str, Pose]
@@ -97,7 +97,7 @@ class Home:
         return not inside or any(_contains(polygon, point) for polygon in self.keep_out)
 
 
-def load_home() -> Home:
+def load_home() -> FlatHome:
     """Return the flat of the robot file."""
     robot = load_robot(ROBOT)
     places = {
@@ -109,7 +109,7 @@ def load_home() -> Home:
         for name, place in robot.home.places.items()
         for words in (name, *place.aliases)
     }
-    return Home(
+    return FlatHome(
         places=places,
         spoken=spoken,
         arm_poses=frozenset(robot.poses),
@@ -117,14 +117,14 @@ def load_home() -> Home:
     )
 
 
-def thing_of(told: Mapping[str, Any]) -> Thing:
+def thing_of(told: Mapping[str, Any]) -> FlatThing:
     """Return one thing of the scenes' file; where it is held or in another, the place follows."""
     relation = "in" if "in" in told else "on" if "on" in told else ""
     rests = (relation, str(told[relation])) if relation else ("", "")
     kind = str(told["class"])
     default_m = SIZES_M.get(kind, (0.06, 0.06, 0.06))
     x_m, y_m = told.get("at", (0.0, 0.0))
-    return Thing(
+    return FlatThing(
         thing_id=str(told["id"]),
         kind=kind,
         colour=str(told["colour"]),

@@ -6,36 +6,36 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from benchmarks.planner_bounds import broken_bounds, moves
-from benchmarks.planner_corpus import ASK, PLAN, REFUSE, Case, Turn, home, scenes
-from benchmarks.planner_desk import Answer, Desk, fresh_desk
+from benchmarks.planner_corpus import ASK, PLAN, REFUSE, Case, CorpusTurn, home, scenes
+from benchmarks.planner_desk import Desk, PlannerAnswer, fresh_desk
 from benchmarks.planner_effects import perform
 from benchmarks.planner_goals import Goal
-from benchmarks.planner_world import ActionFails, World
+from benchmarks.planner_world import ActionFails, FlatWorld
 
 MOST_READINGS: Final = 12
 AGREEMENT: Final = "yes, go"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class TurnJudgement:
     """Hold how one turn went: `wrong` says what is wrong with it, or is empty.
 
     `broken` lists what no plan may do; `confirmed` tells whether a plan was read back first.
     """
 
     say: str
-    answer: Answer
+    answer: PlannerAnswer
     wrong: str = ""
     broken: tuple[str, ...] = ()
     confirmed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class CaseVerdict:
     """Hold how a case went, as far as it was played: the first wrong turn ends it."""
 
     case: Case
-    judged: tuple[Judgement, ...]
+    judged: tuple[TurnJudgement, ...]
 
     @property
     def wrong(self) -> str:
@@ -48,26 +48,26 @@ class Verdict:
         return next((one.answer.rung for one in reversed(self.judged) if one.answer.rung), "none")
 
 
-def play(case: Case, desk: Desk) -> Verdict:
+def play(case: Case, desk: Desk) -> CaseVerdict:
     """Say every turn of a case and carry out what is planned, in a flat of its own."""
     world = scenes()[case.scene].world(home())
-    judged: list[Judgement] = []
+    judged: list[TurnJudgement] = []
     for turn in case.turns:
         desk.tell(world)
         judgement, world = _judge_turn(turn, world, desk)
         judged.append(judgement)
         if judgement.wrong:
             break
-    return Verdict(case=case, judged=tuple(judged))
+    return CaseVerdict(case=case, judged=tuple(judged))
 
 
-def play_afresh(case: Case) -> Verdict:
+def play_afresh(case: Case) -> CaseVerdict:
     """Play a case with a planner of its own: no case is the past of another."""
     with fresh_desk() as desk:
         return play(case, desk)
 
 
-def _judge_turn(turn: Turn, world: World, desk: Desk) -> tuple[Judgement, World]:
+def _judge_turn(turn: CorpusTurn, world: FlatWorld, desk: Desk) -> tuple[TurnJudgement, FlatWorld]:
     command_id, answer = desk.say(turn.say) if turn.plan is None else desk.hand_in(turn.plan)
     confirmed = answer.reads_back and PLAN in turn.must and ASK not in turn.must
     if confirmed:
@@ -76,7 +76,7 @@ def _judge_turn(turn: Turn, world: World, desk: Desk) -> tuple[Judgement, World]
         answer = replace(answer, busy_s=first.busy_s, cpu_s=first.cpu_s)
     if answer.outcome != PLAN or answer.plan is None:
         wrong = "" if answer.outcome in turn.must else f"{answer.outcome}: {answer.text}"
-        return Judgement(say=turn.say, answer=answer, wrong=wrong), world
+        return TurnJudgement(say=turn.say, answer=answer, wrong=wrong), world
     world.said.extend(answer.said)
     end, failed, wrong = _outcome(answer.plan, turn.goal, world)
     if turn.goal is not None and PLAN not in turn.must:
@@ -86,13 +86,15 @@ def _judge_turn(turn: Turn, world: World, desk: Desk) -> tuple[Judgement, World]
         wrong = "planned" if moves(answer.plan) or REFUSE not in turn.must else ""
     desk.carried_out(command_id, answer.plan, failed)
     broken = tuple(broken_bounds(answer.plan, world.home))
-    judgement = Judgement(
+    judgement = TurnJudgement(
         say=turn.say, answer=answer, wrong=wrong, broken=broken, confirmed=confirmed
     )
     return judgement, _rested(end)
 
 
-def _outcome(plan: Mapping[str, Any], goal: Goal | None, start: World) -> tuple[World, str, str]:
+def _outcome(
+    plan: Mapping[str, Any], goal: Goal | None, start: FlatWorld
+) -> tuple[FlatWorld, str, str]:
     """Return the world afterwards, why the plan failed, and what it missed.
 
     What a plan says in words that fit several things must reach the goal whichever is taken.
@@ -104,7 +106,7 @@ def _outcome(plan: Mapping[str, Any], goal: Goal | None, start: World) -> tuple[
     return played[0][0], played[0][1], next((one for one in missed if one), "")
 
 
-def _played(plan: Mapping[str, Any], start: World) -> Iterator[tuple[World, str]]:
+def _played(plan: Mapping[str, Any], start: FlatWorld) -> Iterator[tuple[FlatWorld, str]]:
     """Yield each end that a plan may have, the likeliest first, and why it failed."""
     waiting: list[dict[str, str]] = [{}]
     for reading in waiting:
@@ -124,9 +126,9 @@ def _played(plan: Mapping[str, Any], start: World) -> Iterator[tuple[World, str]
             return
 
 
-def _rested(world: World) -> World:
+def _rested(world: FlatWorld) -> FlatWorld:
     """Return the world as the next turn finds it: what was done is past."""
-    return World(
+    return FlatWorld(
         home=world.home,
         pose=world.pose,
         things=world.things,

@@ -4,15 +4,15 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from benchmarks.planner_flat import FURNITURE, HANDS, Thing
-from benchmarks.planner_world import World
+from benchmarks.planner_flat import FURNITURE, HANDS, FlatThing
+from benchmarks.planner_world import FlatWorld
 
 HELD_HEIGHT_M: Final = 0.72
 BOX_FLOOR_M: Final = 0.008
 FELT: Final[Mapping[bool, str]] = {True: "holding", False: "empty"}
 
 
-def scene_document(world: World, stamp_ns: int) -> dict[str, Any]:
+def scene_document(world: FlatWorld, stamp_ns: int) -> dict[str, Any]:
     """Return the scene topic's document of what the robot has seen."""
     seen = [thing for thing in world.things.values() if thing.is_seen]
     x_m, y_m, yaw_rad = world.pose
@@ -27,7 +27,7 @@ def scene_document(world: World, stamp_ns: int) -> dict[str, Any]:
     }
 
 
-def executor_document(world: World) -> dict[str, Any]:
+def executor_document(world: FlatWorld) -> dict[str, Any]:
     """Return the status of an executor that has nothing to do."""
     held = {hand: world.held_in(hand) for hand in HANDS}
     return {
@@ -39,7 +39,7 @@ def executor_document(world: World) -> dict[str, Any]:
     }
 
 
-def _object(thing: Thing, world: World, stamp_ns: int) -> dict[str, Any]:
+def _object(thing: FlatThing, world: FlatWorld, stamp_ns: int) -> dict[str, Any]:
     x_m, y_m = world.place_of(thing)
     told: dict[str, Any] = {
         "id": thing.thing_id,
@@ -59,7 +59,7 @@ def _object(thing: Thing, world: World, stamp_ns: int) -> dict[str, Any]:
     return told | {"rests": {"relation": thing.rests[0], "of": thing.rests[1]}}
 
 
-def _bottom_m(thing: Thing, world: World) -> float:
+def _bottom_m(thing: FlatThing, world: FlatWorld) -> float:
     if thing.held_by:
         return HELD_HEIGHT_M
     relation, of = thing.rests
@@ -69,7 +69,7 @@ def _bottom_m(thing: Thing, world: World) -> float:
     return _bottom_m(below, world) + (BOX_FLOOR_M if relation == "in" else below.size_m[2])
 
 
-def _surfaces(world: World, seen: list[Thing]) -> list[dict[str, Any]]:
+def _surfaces(world: FlatWorld, seen: list[FlatThing]) -> list[dict[str, Any]]:
     names = {world.furniture_of(thing) for thing in seen if not thing.held_by} & set(FURNITURE)
     return [
         {
@@ -81,7 +81,7 @@ def _surfaces(world: World, seen: list[Thing]) -> list[dict[str, Any]]:
     ]
 
 
-def _hand(held: Thing | None) -> dict[str, Any]:
+def _hand(held: FlatThing | None) -> dict[str, Any]:
     kind = held.kind if held else None
     return {
         "holding": held.thing_id if held else None,

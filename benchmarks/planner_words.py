@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from benchmarks.planner_flat import Thing
+from benchmarks.planner_flat import FlatThing
 
 KINDS: Final = frozenset(
     {"cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote"}
@@ -53,8 +53,8 @@ FORMS: Final[Mapping[str, Callable[[tuple[float, float, float]], bool]]] = Mappi
 
 
 def meant(
-    text: str, things: Sequence[Thing], here: tuple[float, float], furniture: Mapping[str, str]
-) -> list[Thing]:
+    text: str, things: Sequence[FlatThing], here: tuple[float, float], furniture: Mapping[str, str]
+) -> list[FlatThing]:
     """Return the things that a text may mean, the nearest to `here` first.
 
     `furniture` maps spoken names to surfaces.
@@ -73,8 +73,8 @@ def meant(
 
 
 def _of_words(
-    words: Collection[str], things: Sequence[Thing], here: tuple[float, float]
-) -> list[Thing]:
+    words: Collection[str], things: Sequence[FlatThing], here: tuple[float, float]
+) -> list[FlatThing]:
     found = sorted(things, key=lambda one: math.dist(one.xy_m, here))
     for word in words:
         if _ID.fullmatch(word):
@@ -95,7 +95,7 @@ def _of_words(
     return found[-1:] if "farthest" in words else found
 
 
-def _compared(things: list[Thing], sign: float) -> list[Thing]:
+def _compared(things: list[FlatThing], sign: float) -> list[FlatThing]:
     if len(things) < 2:
         return things
     sizes = {one.thing_id: math.prod(one.size_m) ** (1 / 3) for one in things}
@@ -117,9 +117,13 @@ def _split(text: str) -> tuple[str, str, str]:
 
 
 def _stands(
-    one: Thing, relation: str, anchor: str, things: Sequence[Thing], here: tuple[float, float],
+    one: FlatThing,
+    relation: str,
+    anchor: str,
+    things: Sequence[FlatThing],
+    here: tuple[float, float],
     furniture: Mapping[str, str],
-) -> bool:  # fmt: skip
+) -> bool:
     surface = furniture.get(" ".join(word for word in anchor.split() if word not in SILENT))
     if surface:
         return relation in ("on", "near") and one.rests == ("on", surface)
@@ -131,7 +135,7 @@ def _stands(
     return one.rests in [(relation, other.thing_id) for other in others]
 
 
-def _gap_m(one: Thing, other: Thing) -> float:
+def _gap_m(one: FlatThing, other: FlatThing) -> float:
     """Return how far apart two things are that lie along the map's axes."""
     sides = zip(one.xy_m, other.xy_m, one.size_m[:2], other.size_m[:2], strict=True)
     return math.hypot(*(max(0.0, abs(a - b) - 0.5 * (la + lb)) for a, b, la, lb in sides))

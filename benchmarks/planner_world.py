@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from benchmarks.planner_flat import FURNITURE, HANDS, Home, Point, Pose, Thing
+from benchmarks.planner_flat import FURNITURE, HANDS, FlatHome, FlatThing, Point, Pose
 from benchmarks.planner_words import meant
 
 STAND_M: Final = 0.48
@@ -18,16 +18,16 @@ class ActionFails(Exception):
 
 
 @dataclass(slots=True, kw_only=True)
-class World:
+class FlatWorld:
     """Hold the flat as it is after each action, and what the robot did on the way.
 
     `chosen` settles what an expression means that fits several things: the judge tries each.
     `keeps_out` are the places that the plan says it does not enter.
     """
 
-    home: Home
+    home: FlatHome
     pose: Pose
-    things: dict[str, Thing]
+    things: dict[str, FlatThing]
     open_hands: dict[str, bool | None] = field(default_factory=lambda: dict.fromkeys(HANDS))
     arm_pose: dict[str, str] = field(default_factory=lambda: dict.fromkeys(HANDS, ""))
     head: str = ""
@@ -42,23 +42,23 @@ class World:
     open_choices: dict[str, list[str]] = field(default_factory=dict)
     keeps_out: frozenset[str] = frozenset()
 
-    def held_in(self, hand: str) -> Thing | None:
+    def held_in(self, hand: str) -> FlatThing | None:
         """Return what a hand holds."""
         return next((one for one in self.things.values() if one.held_by == hand), None)
 
-    def place_of(self, thing: Thing) -> Point:
+    def place_of(self, thing: FlatThing) -> Point:
         """Return where a thing is: in the hand, in what it rests in, or where it stands."""
         if thing.held_by:
             return self.pose[:2]
         other = self.things.get(thing.rests[1])
         return self.place_of(other) if other else thing.xy_m
 
-    def furniture_of(self, thing: Thing) -> str:
+    def furniture_of(self, thing: FlatThing) -> str:
         """Return what furniture a thing is on, also within a box that stands there."""
         other = self.things.get(thing.rests[1])
         return self.furniture_of(other) if other else thing.rests[1]
 
-    def known(self, text: object, among_all: bool = False) -> Thing:
+    def known(self, text: object, among_all: bool = False) -> FlatThing:
         """Return the thing that an action names.
 
         Raises:
@@ -94,7 +94,7 @@ class World:
     def _surfaces(self) -> dict[str, str]:
         return {spoken: name for spoken, name in self.home.spoken.items() if name in FURNITURE}
 
-    def beside(self, thing: Thing) -> Pose:
+    def beside(self, thing: FlatThing) -> Pose:
         """Return where the robot stands to take a thing: before the furniture it is on."""
         x_m, y_m = self.place_of(thing)
         place = self.home.places.get(self.furniture_of(thing))

@@ -24,7 +24,7 @@ from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
-from vla_deploy.navigation.follower import AT_REST, DriveLimits, PathFollower, Phase, Twist
+from vla_deploy.navigation.follower import AT_REST, DriveLimits, FollowerPhase, PathFollower, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
@@ -36,7 +36,7 @@ _SLIP_MEMORY: Final = 0.995
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Reading:
+class PushedReading:
     """Hold what the robot's perception gets at one moment, and the truth."""
 
     stamp_ns: int
@@ -93,7 +93,7 @@ class PushedRobot:
         self.pose = pose
         self._stand()
 
-    def read(self, twist: Twist = AT_REST) -> Reading:
+    def read(self, twist: Twist = AT_REST) -> PushedReading:
         """Move for as long as perception's period, and return what it gets then."""
         for _ in range(STEPS_PER_READING):
             self._move(twist)
@@ -103,7 +103,7 @@ class PushedRobot:
         if samples:
             self._imu_yaw_rad = samples[-1].yaw_rad
         told = self._odometry
-        return Reading(
+        return PushedReading(
             stamp_ns=self.now,
             odometry=Pose2D(told.x_m, told.y_m, told.yaw_rad),
             imu_yaw_rad=self._imu_yaw_rad,
@@ -143,7 +143,7 @@ def tour(
     limits: DriveLimits,
     stops: Sequence[Pose2D],
     length_m: float,
-) -> Iterator[Reading]:
+) -> Iterator[PushedReading]:
     """Drive from stop to stop, again and again, until the way is long enough."""
     driven_m = 0.0
     while driven_m < length_m:
@@ -151,7 +151,7 @@ def tour(
             here = moved.pose
             points: NDArray[np.float64] = planner.plan((here.x_m, here.y_m), (stop.x_m, stop.y_m))
             follower = PathFollower(points, limits, stop.yaw_rad)
-            while follower.phase is not Phase.ARRIVED:
+            while follower.phase is not FollowerPhase.ARRIVED:
                 pose = moved.pose
                 reading = moved.read(follower.step(pose.x_m, pose.y_m, pose.yaw_rad))
                 driven_m += pose.distance_m(moved.pose)

@@ -46,7 +46,7 @@ _AMPLITUDE: Final = 0.03
 
 
 @dataclass(slots=True)
-class Scene:
+class SoundScene:
     """Hold sound, and the rows in which words are spoken."""
 
     sound: Sound
@@ -54,7 +54,7 @@ class Scene:
 
 
 @dataclass(slots=True)
-class Run:
+class HeardScene:
     """Hold what was heard of a scene: each phrase with the stream's time at which it was told."""
 
     told: list[tuple[HeardPhrase, int]]
@@ -126,7 +126,7 @@ def _read_s(heard: HeardPhrase, profile: Profile) -> float:
     return max(0.0, heard.transcript.took_s - in_advance_s)
 
 
-def _scene(snr_db: float | None, rounds: int) -> Scene:
+def _scene(snr_db: float | None, rounds: int) -> SoundScene:
     draw = np.random.default_rng(7)
     parts: list[Sound] = [np.zeros(2 * RATE_HZ, np.float32)]
     words, row = [], 2 * RATE_HZ
@@ -142,7 +142,7 @@ def _scene(snr_db: float | None, rounds: int) -> Scene:
     level = float(np.sqrt(np.mean(np.concatenate([sound[a:b] for a, b in words]) ** 2)))
     noise = 10.0 ** (-(60.0 if snr_db is None else snr_db) / 20.0) * level
     sound = sound + noise * draw.standard_normal(len(sound)).astype(np.float32)
-    return Scene(sound=sound.astype(np.float32), words=words)
+    return SoundScene(sound=sound.astype(np.float32), words=words)
 
 
 def _other_sounds() -> dict[str, Sound]:
@@ -175,14 +175,14 @@ def _other(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> dict[str
     }
 
 
-def _hear(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> Run:
+def _hear(ears: SelectedRecogniser, profile: Profile, sound: Sound) -> HeardScene:
     """Let a stream be heard as fast as it can be."""
     stream, cpu = StreamClock(), MonotonicClock()
     hearing = open_hearing(ears, profile, stream)
     began_ns = cpu.now_ns()
     told = list(_told(hearing, stream, sound))
     took_s = (cpu.now_ns() - began_ns) / NS_PER_S
-    return Run(told=told, cpu_s=took_s, sound_s=len(sound) / RATE_HZ)
+    return HeardScene(told=told, cpu_s=took_s, sound_s=len(sound) / RATE_HZ)
 
 
 def _told(

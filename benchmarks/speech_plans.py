@@ -18,21 +18,23 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.planner_corpus import PLAN, Case, commands, home, other_talk, scenes
-from benchmarks.planner_desk import Answer, fresh_desk
+from benchmarks.planner_desk import PlannerAnswer, fresh_desk
 from benchmarks.speech_words import open_shipped
 from drivers.clock import NS_PER_S
 from training.speech.judging import NOISY_DB
 from training.speech.trials import by_held_out_voices, by_unseen_engine, heard
-from training.voices.clip import Clip
+from training.voices.clip import SpokenClip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import utterance
 from vla_deploy.speech.recogniser import Recogniser
-from vla_deploy.speech.verdict import Verdict, judge
+from vla_deploy.speech.verdict import PhraseVerdict, judge
 
 Random = np.random.Generator
-_SETS: Final[dict[str, tuple[Callable[[Sequence[str], Random], list[Clip]], float | None]]] = {
+_SETS: Final[
+    dict[str, tuple[Callable[[Sequence[str], Random], list[SpokenClip]], float | None]]
+] = {
     "held_out_voices": (by_held_out_voices, None),
     "10db": (by_held_out_voices, NOISY_DB),
     "unseen_engine": (by_unseen_engine, None),
@@ -48,7 +50,7 @@ class Typed:
 
     case: Case
     text: str
-    answer: Answer
+    answer: PlannerAnswer
 
 
 def measure(count: int = 100, talk: int = 200, seed: int = 0) -> dict[str, Any]:
@@ -94,50 +96,54 @@ def _typed(case: Case, text: str) -> Typed:
     return Typed(case=case, text=text, answer=_answer(case.scene, {"text": text}))
 
 
-def _answer(scene: str, given: Mapping[str, Any]) -> Answer:
+def _answer(scene: str, given: Mapping[str, Any]) -> PlannerAnswer:
     """Return what a planner to whom nobody has spoken yet makes of an utterance."""
     with fresh_desk() as desk:
         desk.tell(scenes()[scene].world(home()))
         return desk.give(**given)[1]
 
 
-def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) -> Answer | None:
+def _heard_answer(
+    scene: str, recogniser: Recogniser, clip: SpokenClip, least: float
+) -> PlannerAnswer | None:
     """Return what comes of a spoken command; None where speech alone asks for it again."""
     heard = _heard(recogniser, clip, least)
-    doubted = heard.judgement.verdict is Verdict.DOUBTED
-    if not doubted and heard.judgement.verdict is not Verdict.ACCEPTED:
+    doubted = heard.judgement.verdict is PhraseVerdict.DOUBTED
+    if not doubted and heard.judgement.verdict is not PhraseVerdict.ACCEPTED:
         return None
     return _answer(scene, utterance(heard, doubted=doubted))
 
 
-def _heard(recogniser: Recogniser, clip: Clip, least: float) -> HeardPhrase:
+def _heard(recogniser: Recogniser, clip: SpokenClip, least: float) -> HeardPhrase:
     reading = recogniser.read(clip.samples)
     phrase = Phrase(began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S), samples=clip.samples)
     return HeardPhrase(phrase=phrase, transcript=reading, judgement=judge(reading, "", least))
 
 
 def _share(
-    holds: Callable[[Typed, Answer], bool], typed: Sequence[Typed], answers: Sequence[Answer | None]
+    holds: Callable[[Typed, PlannerAnswer], bool],
+    typed: Sequence[Typed],
+    answers: Sequence[PlannerAnswer | None],
 ) -> float:
     pairs = zip(typed, answers, strict=True)
     return float(np.mean([answer is not None and holds(one, answer) for one, answer in pairs]))
 
 
-def _is_same(typed: Typed, answer: Answer) -> bool:
+def _is_same(typed: Typed, answer: PlannerAnswer) -> bool:
     plans = answer.outcome == PLAN or answer.reads_back
     return plans and _steps(answer) == _steps(typed.answer)
 
 
-def _is_read_back(typed: Typed, answer: Answer) -> bool:
+def _is_read_back(typed: Typed, answer: PlannerAnswer) -> bool:
     return _is_same(typed, answer) and answer.reads_back and not typed.answer.reads_back
 
 
-def _runs_another(typed: Typed, answer: Answer) -> bool:
+def _runs_another(typed: Typed, answer: PlannerAnswer) -> bool:
     """Tell whether something else than was said would be done, and nobody is asked before."""
     return answer.outcome == PLAN and not _is_same(typed, answer)
 
 
-def _steps(answer: Answer) -> list[tuple[str, Any]]:
+def _steps(answer: PlannerAnswer) -> list[tuple[str, Any]]:
     plan = answer.plan or {}
     return [(one["skill"], one.get("parameters", {})) for one in plan.get("actions", [])]
 

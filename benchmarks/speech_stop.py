@@ -28,7 +28,7 @@ from benchmarks.speech_stop_listening import (
     delay_figures,
 )
 from benchmarks.speech_stop_talk import Voices, other_talk, phrases, words_alike
-from training.voices.clip import RATE_HZ, Clip, Wave
+from training.voices.clip import RATE_HZ, SpokenClip, Wave
 from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 from training.voices.rooms import draw_room, in_room
@@ -245,7 +245,7 @@ def _drawn(random: np.random.Generator) -> str:
 
 
 def _alarms(
-    ear: StopListening, clip: Clip, snr_db: float | None, random: np.random.Generator
+    ear: StopListening, clip: SpokenClip, snr_db: float | None, random: np.random.Generator
 ) -> list[str]:
     sound = _around(clip.samples, snr_db, _apart(random))
     found = ear.alarms(sound[: -RATE_HZ // 2])

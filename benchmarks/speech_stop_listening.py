@@ -15,13 +15,13 @@ from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
 from vla_deploy.speech.sound import FRAME, FRAME_S, SoundBlock
 from vla_deploy.speech.stop_words.spotter import Spotted, open_spotter
-from vla_deploy.speech.verdict import Verdict
+from vla_deploy.speech.verdict import PhraseVerdict
 
 SPOTTER, WORDS = "spotter", "words"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Alarm:
+class StopAlarm:
     """Hold a word and who heard it, when the button is hit, and what the last block took."""
 
     word: str
@@ -69,7 +69,7 @@ class StopListening:
         """Return how much was heard."""
         return self._count / RATE_HZ
 
-    def alarms(self, sound: Wave) -> Iterator[Alarm]:
+    def alarms(self, sound: Wave) -> Iterator[StopAlarm]:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
         self.scores = []
@@ -84,7 +84,7 @@ class StopListening:
                 took_s = time.perf_counter() - began_s
                 self.busy_s[by] += time.process_time() - busy_s
                 if word:
-                    yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
+                    yield StopAlarm(word=word, by=by, at_s=at_s, computed_s=took_s)
             self.scores.append((at_s, self.spotter.score))
 
     def _spot(self, frame: SoundBlock) -> str:
@@ -94,4 +94,4 @@ class StopListening:
     def _read(self, frame: SoundBlock) -> str:
         self._asr.feed(frame, None)
         told = list(self._asr.heard())
-        return next((one.text for one in told if one.judgement.verdict is Verdict.STOP), "")
+        return next((one.text for one in told if one.judgement.verdict is PhraseVerdict.STOP), "")

@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from training.stop_words.cast import PARTS, Part, draw_style
+from training.stop_words.cast import PARTS, CastPart, draw_style
 from training.stop_words.texts import is_clean
 from training.stop_words.timing import word_times
-from training.voices.clip import RATE_HZ, Clip, Wave
+from training.voices.clip import RATE_HZ, SpokenClip, Wave
 from training.voices.errors import EngineMissing, SynthesisFailed
 from vla_deploy.speech.sound import NOTHING
 
@@ -96,7 +96,7 @@ class Voices:
         """Tell whether words within a phrase can be timed."""
         return self._parts[engine].tells_times
 
-    def say(self, engine: str, text: str, random: np.random.Generator) -> Clip | None:
+    def say(self, engine: str, text: str, random: np.random.Generator) -> SpokenClip | None:
         """Let a voice say a text; None where that one cannot."""
         part = self._parts[engine]
         both = part.voices and part.held_voices
@@ -104,7 +104,7 @@ class Voices:
         voice = kept[int(random.integers(len(kept)))]
         return self._spoken(part, text, voice, random)
 
-    def before(self, clip: Clip, random: np.random.Generator) -> Wave:
+    def before(self, clip: SpokenClip, random: np.random.Generator) -> Wave:
         """Let the voice of a clip say something else first; return the end of it and a pause."""
         texts = _overheard()
         text = texts[int(random.integers(len(texts)))]
@@ -115,8 +115,8 @@ class Voices:
         return np.pad(kept, (0, round(RATE_HZ * random.uniform(*_PAUSE_S))))
 
     def _spoken(
-        self, part: Part, text: str, voice: str, random: np.random.Generator
-    ) -> Clip | None:
+        self, part: CastPart, text: str, voice: str, random: np.random.Generator
+    ) -> SpokenClip | None:
         try:
             return part.speak(text, voice, draw_style(random))
         except SynthesisFailed:
@@ -125,7 +125,7 @@ class Voices:
 
 def phrases(
     voices: Voices, engine: str, count: int, random: np.random.Generator
-) -> Iterator[tuple[Clip, tuple[float, float]]]:
+) -> Iterator[tuple[SpokenClip, tuple[float, float]]]:
     """Yield phrases with one stop word, each with when it was said, in seconds."""
     for number in range(count):
         word = _WORDS[number % len(_WORDS)]
@@ -141,17 +141,19 @@ def phrases(
             yield clip, times[0]
 
 
-def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
+def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[SpokenClip]:
     """Yield talk of other things without a stop word, without end."""
     return _endless([*_overheard(), *_documented()], voices, random)
 
 
-def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
+def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[SpokenClip]:
     """Yield sentences made of words that sound like a stop word, without end."""
     return _endless(_NEAR, voices, random)
 
 
-def _endless(texts: Sequence[str], voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
+def _endless(
+    texts: Sequence[str], voices: Voices, random: np.random.Generator
+) -> Iterator[SpokenClip]:
     engines = voices.engines
     while True:
         text = texts[int(random.integers(len(texts)))]
@@ -163,7 +165,7 @@ def _endless(texts: Sequence[str], voices: Voices, random: np.random.Generator) 
             yield clip
 
 
-def _all_voices(part: Part) -> tuple[str, ...]:
+def _all_voices(part: CastPart) -> tuple[str, ...]:
     return (*part.voices, *part.held_voices)
 
 

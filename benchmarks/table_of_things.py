@@ -30,7 +30,7 @@ Pose = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
+class ThingShape:
     """Give a thing's size, and how high its body's origin and centre of mass lie in it."""
 
     kind: str
@@ -40,20 +40,37 @@ class Shape:
     mass_at_m: float
 
 
-SHAPES: Final[Mapping[str, Shape]] = MappingProxyType(
+SHAPES: Final[Mapping[str, ThingShape]] = MappingProxyType(
     {
-        "box": Shape(kind="box", colour="orange", size_m=(0.232, 0.232, 0.128), origin_m=0.0,
-                     mass_at_m=0.0424),
-        "red_cup": Shape(kind="cup", colour="red", size_m=(0.066, 0.066, 0.095), origin_m=0.0475,
-                         mass_at_m=0.0475),
-        "blue_ball": Shape(kind="ball", colour="blue", size_m=(0.05, 0.05, 0.05), origin_m=0.025,
-                           mass_at_m=0.025),
-        "book": Shape(kind="book", colour="purple", size_m=(0.15, 0.065, 0.04), origin_m=0.02,
-                      mass_at_m=0.02),
-        "bottle": Shape(kind="bottle", colour="green", size_m=(0.06, 0.06, 0.18), origin_m=0.09,
-                        mass_at_m=0.0725),
+        "box": ThingShape(
+            kind="box",
+            colour="orange",
+            size_m=(0.232, 0.232, 0.128),
+            origin_m=0.0,
+            mass_at_m=0.0424,
+        ),
+        "red_cup": ThingShape(
+            kind="cup",
+            colour="red",
+            size_m=(0.066, 0.066, 0.095),
+            origin_m=0.0475,
+            mass_at_m=0.0475,
+        ),
+        "blue_ball": ThingShape(
+            kind="ball", colour="blue", size_m=(0.05, 0.05, 0.05), origin_m=0.025, mass_at_m=0.025
+        ),
+        "book": ThingShape(
+            kind="book", colour="purple", size_m=(0.15, 0.065, 0.04), origin_m=0.02, mass_at_m=0.02
+        ),
+        "bottle": ThingShape(
+            kind="bottle",
+            colour="green",
+            size_m=(0.06, 0.06, 0.18),
+            origin_m=0.09,
+            mass_at_m=0.0725,
+        ),
     }
-)  # fmt: skip
+)
 
 
 def draw_arrangement(random: np.random.Generator) -> dict[str, Pose]:

@@ -21,14 +21,22 @@ from drivers.canopen.objects import (
 from drivers.canopen.sdo import SdoClient
 from drivers.clock import NS_PER_S, Clock
 from drivers.errors import NoReply, ProtocolError, WrongDevice
-from drivers.odrive.codec import MESSAGES, AxisError, AxisState, Command, can_id, decode, split_id
+from drivers.odrive.codec import (
+    MESSAGES,
+    AxisError,
+    AxisState,
+    OdriveCommand,
+    can_id,
+    decode,
+    split_id,
+)
 from drivers.stepping import side_by_side, until
 
 LISTEN_NS: Final = NS_PER_S // 2
 ANSWER_NS: Final = 200_000_000
 NODES_AT_ONCE: Final = 8  # a SocketCAN transmit queue holds ten frames
 MAX_CANOPEN_NODE: Final = 127
-_HEARTBEAT_SIZES: Final = (MESSAGES[Command.HEARTBEAT].wire.size, 8)
+_HEARTBEAT_SIZES: Final = (MESSAGES[OdriveCommand.HEARTBEAT].wire.size, 8)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -88,7 +96,7 @@ class BusScan:
         yield from self._listen(LISTEN_NS)
         if self._odrive:
             for node_id in self.report.axes:
-                self._link.send(can_id(node_id, Command.GET_VERSION), remote=True)
+                self._link.send(can_id(node_id, OdriveCommand.GET_VERSION), remote=True)
             yield from self._listen(ANSWER_NS if self.report.axes else 0)
         if self._canopen:
             self.report.probed = not self.report.axes
@@ -146,8 +154,8 @@ class BusScan:
             self._hear_axis(*split_id(arbitration_id), data)
 
     def _hear_axis(self, node_id: int, command: int, data: bytes) -> None:
-        if command == Command.HEARTBEAT and len(data) in _HEARTBEAT_SIZES:
-            errors, state, *_ = decode(Command.HEARTBEAT, data)
+        if command == OdriveCommand.HEARTBEAT and len(data) in _HEARTBEAT_SIZES:
+            errors, state, *_ = decode(OdriveCommand.HEARTBEAT, data)
             if state not in set(AxisState):
                 return
             words = str(AxisError(int(errors)).name) if errors else "none"
@@ -155,6 +163,6 @@ class BusScan:
             known = self.report.axes.get(node_id)
             axis.firmware = axis.firmware if known is None else known.firmware
             self.report.axes[node_id] = axis
-        elif command == Command.GET_VERSION and node_id in self.report.axes:
-            version = decode(Command.GET_VERSION, data)
+        elif command == OdriveCommand.GET_VERSION and node_id in self.report.axes:
+            version = decode(OdriveCommand.GET_VERSION, data)
             self.report.axes[node_id].firmware = ".".join(map(str, version[4:7]))

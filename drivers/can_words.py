@@ -25,9 +25,9 @@ from drivers.odrive.codec import (
     MESSAGES,
     AxisError,
     AxisState,
-    Command,
     ControlMode,
     InputMode,
+    OdriveCommand,
     decode,
     split_id,
 )
@@ -139,9 +139,9 @@ def describe_odrive(frame: can.Message) -> Words:
         return outside
     node_id, number = split_id(frame.arbitration_id)
     node = None if node_id == BROADCAST_NODE_ID else node_id
-    if number not in set(Command):
+    if number not in set(OdriveCommand):
         return Words(kind=f"command 0x{number:02X}", node=node, text="")
-    command = Command(number)
+    command = OdriveCommand(number)
     if frame.is_remote_frame:
         text = "asked for by a remote frame"
     else:
@@ -172,7 +172,7 @@ def _errors(bits: int) -> str:
     return str(AxisError(bits).name) if bits else "none"
 
 
-def _signals(command: Command, data: bytes) -> str:
+def _signals(command: OdriveCommand, data: bytes) -> str:
     names = MESSAGES[command].signals
     return ", ".join(
         f"{name} {_value(name, value)}"

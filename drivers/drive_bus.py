@@ -23,7 +23,7 @@ class PowerState(Enum):
     FAULT = "fault"
 
 
-class Goal(Enum):
+class DriveGoal(Enum):
     """Name what the host wants of all its drives."""
 
     DISABLED = "disabled"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.can_link import CanLink
 from drivers.clock import Clock
 from drivers.cyclic_port import CyclicPort
-from drivers.drive_bus import DriveState, Goal, PowerState, ResetRule
+from drivers.drive_bus import DriveGoal, DriveState, PowerState, ResetRule
 from drivers.drive_goal import DrivesSeen, GoalKeeper
 from drivers.errors import LinkLost, ProtocolError
 from drivers.node_budget import NodeBudget
@@ -71,7 +71,7 @@ class DriveCycle(ABC, Generic[P]):
     @property
     def enabled(self) -> bool:
         """Tell whether every drive follows its velocity and is meant to."""
-        return self._goals.goal is Goal.ENABLED and self._all_enabled()
+        return self._goals.goal is DriveGoal.ENABLED and self._all_enabled()
 
     def _all_enabled(self) -> bool:
         # Asked several times a tick: a generator would take three times as long.

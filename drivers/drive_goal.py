@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.drive_bus import Goal
+from drivers.drive_bus import DriveGoal
 
 FAULT_RESET_NS: Final = NS_PER_S // 2
 BRAKE_TIMEOUT_NS: Final = 5 * NS_PER_S
@@ -24,39 +24,39 @@ class GoalKeeper:
     """Hold the goal: enabled drives that fail are braked, braked drives lose their power."""
 
     def __init__(self) -> None:
-        self.goal = Goal.DISABLED
+        self.goal = DriveGoal.DISABLED
         self._was_enabled = False
         self._until_ns = 0
 
     def enable(self) -> None:
         """Want all drives to follow."""
-        self.goal = Goal.ENABLED
+        self.goal = DriveGoal.ENABLED
         self._was_enabled = False
 
     def disable(self) -> None:
         """Want all drives without power."""
-        self.goal = Goal.DISABLED
+        self.goal = DriveGoal.DISABLED
 
     def quick_stop(self, now_ns: int) -> None:
         """Want all drives to brake, and then to be without power."""
-        if self.goal is not Goal.QUICK_STOP:
-            self.goal = Goal.QUICK_STOP
+        if self.goal is not DriveGoal.QUICK_STOP:
+            self.goal = DriveGoal.QUICK_STOP
             self._until_ns = now_ns + BRAKE_TIMEOUT_NS
 
     def reset_fault(self, now_ns: int) -> None:
         """Want all drives out of their faults for a while, and then without power."""
-        self.goal = Goal.FAULT_RESET
+        self.goal = DriveGoal.FAULT_RESET
         self._until_ns = now_ns + FAULT_RESET_NS
 
     def advance(self, seen: DrivesSeen, now_ns: int) -> None:
         """Change the goal where it is reached, out of reach or out of time."""
         late = now_ns > self._until_ns
-        if self.goal is Goal.ENABLED:
+        if self.goal is DriveGoal.ENABLED:
             fell_out = self._was_enabled and not seen.all_enabled
             self._was_enabled = seen.all_enabled
             if fell_out or seen.any_lost or seen.any_faulted:
                 self.quick_stop(now_ns)
-        elif (self.goal is Goal.QUICK_STOP and (late or not seen.any_braking)) or (
-            self.goal is Goal.FAULT_RESET and (late or not seen.any_faulted)
+        elif (self.goal is DriveGoal.QUICK_STOP and (late or not seen.any_braking)) or (
+            self.goal is DriveGoal.FAULT_RESET and (late or not seen.any_faulted)
         ):
             self.disable()

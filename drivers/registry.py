@@ -18,7 +18,7 @@ from drivers.imu.base import Imu
 from drivers.lidar.base import Lidar
 
 
-class Kind(Enum):
+class SensorKind(Enum):
     """Name the kinds of sensor that a robot file may declare by model."""
 
     LIDAR = "lidar"
@@ -34,21 +34,21 @@ class SensorModel:
     baud: int = 0
 
 
-MODELS: Final[Mapping[tuple[Kind, str], SensorModel]] = MappingProxyType(
+MODELS: Final[Mapping[tuple[SensorKind, str], SensorModel]] = MappingProxyType(
     {
-        (Kind.LIDAR, "LD19"): SensorModel("drivers.lidar.ld19:Ld19", 230_400),
-        (Kind.IMU, "BNO085-RVC"): SensorModel("drivers.imu.bno085_rvc:Bno085Rvc", 115_200),
-        (Kind.CAMERA, "RGBD-STREAM"): SensorModel("drivers.camera.rgbd_stream:RgbdCamera"),
+        (SensorKind.LIDAR, "LD19"): SensorModel("drivers.lidar.ld19:Ld19", 230_400),
+        (SensorKind.IMU, "BNO085-RVC"): SensorModel("drivers.imu.bno085_rvc:Bno085Rvc", 115_200),
+        (SensorKind.CAMERA, "RGBD-STREAM"): SensorModel("drivers.camera.rgbd_stream:RgbdCamera"),
     }
 )
 
 
-def model_names(kind: Kind) -> tuple[str, ...]:
+def model_names(kind: SensorKind) -> tuple[str, ...]:
     """Return the models of a kind that have a driver."""
     return tuple(name for known, name in MODELS if known is kind)
 
 
-def sensor_model(kind: Kind, model: str) -> SensorModel:
+def sensor_model(kind: SensorKind, model: str) -> SensorModel:
     """Return a model's row.
 
     Raises:
@@ -71,7 +71,7 @@ def open_lidar(
     Raises:
         UnknownModel: no driver knows the model.
     """
-    driver = _driver(Kind.LIDAR, model)
+    driver = _driver(SensorKind.LIDAR, model)
     return cast("Lidar", driver(line, clock, mounting_yaw_rad=mounting_yaw_rad))
 
 
@@ -81,7 +81,7 @@ def open_imu(model: str, line: ByteTransport, clock: Clock) -> Imu:
     Raises:
         UnknownModel: no driver knows the model.
     """
-    return cast("Imu", _driver(Kind.IMU, model)(line, clock))
+    return cast("Imu", _driver(SensorKind.IMU, model)(line, clock))
 
 
 def open_camera(
@@ -94,11 +94,11 @@ def open_camera(
         ValueError: the camera cannot have that rate.
         LinkLost: the stream has gone.
     """
-    camera = _driver(Kind.CAMERA, model)(stream, clock)
+    camera = _driver(SensorKind.CAMERA, model)(stream, clock)
     camera.start(rate_hz)
     return cast("Camera[RgbdFrame]", camera)
 
 
-def _driver(kind: Kind, model: str) -> Any:
+def _driver(kind: SensorKind, model: str) -> Any:
     module, name = sensor_model(kind, model).driver.split(":")
     return getattr(import_module(module), name)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 GIB: Final = 1 << 30
 _MODULE: Final = re.compile(r"\bp(?:3767|3701|3834)-\d{4}\b")
@@ -108,7 +108,7 @@ def _device_tree(tree: Tree, name: str, reasons: list[str]) -> str:
     for folder in tried:
         try:
             return tree.text(f"{folder}/{name}")
-        except Missing as missing:
+        except ValueMissing as missing:
             reason = f"{name} of the board is missing, because {missing}"
     reasons.append(reason)
     return ""
@@ -118,7 +118,7 @@ def _product(tree: Tree) -> str:
     """Return the name that the firmware of a PC tells."""
     try:
         vendor, product = (tree.text(f"/sys/class/dmi/id/{key}") for key in _PRODUCT)
-    except Missing:
+    except ValueMissing:
         return "computer without device tree"
     return f"{vendor} {product}"
 
@@ -126,7 +126,7 @@ def _product(tree: Tree) -> str:
 def _memory_bytes(tree: Tree, reasons: list[str]) -> int | None:
     try:
         text = tree.text("/proc/meminfo")
-    except Missing as missing:
+    except ValueMissing as missing:
         reasons.append(f"the memory's size is missing, because {missing}")
         return None
     found = re.search(r"^MemTotal:\s+(\d{1,15}) kB", text, re.MULTILINE)
@@ -139,7 +139,7 @@ def _memory_bytes(tree: Tree, reasons: list[str]) -> int | None:
 def _l4t(tree: Tree, reasons: list[str]) -> str | None:
     try:
         found = _RELEASE.search(tree.text("/etc/nv_tegra_release"))
-    except Missing as missing:
+    except ValueMissing as missing:
         reasons.append(f"the L4T release is missing, because {missing}")
         return None
     if found is None:
@@ -161,7 +161,7 @@ def _is_super(tree: Tree, model: str, compatible: str) -> bool:
         return True
     try:
         return "MAXN_SUPER" in tree.text("/etc/nvpmodel.conf")
-    except Missing:
+    except ValueMissing:
         return False
 
 

@@ -12,7 +12,7 @@ from typing import Final
 from platforms.errors import ProfileError
 from platforms.power_service import SOCKET, ask_for_mode
 from platforms.probes.power_mode import CONFIGURATION, PowerModes, read_power_modes
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 NVPMODEL: Final = ("/usr/sbin/nvpmodel",)
 _TIMEOUT_S: Final = 10.0
@@ -96,7 +96,7 @@ class PowerSwitch:
         """Return what each mode says about the units that get power."""
         try:
             text = self._tree.text(CONFIGURATION)
-        except Missing:
+        except ValueMissing:
             return {}
         return {
             int(number): tuple(sorted(_MASK.findall(body)))

@@ -14,7 +14,7 @@ from platforms.ladder import (
 )
 from platforms.profile_check import cross_faults
 from platforms.profile_schema import schema_faults
-from platforms.profile_source import PROFILES, Source, Table, read_source
+from platforms.profile_source import PROFILES, ProfileSource, Table, read_source
 
 __all__ = [
     "PROFILES",
@@ -145,7 +145,7 @@ def load_profile(name_or_path: str | Path) -> Profile:
     return profile_from(read_source(name_or_path))
 
 
-def profile_from(source: Source) -> Profile:
+def profile_from(source: ProfileSource) -> Profile:
     """Validate what was read, completely.
 
     Raises:

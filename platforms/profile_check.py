@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from platforms.ladder import LadderAction
-from platforms.profile_schema import Fault
+from platforms.profile_schema import ProfileFault
 from platforms.profile_source import Table
 
 MIN_WATCHDOG_PERIODS: Final = 3
@@ -21,13 +21,13 @@ _TIERED_ROLES: Final = {
 _RANKS: Final = {action: rank for rank, action in enumerate(LadderAction)}
 
 
-def cross_faults(values: Table) -> Iterator[Fault]:
+def cross_faults(values: Table) -> Iterator[ProfileFault]:
     """Find every contradiction in values that are each in their range."""
     for check in _CHECKS:
         yield from check(values)
 
 
-def _watchdogs(values: Table) -> Iterator[Fault]:
+def _watchdogs(values: Table) -> Iterator[ProfileFault]:
     shortest_s = MIN_WATCHDOG_PERIODS / values["control_rate_hz"]
     for key in ("bus_watchdog_s", "can_heartbeat_s"):
         if values[key] < shortest_s:
@@ -35,19 +35,19 @@ def _watchdogs(values: Table) -> Iterator[Fault]:
                 f"expected at least {MIN_WATCHDOG_PERIODS} control periods ({shortest_s:g} s), "
                 f"got {values[key]!r}"
             )
-            yield Fault(key=key, text=text)
+            yield ProfileFault(key=key, text=text)
 
 
-def _perception(values: Table) -> Iterator[Fault]:
+def _perception(values: Table) -> Iterator[ProfileFault]:
     if values["perception_rate_hz"] > values["camera_rate_hz"]:
         text = (
             f"expected at most camera_rate_hz ({values['camera_rate_hz']:g} Hz), "
             f"got {values['perception_rate_hz']!r}"
         )
-        yield Fault(key="perception_rate_hz", text=text)
+        yield ProfileFault(key="perception_rate_hz", text=text)
 
 
-def _speech(values: Table) -> Iterator[Fault]:
+def _speech(values: Table) -> Iterator[ProfileFault]:
     speech = values["speech"]
     for key, least in (
         ("unfinished_silence_s", "end_silence_s"),
@@ -55,19 +55,19 @@ def _speech(values: Table) -> Iterator[Fault]:
     ):
         if speech[key] < speech[least]:
             text = f"expected at least {least} ({speech[least]:g} s), got {speech[key]!r}"
-            yield Fault(key=f"speech.{key}", text=text)
+            yield ProfileFault(key=f"speech.{key}", text=text)
 
 
-def _affinities(values: Table) -> Iterator[Fault]:
+def _affinities(values: Table) -> Iterator[ProfileFault]:
     count = values["board"]["cpu_count"]
     for process, settings in values["processes"].items():
         beyond = [cpu for cpu in settings["affinity"] if cpu >= count]
         if beyond:
             text = f"expected CPUs of the board, 0 to {count - 1}, got {beyond}"
-            yield Fault(key=f"processes.{process}.affinity", text=text)
+            yield ProfileFault(key=f"processes.{process}.affinity", text=text)
 
 
-def _budget_sums(values: Table) -> Iterator[Fault]:
+def _budget_sums(values: Table) -> Iterator[ProfileFault]:
     budgets = values["budgets"]
     for key, unit in (("memory_mb", "MB"), ("cpu_ratio", "cores")):
         total = budgets["total"][key]
@@ -76,10 +76,10 @@ def _budget_sums(values: Table) -> Iterator[Fault]:
         )
         if asked > total:
             text = f"expected at least the {asked:g} {unit} of all processes, got {total!r}"
-            yield Fault(key=f"budgets.total.{key}", text=text)
+            yield ProfileFault(key=f"budgets.total.{key}", text=text)
 
 
-def _board_limits(values: Table) -> Iterator[Fault]:
+def _board_limits(values: Table) -> Iterator[ProfileFault]:
     board, total = values["board"], values["budgets"]["total"]
     for key, has in (
         ("memory_mb", board["memory_mb"]),
@@ -88,10 +88,10 @@ def _board_limits(values: Table) -> Iterator[Fault]:
     ):
         if total.get(key, 0) > has:
             text = f"expected at most the {has:g} that the board has, got {total[key]!r}"
-            yield Fault(key=f"budgets.total.{key}", text=text)
+            yield ProfileFault(key=f"budgets.total.{key}", text=text)
 
 
-def _ladder_order(values: Table) -> Iterator[Fault]:
+def _ladder_order(values: Table) -> Iterator[ProfileFault]:
     actions = [LadderAction(step["action"]) for step in values["ladder"]]
     for number in range(1, len(actions)):
         if _RANKS[actions[number]] < _RANKS[actions[number - 1]]:
@@ -99,13 +99,13 @@ def _ladder_order(values: Table) -> Iterator[Fault]:
                 f"expected the order {' -> '.join(LadderAction)}, "
                 f"got {actions[number]} after {actions[number - 1]}"
             )
-            yield Fault(key=f"ladder[{number}].action", text=text)
+            yield ProfileFault(key=f"ladder[{number}].action", text=text)
 
 
-def _ladder_steps(values: Table) -> Iterator[Fault]:
+def _ladder_steps(values: Table) -> Iterator[ProfileFault]:
     for number, step in enumerate(values["ladder"]):
         for key, text in _step_faults(step, tuple(values["processes"])):
-            yield Fault(key=f"ladder[{number}].{key}", text=text)
+            yield ProfileFault(key=f"ladder[{number}].{key}", text=text)
 
 
 def _step_faults(step: Table, processes: tuple[str, ...]) -> Iterator[tuple[str, str]]:
@@ -123,7 +123,7 @@ def _step_faults(step: Table, processes: tuple[str, ...]) -> Iterator[tuple[str,
         yield "ratio", f"expected nothing, only slow has a ratio, got {step['ratio']!r}"
 
 
-def _smaller_models(values: Table) -> Iterator[Fault]:
+def _smaller_models(values: Table) -> Iterator[ProfileFault]:
     """Find steps that would load the same model a second time, under want of memory."""
     wanted: Counter[str] = Counter()
     for number, step in enumerate(values["ladder"]):
@@ -137,10 +137,10 @@ def _smaller_models(values: Table) -> Iterator[Fault]:
             continue
         models = f"models.{role}.tiers has {', '.join(tiers) or 'nothing'}" if role else "no models"
         text = f"expected a smaller model of {process} to go to, got none: {models}"
-        yield Fault(key=f"ladder[{number}].action", text=text)
+        yield ProfileFault(key=f"ladder[{number}].action", text=text)
 
 
-_CHECKS: Final[tuple[Callable[[Table], Iterator[Fault]], ...]] = (
+_CHECKS: Final[tuple[Callable[[Table], Iterator[ProfileFault]], ...]] = (
     _watchdogs,
     _perception,
     _speech,

@@ -47,7 +47,7 @@ _PRECISIONS: Final = ("fp32", "fp16", "int8", "int4")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fault:
+class ProfileFault:
     """Tell what is wrong with one key."""
 
     key: str
@@ -57,7 +57,7 @@ class Fault:
         return f"{self.key}: {self.text}"
 
 
-class Rule(Protocol):
+class ValueRule(Protocol):
     """Say in words what a value may be, and whether one is."""
 
     def allows(self, value: object) -> bool:
@@ -114,7 +114,7 @@ class _OneOf:
 class _ListOf:
     """Allow lists without repetition, empty ones only where `empty`."""
 
-    rule: Rule
+    rule: ValueRule
     empty: bool = False
 
     def __str__(self) -> str:
@@ -126,7 +126,7 @@ class _ListOf:
         return all(map(self.rule.allows, value)) and len({str(one) for one in value}) == len(value)
 
 
-Keys = Mapping[str, Rule]
+Keys = Mapping[str, ValueRule]
 _MEMORY_MB: Final = _Range(1, 262_144, "MB")
 _CORES: Final = _Range(0.01, 64, "cores")
 _TOP: Keys = {
@@ -191,7 +191,7 @@ _TABLES: Final = (
 )  # fmt: skip
 
 
-def schema_faults(values: Table) -> Iterator[Fault]:
+def schema_faults(values: Table) -> Iterator[ProfileFault]:
     """Find every key that is unknown, missing or out of its range."""
     plain = {key: value for key, value in values.items() if key not in _TABLES}
     yield from _table_faults("", plain, _TOP)
@@ -205,12 +205,12 @@ def schema_faults(values: Table) -> Iterator[Fault]:
     yield from _table_faults("ladder_timing", values.get("ladder_timing"), _TIMING)
 
 
-def _model_faults(models: object) -> Iterator[Fault]:
+def _model_faults(models: object) -> Iterator[ProfileFault]:
     given = tuple(role for role in ROLES if isinstance(models, dict) and role in models)
     yield from _group_faults("models", models, given, _MODEL, _MODEL_OPTIONAL, known=ROLES)
 
 
-def _budget_faults(budgets: object) -> Iterator[Fault]:
+def _budget_faults(budgets: object) -> Iterator[ProfileFault]:
     processes: object = budgets
     if isinstance(budgets, dict):
         processes = {name: table for name, table in budgets.items() if name != "total"}
@@ -219,10 +219,10 @@ def _budget_faults(budgets: object) -> Iterator[Fault]:
     yield from _group_faults("budgets", processes, PROCESSES, _BUDGET)
 
 
-def _ladder_faults(ladder: object) -> Iterator[Fault]:
+def _ladder_faults(ladder: object) -> Iterator[ProfileFault]:
     if not isinstance(ladder, list):
         text = f"expected a list of steps with {', '.join(_STEP)}, got {_shown(ladder)}"
-        yield Fault(key="ladder", text=text)
+        yield ProfileFault(key="ladder", text=text)
         return
     for number, step in enumerate(ladder):
         yield from _table_faults(f"ladder[{number}]", step, _STEP, _STEP_OPTIONAL)
@@ -235,35 +235,37 @@ def _group_faults(
     keys: Keys,
     optional: Keys | None = None,
     known: tuple[str, ...] = (),
-) -> Iterator[Fault]:
+) -> Iterator[ProfileFault]:
     """Check tables of tables, one for each name wanted."""
     names = known or wanted
     if not isinstance(group, dict):
         text = f"expected a table for each of {', '.join(names)}, got {_shown(group)}"
-        yield Fault(key=where, text=text)
+        yield ProfileFault(key=where, text=text)
         return
     for name in sorted(group.keys() - set(names)):
-        yield Fault(key=f"{where}.{name}", text=f"unknown, expected one of {', '.join(names)}")
+        yield ProfileFault(
+            key=f"{where}.{name}", text=f"unknown, expected one of {', '.join(names)}"
+        )
     for name in wanted:
         yield from _table_faults(f"{where}.{name}", group.get(name), keys, optional)
 
 
 def _table_faults(
     where: str, table: object, keys: Keys, optional: Keys | None = None
-) -> Iterator[Fault]:
+) -> Iterator[ProfileFault]:
     every = {**keys, **(optional or {})}
     if not isinstance(table, dict):
         text = f"expected a table with {', '.join(keys)}, got {_shown(table)}"
-        yield Fault(key=where, text=text)
+        yield ProfileFault(key=where, text=text)
         return
     prefix = f"{where}." if where else ""
     for key in table.keys() - every.keys():
-        yield Fault(key=f"{prefix}{key}", text=f"unknown key, expected {', '.join(every)}")
+        yield ProfileFault(key=f"{prefix}{key}", text=f"unknown key, expected {', '.join(every)}")
     for key, rule in every.items():
         if key in table and not rule.allows(table[key]):
-            yield Fault(key=f"{prefix}{key}", text=f"expected {rule}, got {table[key]!r}")
+            yield ProfileFault(key=f"{prefix}{key}", text=f"expected {rule}, got {table[key]!r}")
         elif key in keys and key not in table:
-            yield Fault(key=f"{prefix}{key}", text=f"expected {rule}, got nothing")
+            yield ProfileFault(key=f"{prefix}{key}", text=f"expected {rule}, got nothing")
 
 
 def _shown(value: object) -> str:

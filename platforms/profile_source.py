@@ -13,7 +13,7 @@ Table = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class ProfileSource:
     """Hold a profile as it stands in its files; `origins` says which file set each dotted key.
 
     `parents` are what it inherits from, the nearest first.
@@ -26,7 +26,7 @@ class Source:
     parents: tuple[str, ...] = ()
 
     @classmethod
-    def of_values(cls, name_or_path: str, values: Table) -> "Source":
+    def of_values(cls, name_or_path: str, values: Table) -> "ProfileSource":
         """Return what another process has read."""
         path = Path(name_or_path)
         return cls(name=path.stem, path=path, values=values, origins={})
@@ -36,7 +36,7 @@ class Source:
         return self.origins.get(key.partition("[")[0], self.path)
 
 
-def read_source(name_or_path: str | Path) -> Source:
+def read_source(name_or_path: str | Path) -> ProfileSource:
     """Read a profile by its name, or by a path that ends in .toml, and merge what it inherits.
 
     Raises:
@@ -51,7 +51,7 @@ def read_source(name_or_path: str | Path) -> Source:
         values = merged(values, own)
         origins |= dict.fromkeys((key for key, _ in flat(own)), file)
     parents = tuple(file.stem for file, _ in chain[1:])
-    return Source(name=path.stem, path=path, values=values, origins=origins, parents=parents)
+    return ProfileSource(name=path.stem, path=path, values=values, origins=origins, parents=parents)
 
 
 def flat(table: Table, prefix: str = "") -> Iterator[tuple[str, Any]]:

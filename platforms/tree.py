@@ -1,7 +1,8 @@
 """Read small system files below a root, and say why where that does not work.
 
 A board lacks most of the files that another one has, some belong to root, some fail while a unit
-sleeps, and some vanish between two reads. All of that is normal: one exception, `Missing`, says it.
+sleeps, and some vanish between two reads. All of that is normal: one exception, `ValueMissing`,
+says it.
 """
 
 import os
@@ -18,7 +19,7 @@ _REASONS: Final = {
 }
 
 
-class Missing(Exception):
+class ValueMissing(Exception):
     """Say why a number cannot be had; whoever reads turns it into a reading without a value."""
 
 
@@ -45,9 +46,9 @@ class SystemFile:
             return self._content().decode().strip(" \t\r\n\0")
         except OSError as error:
             self.close()
-            raise Missing(_reason(error, self._shown)) from error
+            raise ValueMissing(_reason(error, self._shown)) from error
         except UnicodeDecodeError as error:
-            raise Missing(f"{self._shown} is not text") from error
+            raise ValueMissing(f"{self._shown} is not text") from error
 
     def number(self) -> float:
         """Return the content as a number.
@@ -140,9 +141,9 @@ def number_in(text: str, where: str) -> float:
         value = float(text)
     except ValueError as error:
         shown = f"holds {text[:24]!r}" if text else "is empty"
-        raise Missing(f"{where} {shown}, expected a number") from error
+        raise ValueMissing(f"{where} {shown}, expected a number") from error
     if not abs(value) < float("inf"):
-        raise Missing(f"{where} holds {text[:24]!r}, expected a finite number")
+        raise ValueMissing(f"{where} holds {text[:24]!r}, expected a finite number")
     return value
 
 

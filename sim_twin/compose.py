@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 
 STEP_S = 0.002
 ROBOT_ROOT = "base"
@@ -28,7 +28,9 @@ def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
     world = _load(world_xml)
     robot = _load(robot_xml)
     if robot.body(ROBOT_ROOT) is None:
-        raise ModelMismatch(f"{robot_xml}: expected a root body named {ROBOT_ROOT!r}, found none")
+        raise TwinModelMismatch(
+            f"{robot_xml}: expected a root body named {ROBOT_ROOT!r}, found none"
+        )
     for geom in robot.geoms:
         looks = geom.group <= ROBOT_LOOKS_GROUP
         geom.group = ROBOT_LOOKS_GROUP if looks else ROBOT_COLLISION_GROUP
@@ -36,14 +38,14 @@ def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
     try:
         return _attach(robot, world)
     except ValueError as error:
-        raise ModelMismatch(f"{robot_xml} in {world_xml}: {error}") from error
+        raise TwinModelMismatch(f"{robot_xml} in {world_xml}: {error}") from error
 
 
 def _load(path: Path) -> mujoco.MjSpec:
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
-        raise ModelMismatch(f"{path}: {error}") from error
+        raise TwinModelMismatch(f"{path}: {error}") from error
 
 
 def _attach(robot: mujoco.MjSpec, world: mujoco.MjSpec) -> mujoco.MjModel:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from sim_twin.compose import STEP_S
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.held_things import HeldThings
 from sim_twin.probes import MotionProbe, RangeProbe
 from sim_twin.shafts import Shaft, Shafts
@@ -60,7 +60,7 @@ class Engine:
         for name, value in joints.items():
             joint = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name)
             if joint < 0:
-                raise ModelMismatch(f"expected a joint {name!r}, the model has none")
+                raise TwinModelMismatch(f"expected a joint {name!r}, the model has none")
             self.data.qpos[self.model.jnt_qposadr[joint]] = value
         self._follow_couplings()
         mujoco.mj_forward(self.model, self.data)
@@ -75,7 +75,7 @@ class Engine:
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, body)
         joint = self.model.body_jntadr[found] if found >= 0 else -1
         if joint < 0 or self.model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
-            raise ModelMismatch(f"expected a body {body!r} with a free joint, found none")
+            raise TwinModelMismatch(f"expected a body {body!r} with a free joint, found none")
         return int(joint)
 
     def _follow_couplings(self) -> None:

@@ -19,7 +19,7 @@ class OpenGLMissing(TwinError):
     """Say that nothing can be rendered on this machine, and how to change that."""
 
 
-class ModelMismatch(TwinError):
+class TwinModelMismatch(TwinError):
     """Say that the robot or the world lacks a part that the twin needs."""
 
 
@@ -27,7 +27,7 @@ class RefereeRefusal(TwinError):
     """Say why the referee cannot answer."""
 
 
-class Unreachable(TwinError):
+class TwinUnreachable(TwinError):
     """Say that no twin answers."""
 
 

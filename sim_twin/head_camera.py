@@ -11,14 +11,14 @@ from drivers.camera.protocol import (
     BYTES_PER_PIXEL,
     CRC,
     HEADER_BYTES,
-    Command,
+    CameraCommand,
     encode_request,
 )
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.renderer import Renderer, fixed_camera
 from sim_twin.sensors.camera import CameraDevice
-from vla_deploy.robots.description import Camera
+from vla_deploy.robots.description import CameraDescription
 
 _FOVY_TOLERANCE_RAD = 1e-3
 
@@ -30,7 +30,7 @@ class HeadCamera:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        camera: Camera,
+        camera: CameraDescription,
         seed: int,
         *,
         latency_s: float = 0.0,
@@ -69,7 +69,7 @@ class HeadCamera:
 
     def hang_up(self) -> None:
         """Stop streaming because the client has gone."""
-        self.device.receive(encode_request(Command.STOP, 0.0))
+        self.device.receive(encode_request(CameraCommand.STOP, 0.0))
 
     def close(self) -> None:
         """Release OpenGL."""
@@ -78,16 +78,18 @@ class HeadCamera:
             self._renderer = None
 
 
-def camera_line(head: HeadCamera, camera: Camera, now_ns: Callable[[], int]) -> LineTamper:
+def camera_line(
+    head: HeadCamera, camera: CameraDescription, now_ns: Callable[[], int]
+) -> LineTamper:
     """Return the camera's line, on which faults may act."""
     frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
     return LineTamper(head.device, now_ns, frame_bytes, tells_time=False)
 
 
-def _check_fovy(model: mujoco.MjModel, camera: Camera) -> None:
+def _check_fovy(model: mujoco.MjModel, camera: CameraDescription) -> None:
     fovy_rad = math.radians(float(model.camera(camera.site).fovy[0]))
     if abs(fovy_rad - camera.fovy_rad) > _FOVY_TOLERANCE_RAD:
-        raise ModelMismatch(
+        raise TwinModelMismatch(
             f"camera {camera.site!r}: robot file says fovy_rad = {camera.fovy_rad:.4f}, "
             f"its MJCF {fovy_rad:.4f}; make them agree"
         )

@@ -4,7 +4,7 @@ import mujoco
 
 from sim_twin.compose import ROBOT_ROOT, compose
 from sim_twin.engine import Engine
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.shafts import Shaft
 from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.robots import RobotDescription
@@ -22,7 +22,7 @@ def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
     try:
         return compose(robot.mjcf_path, load_world(world).mjcf_path)
     except FileNotFoundError as error:
-        raise ModelMismatch(str(error)) from error
+        raise TwinModelMismatch(str(error)) from error
 
 
 def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:

@@ -14,7 +14,7 @@ from sim_twin.clock import SimClock
 from sim_twin.device import WireDevice
 from sim_twin.faults import FaultInjector
 from sim_twin.lines import MemoryLine
-from sim_twin.schedule import Closable, Schedule
+from sim_twin.schedule import HeldDevice, Schedule
 from sim_twin.servos import WireTiming
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
@@ -25,7 +25,7 @@ class MemoryOpener:
     """Open the twin's devices in memory; implements `drivers.opener.DeviceOpener`."""
 
     def __init__(self, twin: Twin, clock: SimClock) -> None:
-        self.opened: list[Closable] = []
+        self.opened: list[HeldDevice] = []
         self._twin = twin
         self._clock = clock
 

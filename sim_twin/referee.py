@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sim_twin.errors import RefereeRefusal, TwinError, Unreachable
+from sim_twin.errors import RefereeRefusal, TwinError, TwinUnreachable
 from vla_deploy.client.unix_rpc import request
 
 REFEREE_SOCKET = "referee"
@@ -48,7 +48,7 @@ def ask(run_dir: Path, op: str, **arguments: Any) -> dict[str, Any]:
         answer = request(path, {"op": op, **arguments})
     except OSError as error:
         reason = error.strerror or error
-        raise Unreachable(f"{path}: {reason}; expected a running twin, start one") from error
+        raise TwinUnreachable(f"{path}: {reason}; expected a running twin, start one") from error
     if not answer.pop("ok"):
         raise RefereeRefusal(answer["error"])
     return answer

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_twin.errors import ModelMismatch, OpenGLMissing
+from sim_twin.errors import OpenGLMissing, TwinModelMismatch
 
 APT_LINE = "apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
@@ -117,7 +117,7 @@ def fixed_camera(model: mujoco.MjModel, name: str) -> mujoco.MjvCamera:
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, name)
     if number < 0:
         found = ", ".join(repr(model.camera(one).name) for one in range(model.ncam)) or "none"
-        raise ModelMismatch(
+        raise TwinModelMismatch(
             f'expected a <camera name="{name}"> in the MJCF, as the robot file\'s camera.site, '
             f"found {found}; make them agree"
         )

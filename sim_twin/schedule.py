@@ -9,7 +9,7 @@ from sim_twin.clock import Simulation
 from vla_deploy.runtime.node import Node
 
 
-class Closable(Protocol):
+class HeldDevice(Protocol):
     """Hold a device open."""
 
     def close(self) -> None:
@@ -21,7 +21,7 @@ class Closable(Protocol):
 class _Entry:
     node: Node
     due_ns: int
-    opened: list[Closable] = field(default_factory=list)
+    opened: list[HeldDevice] = field(default_factory=list)
 
 
 class Schedule:
@@ -31,7 +31,7 @@ class Schedule:
     when it is killed, as the kernel does for a dead process.
     """
 
-    def __init__(self, simulation: Simulation, opened: Sequence[Closable] = ()) -> None:
+    def __init__(self, simulation: Simulation, opened: Sequence[HeldDevice] = ()) -> None:
         self._simulation = simulation
         self._opened = opened
         self._entries: list[_Entry] = []

@@ -33,7 +33,7 @@ _NS_PER_US: Final = 1000
 _log = logging.getLogger(__name__)
 
 
-class ServiceState(StrEnum):
+class RunnerState(StrEnum):
     """Name the states of a service."""
 
     INACTIVE = "inactive"
@@ -60,10 +60,10 @@ class ServiceRules:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class ServiceReport:
     """Say how the service is: its words, its main process and what has happened to it."""
 
-    state: ServiceState = ServiceState.INACTIVE
+    state: RunnerState = RunnerState.INACTIVE
     main_pid: int = 0
     status: str = ""
     restarts: int = 0
@@ -86,7 +86,7 @@ class ServiceRunner:
         log_path: Path | None = None,
     ) -> None:
         self.rules = rules or ServiceRules(watchdog_s=watchdog_s, restart_s=restart_s)
-        self.report = Report()
+        self.report = ServiceReport()
         self._command = list(command)
         self._log_path = log_path
         self._clock: Clock = clock or MonotonicClock()
@@ -106,20 +106,20 @@ class ServiceRunner:
         self._deadline_ns = 0
 
     @property
-    def state(self) -> ServiceState:
+    def state(self) -> RunnerState:
         """Return the state of the service."""
         return self.report.state
 
     def start(self) -> None:
         """Start the service and return at once."""
-        self._set(state=ServiceState.STARTING)
+        self._set(state=RunnerState.STARTING)
         self._thread.start()
 
     def wait_ready(self, timeout_s: float = 60.0) -> bool:
         """Wait until the service is ready; return whether it is."""
-        return self.wait_for(ServiceState.READY, timeout_s)
+        return self.wait_for(RunnerState.READY, timeout_s)
 
-    def wait_for(self, state: ServiceState, timeout_s: float) -> bool:
+    def wait_for(self, state: RunnerState, timeout_s: float) -> bool:
         """Wait for a state; return whether it came."""
         with self._changed:
             return self._changed.wait_for(lambda: self.state is state, timeout_s)
@@ -143,28 +143,28 @@ class ServiceRunner:
             if self._stop.is_set() or exit_code == 0:
                 break
             if exit_code in self.rules.prevent_restart:
-                self._set(state=ServiceState.FAILED)
+                self._set(state=RunnerState.FAILED)
                 return
-            self._set(state=ServiceState.RESTARTING)
+            self._set(state=RunnerState.RESTARTING)
             self._stop.wait(self.rules.restart_s)
             if not self._stop.is_set():
                 self._set(restarts=self.report.restarts + 1)
-        if self.state is not ServiceState.FAILED:
-            self._set(state=ServiceState.INACTIVE)
+        if self.state is not RunnerState.FAILED:
+            self._set(state=RunnerState.INACTIVE)
 
     def _may_start(self) -> bool:
         """Give up, as StartLimitBurst says, after too many starts in an interval."""
         now_ns = self._clock.now_ns()
         full = len(self._starts) == self.rules.start_limit_burst
         if full and now_ns - self._starts[0] < self.rules.start_limit_interval_s * NS_PER_S:
-            self._set(state=ServiceState.FAILED)
+            self._set(state=RunnerState.FAILED)
             return False
         self._starts.append(now_ns)
         return True
 
     def _live(self) -> int:
         """Run the main process from start to end; return its exit code, negative for a signal."""
-        self._set(state=ServiceState.STARTING, status="")
+        self._set(state=RunnerState.STARTING, status="")
         self._allow(self.rules.start_timeout_s)
         process = self._spawn()
         self._set(main_pid=process.pid)
@@ -214,27 +214,27 @@ class ServiceRunner:
         if name == "STATUS":
             self._set(status=value)
         elif name == "STOPPING":
-            self._set(state=ServiceState.STOPPING)
+            self._set(state=RunnerState.STOPPING)
             self._allow(self.rules.stop_timeout_s)
         elif name == "READY":
-            self._set(state=ServiceState.READY)
+            self._set(state=RunnerState.READY)
             self._allow(self.rules.watchdog_s)
-        elif name == "WATCHDOG" and self.state is ServiceState.READY:
+        elif name == "WATCHDOG" and self.state is RunnerState.READY:
             self._allow(self.rules.watchdog_s)
-        elif name == "EXTEND_TIMEOUT_USEC" and self.state is not ServiceState.READY:
+        elif name == "EXTEND_TIMEOUT_USEC" and self.state is not RunnerState.READY:
             extended_ns = self._clock.now_ns() + int(value) * _NS_PER_US
             self._deadline_ns = max(self._deadline_ns, extended_ns)
 
     def _abort(self, process: "subprocess.Popen[bytes]") -> None:
         """Do what systemd does to a service that is late: SIGABRT, then SIGKILL."""
-        if self.state is ServiceState.READY:
+        if self.state is RunnerState.READY:
             self._set(watchdog_kills=self.report.watchdog_kills + 1)
         process.send_signal(signal.SIGABRT)
         process.send_signal(signal.SIGCONT)
         _wait_or_kill(process, self.rules.abort_timeout_s)
 
     def _terminate(self, process: "subprocess.Popen[bytes]") -> None:
-        self._set(state=ServiceState.STOPPING)
+        self._set(state=RunnerState.STOPPING)
         process.terminate()
         process.send_signal(signal.SIGCONT)
         _wait_or_kill(process, self.rules.stop_timeout_s)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 
 Floats = NDArray[np.float64]
 ControlLaw = Callable[[int, float, float], float]
@@ -96,6 +96,6 @@ def _find(lookup: object, kind: str, name: str) -> int:
     try:
         return int(lookup(name).id)  # type: ignore[operator]
     except KeyError as error:
-        raise ModelMismatch(
+        raise TwinModelMismatch(
             f"the robot file names {name!r}, but its MJCF has no such {kind}"
         ) from error

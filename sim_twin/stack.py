@@ -30,7 +30,7 @@ ACT_EVERY_S = 0.5
 REACHED = {"reset": "disarmed", "arm": "armed"}
 
 
-class NotReady(Exception):
+class StackNotReady(Exception):
     """Say that the stack did not come up."""
 
 
@@ -91,10 +91,10 @@ class LockstepControl:
         """
         clock = self.lockstep
         if not clock.run_until(lambda: bool(self.status()), READY_TIMEOUT_S):
-            raise NotReady("control tells no status")
+            raise StackNotReady("control tells no status")
         self.operate("arm")
         if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
-            raise NotReady(f"control does not arm: {self.status()}")
+            raise StackNotReady(f"control does not arm: {self.status()}")
 
     def insist(self, act: str) -> None:
         """Do an operator's act again and again, as a person would, until it has its effect."""
@@ -189,5 +189,5 @@ class LockstepStack(LockstepControl):
         """
         command_id = self.give(text=text)
         if not self.lockstep.run_until(lambda: self.outcome(command_id) is not None, timeout_s):
-            raise NotReady(f'"{text}" did not end within {timeout_s:g} s')
+            raise StackNotReady(f'"{text}" did not end within {timeout_s:g} s')
         return self._outcomes.pop(command_id)

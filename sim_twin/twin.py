@@ -7,7 +7,7 @@ from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
 from sim_twin.can import CanWire, robot_drives
 from sim_twin.device import WireDevice
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
@@ -180,7 +180,7 @@ class Twin:
             if isinstance(device, kind):
                 device.step(self.now_ns)
                 return device
-        raise ModelMismatch(f"the twin of {self.robot.name} needs {what} in the robot file")
+        raise TwinModelMismatch(f"the twin of {self.robot.name} needs {what} in the robot file")
 
     def _now_ns(self) -> int:
         return self.engine.now_ns

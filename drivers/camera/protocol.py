@@ -40,7 +40,7 @@ _REQUEST = struct.Struct("<4sBBH")
 REQUEST_BYTES = _REQUEST.size + CRC.size
 
 
-class Command(IntEnum):
+class CameraCommand(IntEnum):
     """Name the requests a host may send."""
 
     STOP = 0
@@ -117,17 +117,17 @@ def decode_header(data: bytes) -> FrameHeader | None:
     return header if version == VERSION and plausible else None
 
 
-def encode_request(command: Command, rate_hz: float) -> bytes:
+def encode_request(command: CameraCommand, rate_hz: float) -> bytes:
     """Return a request's bytes."""
     packed = _REQUEST.pack(REQUEST_MAGIC, VERSION, command, round(rate_hz * 10))
     return packed + CRC.pack(zlib.crc32(packed))
 
 
-def decode_request(data: bytes) -> tuple[Command, float] | None:
+def decode_request(data: bytes) -> tuple[CameraCommand, float] | None:
     """Return command and rate in hertz, or None where the bytes are no valid request."""
     packed, (crc,) = data[: _REQUEST.size], CRC.unpack_from(data, _REQUEST.size)
     magic, version, command, decihertz = _REQUEST.unpack(packed)
     intact = zlib.crc32(packed) == crc and magic == REQUEST_MAGIC and version == VERSION
-    if not intact or command not in tuple(Command):
+    if not intact or command not in tuple(CameraCommand):
         return None
-    return Command(command), decihertz / 10.0
+    return CameraCommand(command), decihertz / 10.0

@@ -10,7 +10,7 @@ from drivers.camera.protocol import (
     CRC,
     FRAME_MAGIC,
     HEADER_BYTES,
-    Command,
+    CameraCommand,
     FrameHeader,
     decode_header,
     encode_request,
@@ -53,7 +53,7 @@ class RgbdCamera:
             )
         self._rate_hz = rate_hz
         self._heard_ns = self._clock.now_ns()
-        self._transport.write(encode_request(Command.START, rate_hz))
+        self._transport.write(encode_request(CameraCommand.START, rate_hz))
 
     def stop(self) -> None:
         """Ask the camera to stop streaming.
@@ -62,7 +62,7 @@ class RgbdCamera:
             LinkLost: the stream has gone.
         """
         self._rate_hz = 0.0
-        self._transport.write(encode_request(Command.STOP, 0.0))
+        self._transport.write(encode_request(CameraCommand.STOP, 0.0))
 
     def close(self) -> None:
         """Release the stream."""

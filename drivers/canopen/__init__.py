@@ -1,17 +1,17 @@
 """Drive CiA 402 wheel drives over CANopen."""
 
-from drivers.canopen.cia402 import Goal, PowerState
+from drivers.canopen.cia402 import DriveGoal, PowerState
 from drivers.canopen.emergency import Emergency
-from drivers.canopen.objects import EDS_PATH, OperatingMode
+from drivers.canopen.objects import EDS_PATH, DriveMode
 from drivers.canopen.spec import DriveSpec
 from drivers.canopen.wheel_bus import WheelDriveBus
 
 __all__ = [
     "EDS_PATH",
+    "DriveGoal",
+    "DriveMode",
     "DriveSpec",
     "Emergency",
-    "Goal",
-    "OperatingMode",
     "PowerState",
     "WheelDriveBus",
 ]

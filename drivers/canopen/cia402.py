@@ -6,7 +6,7 @@ The patterns and commands are those of CiA 402-2 (IEC 61800-7-201), state contro
 from enum import IntEnum
 from typing import Final
 
-from drivers.drive_bus import Goal as Goal
+from drivers.drive_bus import DriveGoal as DriveGoal
 from drivers.drive_bus import PowerState as PowerState
 
 
@@ -34,14 +34,14 @@ STATUSWORD_PATTERNS: Final[tuple[tuple[int, int, PowerState], ...]] = (
 FAULT_STATES: Final = (PowerState.FAULT, PowerState.FAULT_REACTION_ACTIVE)
 
 # Anything not listed gets DISABLE_VOLTAGE, the one command that is safe in every state.
-_COMMANDS: Final[dict[tuple[Goal, PowerState], ControlCommand]] = {
-    (Goal.ENABLED, PowerState.SWITCH_ON_DISABLED): ControlCommand.SHUTDOWN,
-    (Goal.ENABLED, PowerState.READY_TO_SWITCH_ON): ControlCommand.SWITCH_ON,
-    (Goal.ENABLED, PowerState.SWITCHED_ON): ControlCommand.ENABLE_OPERATION,
-    (Goal.ENABLED, PowerState.OPERATION_ENABLED): ControlCommand.ENABLE_OPERATION,
-    (Goal.QUICK_STOP, PowerState.OPERATION_ENABLED): ControlCommand.QUICK_STOP,
-    (Goal.QUICK_STOP, PowerState.QUICK_STOP_ACTIVE): ControlCommand.QUICK_STOP,
-    (Goal.FAULT_RESET, PowerState.FAULT): ControlCommand.FAULT_RESET,
+_COMMANDS: Final[dict[tuple[DriveGoal, PowerState], ControlCommand]] = {
+    (DriveGoal.ENABLED, PowerState.SWITCH_ON_DISABLED): ControlCommand.SHUTDOWN,
+    (DriveGoal.ENABLED, PowerState.READY_TO_SWITCH_ON): ControlCommand.SWITCH_ON,
+    (DriveGoal.ENABLED, PowerState.SWITCHED_ON): ControlCommand.ENABLE_OPERATION,
+    (DriveGoal.ENABLED, PowerState.OPERATION_ENABLED): ControlCommand.ENABLE_OPERATION,
+    (DriveGoal.QUICK_STOP, PowerState.OPERATION_ENABLED): ControlCommand.QUICK_STOP,
+    (DriveGoal.QUICK_STOP, PowerState.QUICK_STOP_ACTIVE): ControlCommand.QUICK_STOP,
+    (DriveGoal.FAULT_RESET, PowerState.FAULT): ControlCommand.FAULT_RESET,
 }
 
 
@@ -53,6 +53,6 @@ def decode_statusword(statusword: int) -> PowerState:
     return PowerState.UNKNOWN
 
 
-def controlword_for(goal: Goal, state: PowerState) -> ControlCommand:
+def controlword_for(goal: DriveGoal, state: PowerState) -> ControlCommand:
     """Return the next command on the way from `state` to `goal`."""
     return _COMMANDS.get((goal, state), ControlCommand.DISABLE_VOLTAGE)

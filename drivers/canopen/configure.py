@@ -29,7 +29,7 @@ from drivers.canopen.objects import (
     STATUSWORD,
     SUPPORTED_MODES,
     AbortConnection,
-    OperatingMode,
+    DriveMode,
 )
 from drivers.canopen.parameters import DriveParameters, Expected
 from drivers.canopen.sdo import Writing
@@ -126,7 +126,7 @@ def read_rated_torque(parameters: DriveParameters) -> Generator[None, None, floa
     return steps / RATED_TORQUE_PER_NM
 
 
-def set_mode(parameters: DriveParameters, mode: OperatingMode, clock: Clock) -> Writing:
+def set_mode(parameters: DriveParameters, mode: DriveMode, clock: Clock) -> Writing:
     """Choose the mode of operation and wait until the drive displays it.
 
     Raises:
@@ -175,7 +175,7 @@ def configure_drive(
 
 
 def _ramps(spec: DriveSpec, cycle_ms: int) -> tuple[Step, ...]:
-    if spec.mode is OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
+    if spec.mode is DriveMode.CYCLIC_SYNCHRONOUS_VELOCITY:
         return (INTERPOLATION_PERIOD, 1, cycle_ms), (INTERPOLATION_PERIOD, 2, MILLISECONDS)
     # Control's own ramps are the slower ones; where it must brake, the drive is not in its way.
     faster = round(spec.acceleration_rad_s2 * abs(spec.counts_per_rad))

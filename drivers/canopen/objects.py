@@ -77,7 +77,7 @@ class NmtState(IntEnum):
     PRE_OPERATIONAL = 0x7F
 
 
-class OperatingMode(IntEnum):
+class DriveMode(IntEnum):
     """Name the modes of operation (6060) a wheel drive knows."""
 
     PROFILE_VELOCITY = 3

@@ -27,16 +27,16 @@ from drivers.canopen.objects import (
     TORQUE_ACTUAL,
     TPDO1,
     TPDO2,
-    OperatingMode,
+    DriveMode,
     Pdo,
     mapped_object,
 )
 from drivers.canopen.spec import DriveSpec
 from drivers.errors import WrongDevice
 
-_RAMPED: Final = (OperatingMode.PROFILE_VELOCITY,)
-_CYCLIC: Final = (OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY,)
-_ANY: Final = tuple(OperatingMode)
+_RAMPED: Final = (DriveMode.PROFILE_VELOCITY,)
+_CYCLIC: Final = (DriveMode.CYCLIC_SYNCHRONOUS_VELOCITY,)
+_ANY: Final = tuple(DriveMode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +48,11 @@ class Requirement:
     subindex: int = 0
     needed: bool = True
     lack: str = ""
-    modes: tuple[OperatingMode, ...] = _ANY
+    modes: tuple[DriveMode, ...] = _ANY
 
 
 def _needed(
-    index: int, purpose: str, subindex: int = 0, modes: tuple[OperatingMode, ...] = _ANY
+    index: int, purpose: str, subindex: int = 0, modes: tuple[DriveMode, ...] = _ANY
 ) -> Requirement:
     return Requirement(index=index, purpose=purpose, subindex=subindex, modes=modes)
 
@@ -62,7 +62,7 @@ def _useful(
     purpose: str,
     lack: str,
     subindex: int = 0,
-    modes: tuple[OperatingMode, ...] = _ANY,
+    modes: tuple[DriveMode, ...] = _ANY,
 ) -> Requirement:
     return Requirement(
         index=index, purpose=purpose, subindex=subindex, needed=False, lack=lack, modes=modes

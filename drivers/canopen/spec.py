@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.canopen.objects import OperatingMode
+from drivers.canopen.objects import DriveMode
 
 HOST_NODE_ID: Final = 0x7F
 
@@ -24,7 +24,7 @@ class DriveSpec:
     sign: int = 1
     counts_per_rev: int = 16384
     gear_ratio: float = 1.0
-    mode: OperatingMode = OperatingMode.PROFILE_VELOCITY
+    mode: DriveMode = DriveMode.PROFILE_VELOCITY
     acceleration_rad_s2: float = 20.0
     quick_stop_rad_s2: float = 40.0
 

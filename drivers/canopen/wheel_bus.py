@@ -23,7 +23,7 @@ from drivers.canopen.objects import (
 )
 from drivers.canopen.spec import HOST_NODE_ID, DriveSpec
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import Goal, ResetRule
+from drivers.drive_bus import DriveGoal, ResetRule
 from drivers.drive_cycle import DriveCycle
 from drivers.errors import NoReply
 from drivers.stepping import listening, side_by_side, until
@@ -171,10 +171,10 @@ class WheelDriveBus(DriveCycle[DrivePort]):
                 RPDO1.cob_base + port.spec.node_id, RPDO1.wire.pack(controlword, target)
             )
 
-    def _goal_of(self, port: DrivePort) -> Goal:
+    def _goal_of(self, port: DrivePort) -> DriveGoal:
         goal = self._goals.goal
-        barred = goal is Goal.FAULT_RESET and port.reset_rule is ResetRule.NEVER
-        return Goal.DISABLED if barred else goal
+        barred = goal is DriveGoal.FAULT_RESET and port.reset_rule is ResetRule.NEVER
+        return DriveGoal.DISABLED if barred else goal
 
     def _sync(self, now_ns: int) -> None:
         for port in self._ports:

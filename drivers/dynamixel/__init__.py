@@ -3,18 +3,18 @@ from drivers.dynamixel.bus_group import BusGroup
 from drivers.dynamixel.control_table import HardwareError, OperatingMode
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.handshake import ServoSetup
-from drivers.dynamixel.layout import Layout
+from drivers.dynamixel.layout import BlockLayout
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 from drivers.dynamixel.watchdog import WatchdogState
 
 __all__ = [
+    "BlockLayout",
     "BusCounters",
     "BusGroup",
     "BusState",
     "DynamixelBus",
     "HardwareError",
-    "Layout",
     "OperatingMode",
     "ServoSetup",
     "ServoSpec",

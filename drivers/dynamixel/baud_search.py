@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import Final
 
 from drivers.dynamixel.control_table import BAUD_RATES
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.errors import NoReply, ProtocolError
 
-_ONCE: Final = Patience(margin_s=0.02, attempts=1)
+_ONCE: Final = ReplyPatience(margin_s=0.02, attempts=1)
 
 
 def where_they_answer(registers: Registers, silent: Sequence[ServoSpec]) -> dict[int, int]:

@@ -14,8 +14,8 @@ from drivers.dynamixel.cycle import ServoCycle
 from drivers.dynamixel.fault_policy import FaultPolicy
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.layout import Layout
-from drivers.dynamixel.link import Link
+from drivers.dynamixel.layout import BlockLayout
+from drivers.dynamixel.link import PacketLink
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
@@ -45,7 +45,7 @@ class DynamixelBus:
         *,
         baud: int,
         fast_sync: bool | None = None,
-        layout: Layout = Layout.AUTO,
+        layout: BlockLayout = BlockLayout.AUTO,
         watchdog_s: float = 0.1,
         reply_margin_s: float = 0.002,
         health_every_cycles: int = 5,
@@ -72,7 +72,7 @@ class DynamixelBus:
         self._layout = layout
         self._margin_s = reply_margin_s
         self._health_every_cycles = health_every_cycles
-        self._link = Link(transport, clock, baud, self.counters)
+        self._link = PacketLink(transport, clock, baud, self.counters)
         self._registers = Registers(self._link)
         self._cycle: ServoCycle | None = None
 

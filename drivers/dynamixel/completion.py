@@ -6,7 +6,7 @@ behind it. Only that one is to blame; the ones behind it are asked again at once
 
 from typing import Final
 
-from drivers.dynamixel.link import Link
+from drivers.dynamixel.link import PacketLink
 from drivers.dynamixel.sync_read import Entry, SyncRead
 
 _LEAST_MARGIN_RATIO: Final = 0.1
@@ -14,7 +14,7 @@ _LEAST_MARGIN_RATIO: Final = 0.1
 
 
 def complete(
-    link: Link, read: SyncRead, reply: bytes, deadline_ns: int, margin_ns: int
+    link: PacketLink, read: SyncRead, reply: bytes, deadline_ns: int, margin_ns: int
 ) -> tuple[dict[int, Entry], list[int]]:
     """Frame a reply anew, wait for the rest of it, and return entries and blamed servos by id.
 

@@ -15,9 +15,9 @@ from drivers.dynamixel.model import (
     WATCHDOG_UNIT_S,
     HardwareError,
     IndirectBank,
-    Model,
     OperatingMode,
     Register,
+    ServoDatasheet,
     StatusReturnLevel,
 )
 from drivers.dynamixel.models import MODELS, MODELS_BY_NUMBER
@@ -39,8 +39,8 @@ __all__ = [
     "WATCHDOG_UNIT_S",
     "HardwareError",
     "IndirectBank",
-    "Model",
     "OperatingMode",
     "Register",
+    "ServoDatasheet",
     "StatusReturnLevel",
 ]

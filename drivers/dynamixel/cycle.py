@@ -12,7 +12,7 @@ from drivers.dynamixel.handshake import ServoSetup
 from drivers.dynamixel.health import HealthPoll
 from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.layout import DIRECT
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.reader import StateReader
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.roster import Roster
@@ -154,7 +154,7 @@ class ServoCycle:
 
     def _bring_back(self, index: int) -> Iterator[None]:
         servo, setup = self._servos[index], self._setups[index]
-        patience = Patience(margin_s=self._margin_s, attempts=2)
+        patience = ReplyPatience(margin_s=self._margin_s, attempts=2)
         told = []
         for text in bring_back(self._registers, servo, setup.block, patience):
             told += [text] if text else []

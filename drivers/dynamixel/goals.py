@@ -17,7 +17,7 @@ from drivers.dynamixel.codec import (
 )
 from drivers.dynamixel.control_table import PWM_FULL
 from drivers.dynamixel.handshake import ServoSetup
-from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.link import PacketLink, ReplyPatience
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.errors import DriverError, LinkLost
@@ -35,7 +35,7 @@ class GoalWriter:
 
     def __init__(
         self,
-        link: Link,
+        link: PacketLink,
         registers: Registers,
         servos: Sequence[ServoSpec],
         setups: Sequence[ServoSetup],
@@ -46,7 +46,7 @@ class GoalWriter:
         self._registers = registers
         self._servos = {servo.id: servo for servo in servos}
         self._joints = [servo.joint for servo in servos]
-        self._patience = Patience(margin_s=margin_s, attempts=2)
+        self._patience = ReplyPatience(margin_s=margin_s, attempts=2)
         self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
         self._pulses_per = 1.0 / self._per_pulse
         self._at_pulse_zero = np.array([servo.to_joint(0) for servo in servos])

@@ -11,7 +11,7 @@ from drivers.dynamixel.control_table import (
     StatusReturnLevel,
 )
 from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
-from drivers.dynamixel.layout import Block, Layout, block_of
+from drivers.dynamixel.layout import Block, BlockLayout, block_of
 from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.settings import IMAGE_BYTES, differences, write_differences, write_map
@@ -53,7 +53,7 @@ def shake_hands(
     servos: Sequence[ServoSpec],
     *,
     fast_sync: bool | None,
-    layout: Layout,
+    layout: BlockLayout,
     thorough: bool,
 ) -> list[ServoSetup]:
     """Check adapter and servos, write settings that differ, and return what was learned.
@@ -125,7 +125,7 @@ def _remedy(registers: Registers, silent: Sequence[ServoSpec]) -> str:
 
 
 def _identity_faults(
-    servo: ServoSpec, number: int, firmware: int, *, fast_sync: bool | None, layout: Layout
+    servo: ServoSpec, number: int, firmware: int, *, fast_sync: bool | None, layout: BlockLayout
 ) -> list[str]:
     if number != servo.model.number:
         got = MODELS_BY_NUMBER.get(number)
@@ -176,7 +176,7 @@ def _set_up(
     firmware: int,
     *,
     fast_sync: bool | None,
-    layout: Layout,
+    layout: BlockLayout,
 ) -> ServoSetup:
     block = block_of(servo.model, firmware, layout)
     written = [*write_differences(registers, servo, image), *write_map(registers, servo, block)]

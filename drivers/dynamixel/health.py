@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.control_table import VOLTAGE_UNIT_V
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
@@ -52,7 +52,7 @@ class HealthPoll:
         self._roster = roster
         self._state = state
         self._every_cycles = every_cycles
-        self._patience = Patience(margin_s=margin_s * _MARGIN_SHARE, attempts=1)
+        self._patience = ReplyPatience(margin_s=margin_s * _MARGIN_SHARE, attempts=1)
         self._bring_back = bring_back
         self._returns: dict[int, Iterator[None]] = {}
         self._asked = np.zeros(len(servos), dtype=np.bool_)

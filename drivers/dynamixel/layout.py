@@ -10,10 +10,10 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.model import Model
+from drivers.dynamixel.model import ServoDatasheet
 
 
-class Layout(Enum):
+class BlockLayout(Enum):
     """Choose the block of a bus."""
 
     AUTO = "auto"
@@ -71,7 +71,7 @@ _SOURCES: Final = (*range(126, 136), 144, 145, 146, 64, 70, 98)
 DIRECT: Final = Block(address=126, size=10, fields=MappingProxyType(_MOTION_FIELDS))
 
 
-def block_of(model: Model, firmware: int, layout: Layout) -> Block:
+def block_of(model: ServoDatasheet, firmware: int, layout: BlockLayout) -> Block:
     """Choose the block of a servo.
 
     Raises:
@@ -81,7 +81,7 @@ def block_of(model: Model, firmware: int, layout: Layout) -> Block:
         (b for b in model.indirect_banks(firmware) if b.slots >= len(_SOURCES)),
         None,
     )
-    if layout is Layout.DIRECT or (layout is Layout.AUTO and bank is None):
+    if layout is BlockLayout.DIRECT or (layout is BlockLayout.AUTO and bank is None):
         return DIRECT
     if bank is None:
         raise ValueError(

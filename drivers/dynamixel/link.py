@@ -20,14 +20,14 @@ PING_REPLY_BYTES: Final = STATUS_OVERHEAD_BYTES + 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Patience:
+class ReplyPatience:
     """Say how long beyond the wire time to wait for an answer, and how often to ask."""
 
     margin_s: float
     attempts: int
 
 
-class Link(Wire):
+class PacketLink(Wire):
     """Ask questions on the wire and tell their answers from what else is heard."""
 
     def detect_echo(self, servo_id: int, margin_s: float) -> None:
@@ -71,7 +71,7 @@ class Link(Wire):
         self.counters.timeouts += len(read.ids) - len(entries)
         return entries
 
-    def sync_read(self, read: SyncRead, patience: Patience) -> dict[int, Entry]:
+    def sync_read(self, read: SyncRead, patience: ReplyPatience) -> dict[int, Entry]:
         """Return what the servos answer to a sync read, by id; silent ones are left out.
 
         Raises:
@@ -101,7 +101,7 @@ class Link(Wire):
         params: bytes,
         *,
         answer_bytes: int,
-        patience: Patience,
+        patience: ReplyPatience,
         name: str,
     ) -> Packet:
         """Ask one servo and return its answer; an alert bit is no failure.
@@ -168,7 +168,7 @@ def _raise_rejection(packet: Packet, name: str) -> None:
         raise kind(f"{name}: refused with error {number}; {remedy}")
 
 
-def _no_answer(name: str, patience: Patience, crc_errors: int) -> CorruptReply | ServoSilent:
+def _no_answer(name: str, patience: ReplyPatience, crc_errors: int) -> CorruptReply | ServoSilent:
     if crc_errors:
         return CorruptReply(
             f"{name}: {crc_errors} damaged answers in {patience.attempts} attempts; "

@@ -113,7 +113,7 @@ class IndirectBank:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model:
+class ServoDatasheet:
     """Describe one servo model; torque, current and speed are the datasheet's at `voltage_v`."""
 
     name: str

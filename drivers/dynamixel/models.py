@@ -14,9 +14,9 @@ from typing import Final
 from drivers.dynamixel.model import (
     CURRENT_UNIT_A,
     IndirectBank,
-    Model,
     OperatingMode,
     Register,
+    ServoDatasheet,
 )
 from drivers.dynamixel.table_rows import (
     COMMON,
@@ -119,7 +119,7 @@ def _model(
     velocity_limit: int,
     changes: Mapping[str, Limits] = MappingProxyType({}),
     at_v: float = 12.0,
-) -> Model:
+) -> ServoDatasheet:
     fastest = 1023 if family.indirect is LARGE_INDIRECT else 2047
     limits: dict[str, Limits] = {
         "model_number": (number, None, None),
@@ -128,7 +128,7 @@ def _model(
         **changes,
     }
     rows = sorted(_rows(family, limits), key=lambda row: row.address)
-    return Model(
+    return ServoDatasheet(
         name=name,
         number=number,
         registers=MappingProxyType({row.name: row for row in rows}),
@@ -199,7 +199,9 @@ _ALL: Final = (
 )
 # fmt: on
 
-MODELS: Final[Mapping[str, Model]] = MappingProxyType({model.name: model for model in _ALL})
-MODELS_BY_NUMBER: Final[Mapping[int, Model]] = MappingProxyType(
+MODELS: Final[Mapping[str, ServoDatasheet]] = MappingProxyType(
+    {model.name: model for model in _ALL}
+)
+MODELS_BY_NUMBER: Final[Mapping[int, ServoDatasheet]] = MappingProxyType(
     {model.number: model for model in _ALL}
 )

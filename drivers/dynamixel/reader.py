@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel.completion import complete
 from drivers.dynamixel.group import Group, News, ServoRead
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.link import Link
+from drivers.dynamixel.link import PacketLink
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.state import BusState
 
@@ -25,7 +25,7 @@ class StateReader:
 
     def __init__(
         self,
-        link: Link,
+        link: PacketLink,
         reads: Sequence[ServoRead],
         roster: Roster,
         state: BusState,

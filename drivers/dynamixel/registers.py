@@ -5,11 +5,11 @@ from typing import Final
 
 from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.control_table import Register
-from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.link import PacketLink, ReplyPatience
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.sync_read import SyncRead
 
-SETUP: Final = Patience(margin_s=0.02, attempts=3)
+SETUP: Final = ReplyPatience(margin_s=0.02, attempts=3)
 """For what is asked before or after motion, when a retry costs nothing."""
 
 _PING_ANSWER_BYTES: Final = 3
@@ -36,15 +36,15 @@ class Registers:
     reason) for the servo, and LinkLost when the adapter is gone.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: PacketLink) -> None:
         self._link = link
 
     @property
-    def link(self) -> Link:
+    def link(self) -> PacketLink:
         """Return what carries the transactions."""
         return self._link
 
-    def ping(self, servo: ServoSpec, patience: Patience = SETUP) -> tuple[int, int]:
+    def ping(self, servo: ServoSpec, patience: ReplyPatience = SETUP) -> tuple[int, int]:
         """Return a servo's model number and firmware version.
 
         Raises:
@@ -60,7 +60,7 @@ class Registers:
         )
         return int.from_bytes(packet.params[:2], "little"), packet.params[2]
 
-    def read(self, servo: ServoSpec, name: str, patience: Patience = SETUP) -> int:
+    def read(self, servo: ServoSpec, name: str, patience: ReplyPatience = SETUP) -> int:
         """Return a register's value.
 
         Raises:
@@ -71,7 +71,7 @@ class Registers:
         return register.from_bytes(self.read_span(servo, register.address, register.size, patience))
 
     def read_span(
-        self, servo: ServoSpec, address: int, size: int, patience: Patience = SETUP
+        self, servo: ServoSpec, address: int, size: int, patience: ReplyPatience = SETUP
     ) -> bytes:
         """Return the bytes of neighbouring registers, read at one instant.
 
@@ -88,7 +88,9 @@ class Registers:
         )
         return packet.params
 
-    def write(self, servo: ServoSpec, name: str, value: int, patience: Patience = SETUP) -> None:
+    def write(
+        self, servo: ServoSpec, name: str, value: int, patience: ReplyPatience = SETUP
+    ) -> None:
         """Write a register and wait for the servo's consent.
 
         Raises:
@@ -107,7 +109,7 @@ class Registers:
         )
 
     def write_span(
-        self, servo: ServoSpec, address: int, data: bytes, patience: Patience = SETUP
+        self, servo: ServoSpec, address: int, data: bytes, patience: ReplyPatience = SETUP
     ) -> None:
         """Write neighbouring bytes at one instant and wait for the servo's consent.
 
@@ -125,7 +127,7 @@ class Registers:
         )
 
     def read_many(
-        self, name: str, servos: Sequence[ServoSpec], patience: Patience = SETUP
+        self, name: str, servos: Sequence[ServoSpec], patience: ReplyPatience = SETUP
     ) -> dict[int, int]:
         """Return a register of many servos by id; silent servos are left out.
 
@@ -138,7 +140,7 @@ class Registers:
         return {servo_id: register.from_bytes(span) for servo_id, span in spans.items()}
 
     def read_span_many(
-        self, servos: Sequence[ServoSpec], address: int, size: int, patience: Patience = SETUP
+        self, servos: Sequence[ServoSpec], address: int, size: int, patience: ReplyPatience = SETUP
     ) -> dict[int, bytes]:
         """Return the bytes of neighbouring registers of many servos by id, without silent ones.
 
@@ -182,7 +184,7 @@ class Registers:
             Instruction.REBOOT,
             b"",
             answer_bytes=0,
-            patience=Patience(margin_s=SETUP.margin_s, attempts=1),
+            patience=ReplyPatience(margin_s=SETUP.margin_s, attempts=1),
             name=f"reboot {servo}",
         )
 

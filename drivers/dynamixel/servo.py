@@ -7,8 +7,8 @@ from drivers.dynamixel.control_table import (
     CENTRE_PULSE,
     MODELS,
     PULSE_RAD,
-    Model,
     OperatingMode,
+    ServoDatasheet,
 )
 
 
@@ -52,7 +52,7 @@ class ServoSpec:
         ]
 
     @property
-    def model(self) -> Model:
+    def model(self) -> ServoDatasheet:
         """Return the control table of the servo's model."""
         return MODELS[self.model_name]
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from drivers.dynamixel.control_table import StatusReturnLevel
 from drivers.dynamixel.errors import NotKept
 from drivers.dynamixel.layout import Block
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.registers import SETUP, Registers, decode
 from drivers.dynamixel.servo import ServoSpec
 
@@ -24,7 +24,7 @@ def differences(servo: ServoSpec, image: bytes) -> dict[str, tuple[int, int]]:
 
 
 def write_differences(
-    registers: Registers, servo: ServoSpec, image: bytes, patience: Patience = SETUP
+    registers: Registers, servo: ServoSpec, image: bytes, patience: ReplyPatience = SETUP
 ) -> Iterator[str]:
     """Write the settings that differ, one at each step, and yield what was changed.
 
@@ -38,7 +38,7 @@ def write_differences(
 
 
 def write_map(
-    registers: Registers, servo: ServoSpec, block: Block, patience: Patience = SETUP
+    registers: Registers, servo: ServoSpec, block: Block, patience: ReplyPatience = SETUP
 ) -> Iterator[str]:
     """Point the servo's indirect addresses at the block's sources, one transaction at each step.
 
@@ -64,7 +64,7 @@ def write_map(
 
 
 def bring_back(
-    registers: Registers, servo: ServoSpec, block: Block, patience: Patience
+    registers: Registers, servo: ServoSpec, block: Block, patience: ReplyPatience
 ) -> Iterator[str]:
     """Set up a servo that was away, one transaction at each step; torque is left as it is.
 

@@ -10,14 +10,14 @@ from typing import Final
 
 from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.errors import NotKept, ServoFault, ServoSilent, WatchdogTripped
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import hardware_error_text
 from drivers.errors import DriverError, LinkLost
 
 _ATTEMPTS: Final = 3
-_URGENT: Final = Patience(margin_s=0.005, attempts=2)
+_URGENT: Final = ReplyPatience(margin_s=0.005, attempts=2)
 _FITNESS_START: Final = 63  # shutdown .. bus_watchdog
 _FITNESS_BYTES: Final = 36
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveState, Goal, PowerState, ResetRule
+from drivers.drive_bus import DriveGoal, DriveState, PowerState, ResetRule
 from drivers.drive_cycle import STILL_RAD_S, DriveCycle
 from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.axis_setup import FEEDBACK_MS, LACKS, AxisSetup
-from drivers.odrive.codec import AxisState, Command, split_id
+from drivers.odrive.codec import AxisState, OdriveCommand, split_id
 from drivers.odrive.endpoints import ENCODER_RATE, EndpointTable, read_endpoints
 from drivers.odrive.spec import AxisSpec
 from drivers.stepping import listening, side_by_side
@@ -24,12 +24,12 @@ FRESH_NS: Final = NS_PER_S // 4
 LATE_S: Final = 3 * FEEDBACK_MS / 1000
 MAX_REV_S: Final = 1e4
 _POLLED: Final = (
-    Command.GET_ERROR,
-    Command.GET_TORQUES,
-    Command.GET_TEMPERATURE,
-    Command.GET_BUS_VOLTAGE_CURRENT,
-    Command.GET_IQ,
-    Command.RX_SDO,  # stands for the watchdog
+    OdriveCommand.GET_ERROR,
+    OdriveCommand.GET_TORQUES,
+    OdriveCommand.GET_TEMPERATURE,
+    OdriveCommand.GET_BUS_VOLTAGE_CURRENT,
+    OdriveCommand.GET_IQ,
+    OdriveCommand.RX_SDO,  # stands for the watchdog
 )
 _WATCHDOG_ERRORS: Final = 0x100_0000
 
@@ -64,7 +64,7 @@ class ODriveBus(DriveCycle[AxisPort]):
             AxisSetup(self._link.send, clock, port, heartbeat_s) for port in self._ports
         )
         self._fresh_until_ns: int | None = None
-        self._requested = Goal.DISABLED
+        self._requested = DriveGoal.DISABLED
         self._request_ns = 0
         self._poll_ns = 0
         self._polled = 0
@@ -110,7 +110,7 @@ class ODriveBus(DriveCycle[AxisPort]):
         """
         super().cut_power()
         for setup in self._setups:
-            setup.tell(Command.ESTOP)
+            setup.tell(OdriveCommand.ESTOP)
 
     def reset_fault(self) -> tuple[str, ...]:
         """Clear what errors may be cleared; the axes stay idle.
@@ -120,8 +120,8 @@ class ODriveBus(DriveCycle[AxisPort]):
         refused = super().reset_fault()
         for port, setup in zip(self._ports, self._setups, strict=True):
             if port.fault is not None and port.fault.rule is not ResetRule.NEVER:
-                setup.tell(Command.CLEAR_ERRORS, 0)
-                setup.ask(Command.GET_ERROR)
+                setup.tell(OdriveCommand.CLEAR_ERRORS, 0)
+                setup.ask(OdriveCommand.GET_ERROR)
         return refused
 
     def cycle(self, velocity_rad_s: NDArray[np.float64] | None) -> DriveState:
@@ -169,7 +169,7 @@ class ODriveBus(DriveCycle[AxisPort]):
             target = 0.0
             if velocity_rad_s is not None:
                 target = float(velocity_rad_s[row]) * port.spec.revs_per_rad
-            setup.tell(Command.SET_INPUT_VEL, min(max(target, -MAX_REV_S), MAX_REV_S), 0.0)
+            setup.tell(OdriveCommand.SET_INPUT_VEL, min(max(target, -MAX_REV_S), MAX_REV_S), 0.0)
         self._request_states(now_ns)
         self._poll(now_ns)
 
@@ -182,34 +182,34 @@ class ODriveBus(DriveCycle[AxisPort]):
         for port, setup in zip(self._ports, self._setups, strict=True):
             wanted = self._wanted_state(port, goal)
             if wanted is not None and port.axis_state is not wanted:
-                setup.tell(Command.SET_AXIS_STATE, wanted)
+                setup.tell(OdriveCommand.SET_AXIS_STATE, wanted)
 
-    def _wanted_state(self, port: AxisPort, goal: Goal) -> AxisState | None:
-        if goal is Goal.ENABLED:
+    def _wanted_state(self, port: AxisPort, goal: DriveGoal) -> AxisState | None:
+        if goal is DriveGoal.ENABLED:
             return AxisState.CLOSED_LOOP_CONTROL if port.watchdog_confirmed else None
-        braking = goal is Goal.QUICK_STOP and abs(port.velocity_rad_s) >= STILL_RAD_S
+        braking = goal is DriveGoal.QUICK_STOP and abs(port.velocity_rad_s) >= STILL_RAD_S
         return None if braking else AxisState.IDLE
 
     def _poll(self, now_ns: int) -> None:
         """Ask for what the axes do not send by themselves."""
         if self._table is None or ENCODER_RATE not in self._table.endpoints:
             for setup in self._setups:
-                setup.ask(Command.GET_ENCODER_ESTIMATES)
+                setup.ask(OdriveCommand.GET_ENCODER_ESTIMATES)
         if now_ns < self._poll_ns:
             return
         self._poll_ns = now_ns + POLL_NS
         command = _POLLED[self._polled]
         for setup in self._setups:
-            setup.ask_watchdog() if command is Command.RX_SDO else setup.ask(command)
+            setup.ask_watchdog() if command is OdriveCommand.RX_SDO else setup.ask(command)
         self._polled = (self._polled + 1) % len(_POLLED)
 
     def _power_state(self, port: AxisPort) -> PowerState:
         state = port.power_state
-        braking = self._goals.goal is Goal.QUICK_STOP and state is PowerState.OPERATION_ENABLED
+        braking = self._goals.goal is DriveGoal.QUICK_STOP and state is PowerState.OPERATION_ENABLED
         return PowerState.QUICK_STOP_ACTIVE if braking else state
 
     def _farewell(self) -> None:
         """Take the power off; where a frame is lost, the watchdog is not fed any more."""
         for setup in self._setups:
-            setup.tell(Command.SET_INPUT_VEL, 0.0, 0.0)
-            setup.tell(Command.SET_AXIS_STATE, AxisState.IDLE)
+            setup.tell(OdriveCommand.SET_INPUT_VEL, 0.0, 0.0)
+            setup.tell(OdriveCommand.SET_AXIS_STATE, AxisState.IDLE)

@@ -7,7 +7,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from drivers.drive_bus import PowerState
 from drivers.errors import ProtocolError
-from drivers.odrive.codec import AxisState, Command, decode
+from drivers.odrive.codec import AxisState, OdriveCommand, decode
 from drivers.odrive.faults import AxisFault
 from drivers.odrive.spec import AxisSpec
 
@@ -104,7 +104,7 @@ class AxisPort:
             handler(self, data, now_ns)
 
     def _on_heartbeat(self, data: bytes, now_ns: int) -> None:
-        errors, state, *_ = decode(Command.HEARTBEAT, data)
+        errors, state, *_ = decode(OdriveCommand.HEARTBEAT, data)
         try:
             self.axis_state = AxisState(int(state))
         except ValueError as error:
@@ -114,12 +114,12 @@ class AxisPort:
         self._heartbeat_ns = now_ns
 
     def _on_error(self, data: bytes, now_ns: int) -> None:
-        active, reason = decode(Command.GET_ERROR, data)
+        active, reason = decode(OdriveCommand.GET_ERROR, data)
         self.errors, self.disarm_reason = int(active), int(reason)
         self.errors_told = True
 
     def _on_estimates(self, data: bytes, now_ns: int) -> None:
-        position_rev, velocity_rev_s = map(float, decode(Command.GET_ENCODER_ESTIMATES, data))
+        position_rev, velocity_rev_s = map(float, decode(OdriveCommand.GET_ENCODER_ESTIMATES, data))
         self.without_estimate = not (math.isfinite(position_rev) and math.isfinite(velocity_rev_s))
         if self.without_estimate:
             return
@@ -128,26 +128,26 @@ class AxisPort:
         self._sample_ns = now_ns
 
     def _on_torques(self, data: bytes, now_ns: int) -> None:
-        _, motor_nm = map(float, decode(Command.GET_TORQUES, data))
+        _, motor_nm = map(float, decode(OdriveCommand.GET_TORQUES, data))
         self.torque_nm = self.spec.sign * self.spec.gear_ratio * motor_nm
 
     def _on_temperature(self, data: bytes, now_ns: int) -> None:
         self.fet_temperature_c, self.motor_temperature_c = map(
-            float, decode(Command.GET_TEMPERATURE, data)
+            float, decode(OdriveCommand.GET_TEMPERATURE, data)
         )
 
     def _on_supply(self, data: bytes, now_ns: int) -> None:
-        self.bus_v, self.bus_a = map(float, decode(Command.GET_BUS_VOLTAGE_CURRENT, data))
+        self.bus_v, self.bus_a = map(float, decode(OdriveCommand.GET_BUS_VOLTAGE_CURRENT, data))
 
     def _on_current(self, data: bytes, now_ns: int) -> None:
-        _, self.iq_a = map(float, decode(Command.GET_IQ, data))
+        _, self.iq_a = map(float, decode(OdriveCommand.GET_IQ, data))
 
     def _on_version(self, data: bytes, now_ns: int) -> None:
-        version = decode(Command.GET_VERSION, data)
+        version = decode(OdriveCommand.GET_VERSION, data)
         self.firmware = ".".join(str(number) for number in version[4:7])
 
     def _on_value(self, data: bytes, now_ns: int) -> None:
-        number, value = decode(Command.TX_SDO, data)
+        number, value = decode(OdriveCommand.TX_SDO, data)
         assert isinstance(value, bytes)
         self.values[int(number)] = value
         if number == self.watchdog_endpoint:
@@ -156,13 +156,13 @@ class AxisPort:
 
 
 _HANDLERS: Final[dict[int, Callable[[AxisPort, bytes, int], None]]] = {
-    Command.HEARTBEAT: AxisPort._on_heartbeat,
-    Command.GET_ERROR: AxisPort._on_error,
-    Command.GET_ENCODER_ESTIMATES: AxisPort._on_estimates,
-    Command.GET_TORQUES: AxisPort._on_torques,
-    Command.GET_TEMPERATURE: AxisPort._on_temperature,
-    Command.GET_BUS_VOLTAGE_CURRENT: AxisPort._on_supply,
-    Command.GET_IQ: AxisPort._on_current,
-    Command.GET_VERSION: AxisPort._on_version,
-    Command.TX_SDO: AxisPort._on_value,
+    OdriveCommand.HEARTBEAT: AxisPort._on_heartbeat,
+    OdriveCommand.GET_ERROR: AxisPort._on_error,
+    OdriveCommand.GET_ENCODER_ESTIMATES: AxisPort._on_estimates,
+    OdriveCommand.GET_TORQUES: AxisPort._on_torques,
+    OdriveCommand.GET_TEMPERATURE: AxisPort._on_temperature,
+    OdriveCommand.GET_BUS_VOLTAGE_CURRENT: AxisPort._on_supply,
+    OdriveCommand.GET_IQ: AxisPort._on_current,
+    OdriveCommand.GET_VERSION: AxisPort._on_version,
+    OdriveCommand.TX_SDO: AxisPort._on_value,
 }

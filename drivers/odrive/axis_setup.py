@@ -10,9 +10,9 @@ from drivers.errors import DeviceFault, NoReply, WrongDevice
 from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.codec import (
     AxisState,
-    Command,
     ControlMode,
     InputMode,
+    OdriveCommand,
     SdoOpcode,
     can_id,
     encode,
@@ -55,11 +55,11 @@ class AxisSetup:
         self._port = port
         self._watchdog_s = watchdog_s
 
-    def tell(self, command: Command, *values: float | bytes) -> None:
+    def tell(self, command: OdriveCommand, *values: float | bytes) -> None:
         """Send one message to the axis; each of them feeds its watchdog."""
         self._send(can_id(self._port.spec.node_id, command), encode(command, *values))
 
-    def ask(self, command: Command) -> None:
+    def ask(self, command: OdriveCommand) -> None:
         """Ask for one message by a remote frame."""
         self._send(can_id(self._port.spec.node_id, command), remote=True)
 
@@ -87,7 +87,7 @@ class AxisSetup:
 
     def ask_watchdog(self) -> None:
         """Ask whether the watchdog is still armed; an axis that rebooted has forgotten it."""
-        self.tell(Command.RX_SDO, SdoOpcode.READ, self._port.watchdog_endpoint or 0, bytes(4))
+        self.tell(OdriveCommand.RX_SDO, SdoOpcode.READ, self._port.watchdog_endpoint or 0, bytes(4))
 
     def _settings(self) -> Iterator[tuple[str, float]]:
         """List the properties to write; the watchdog comes last, for from then on it is fed."""
@@ -103,7 +103,7 @@ class AxisSetup:
 
     def _check_firmware(self, table: EndpointTable) -> Iterator[None]:
         port = self._port
-        yield from self._obtain("version", Command.GET_VERSION, lambda: bool(port.firmware))
+        yield from self._obtain("version", OdriveCommand.GET_VERSION, lambda: bool(port.firmware))
         if port.firmware != table.firmware:
             raise WrongDevice(
                 f"{port.spec.name}: firmware {port.firmware}, but {table.path} is of "
@@ -114,7 +114,7 @@ class AxisSetup:
     def _refuse_unrepaired(self) -> Iterator[None]:
         port = self._port
         port.errors_told = False
-        yield from self._obtain("errors", Command.GET_ERROR, lambda: port.errors_told)
+        yield from self._obtain("errors", OdriveCommand.GET_ERROR, lambda: port.errors_told)
         if port.fault is not None and port.fault.rule is ResetRule.NEVER:
             raise DeviceFault(
                 f"{port.spec.name}: {port.fault.text}; it is reset {ResetRule.NEVER.value}"
@@ -122,38 +122,38 @@ class AxisSetup:
 
     def _stand_down(self) -> Iterator[None]:
         port = self._port
-        self.tell(Command.SET_INPUT_VEL, 0.0, 0.0)
-        self.tell(Command.SET_AXIS_STATE, AxisState.IDLE)
+        self.tell(OdriveCommand.SET_INPUT_VEL, 0.0, 0.0)
+        self.tell(OdriveCommand.SET_AXIS_STATE, AxisState.IDLE)
         yield from self._await(
             "idle state", lambda: port.axis_state is AxisState.IDLE, HEARTBEAT_TIMEOUT_NS
         )
 
     def _choose_velocity_mode(self) -> None:
         spec = self._port.spec
-        self.tell(Command.SET_CONTROLLER_MODE, ControlMode.VELOCITY, InputMode.VEL_RAMP)
+        self.tell(OdriveCommand.SET_CONTROLLER_MODE, ControlMode.VELOCITY, InputMode.VEL_RAMP)
         if spec.current_limit_a is not None:
             velocity_rev_s = spec.velocity_limit_rad_s * abs(spec.revs_per_rad)
-            self.tell(Command.SET_LIMITS, velocity_rev_s, spec.current_limit_a)
-        self.tell(Command.SET_INPUT_VEL, 0.0, 0.0)
+            self.tell(OdriveCommand.SET_LIMITS, velocity_rev_s, spec.current_limit_a)
+        self.tell(OdriveCommand.SET_INPUT_VEL, 0.0, 0.0)
 
     def _clear(self) -> Iterator[None]:
         """Clear what the last host's silence left behind; the rest is the operator's to reset."""
         port = self._port
         self.clear_silence()
         port.errors_told = False
-        yield from self._obtain("errors", Command.GET_ERROR, lambda: port.errors_told)
+        yield from self._obtain("errors", OdriveCommand.GET_ERROR, lambda: port.errors_told)
 
     def clear_silence(self) -> None:
         """Clear errors, unless there is one that is not for us to clear."""
         fault = self._port.fault
         if fault is None or fault.rule is ResetRule.AUTOMATIC:
-            self.tell(Command.CLEAR_ERRORS, 0)
+            self.tell(OdriveCommand.CLEAR_ERRORS, 0)
 
     def _first_estimate(self) -> Iterator[None]:
         port = self._port
         yield from self._obtain(
             "estimate",
-            Command.GET_ENCODER_ESTIMATES,
+            OdriveCommand.GET_ENCODER_ESTIMATES,
             lambda: port.complete or port.without_estimate,
         )
         if not port.complete:
@@ -165,7 +165,7 @@ class AxisSetup:
     def _set(self, endpoint: Endpoint, value: float) -> Iterator[None]:
         """Write a property and read it back."""
         data = endpoint.encode(value)
-        self.tell(Command.RX_SDO, SdoOpcode.WRITE, endpoint.number, data)
+        self.tell(OdriveCommand.RX_SDO, SdoOpcode.WRITE, endpoint.number, data)
         got = yield from self._read(endpoint)
         if got[: _significant(endpoint)] != data[: _significant(endpoint)]:
             raise WrongDevice(
@@ -177,7 +177,7 @@ class AxisSetup:
         values = self._port.values
         values.pop(endpoint.number, None)
         for _ in range(ATTEMPTS):
-            self.tell(Command.RX_SDO, SdoOpcode.READ, endpoint.number, bytes(4))
+            self.tell(OdriveCommand.RX_SDO, SdoOpcode.READ, endpoint.number, bytes(4))
             yield from until(lambda: endpoint.number in values, self._clock, ANSWER_TIMEOUT_NS)
             if endpoint.number in values:
                 return values[endpoint.number]
@@ -186,7 +186,9 @@ class AxisSetup:
             "verified, so the axis is not enabled"
         )
 
-    def _obtain(self, what: str, command: Command, done: Callable[[], bool]) -> Iterator[None]:
+    def _obtain(
+        self, what: str, command: OdriveCommand, done: Callable[[], bool]
+    ) -> Iterator[None]:
         for _ in range(ATTEMPTS):
             self.ask(command)
             yield from until(done, self._clock, ANSWER_TIMEOUT_NS)

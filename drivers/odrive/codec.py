@@ -18,7 +18,7 @@ BROADCAST_NODE_ID: Final = 0x3F
 MAX_DATA_BYTES: Final = 8
 
 
-class Command(IntEnum):
+class OdriveCommand(IntEnum):
     """Name the lower five bits of an identifier."""
 
     GET_VERSION = 0x00
@@ -124,7 +124,7 @@ class AxisError(IntFlag):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Message:
+class OdriveMessage:
     """Describe one message: its vendor's name, its packing and its signals in order."""
 
     name: str
@@ -132,13 +132,13 @@ class Message:
     signals: tuple[str, ...] = ()
 
 
-def _message(name: str, layout: str, *signals: str) -> Message:
-    return Message(name=name, wire=struct.Struct(f"<{layout}"), signals=signals)
+def _message(name: str, layout: str, *signals: str) -> OdriveMessage:
+    return OdriveMessage(name=name, wire=struct.Struct(f"<{layout}"), signals=signals)
 
 
-_C = Command
+_C = OdriveCommand
 # Units: rev, rev/s, N·m, A, V, °C, W. Input_Pos carries its feed-forwards in thousandths.
-MESSAGES: Final[dict[Command, Message]] = {
+MESSAGES: Final[dict[OdriveCommand, OdriveMessage]] = {
     _C.GET_VERSION: _message(
         "Get_Version",
         "8B",
@@ -189,7 +189,7 @@ MESSAGES: Final[dict[Command, Message]] = {
 }
 
 
-def can_id(node_id: int, command: Command) -> int:
+def can_id(node_id: int, command: OdriveCommand) -> int:
     """Return the identifier of a command to, or of a message from, an axis."""
     return node_id << COMMAND_BITS | command
 
@@ -199,12 +199,12 @@ def split_id(arbitration_id: int) -> tuple[int, int]:
     return arbitration_id >> COMMAND_BITS, arbitration_id & COMMAND_MASK
 
 
-def encode(command: Command, *values: float | bytes) -> bytes:
+def encode(command: OdriveCommand, *values: float | bytes) -> bytes:
     """Return the data of a message; one value per signal."""
     return MESSAGES[command].wire.pack(*values)
 
 
-def decode(command: Command, data: bytes) -> tuple[int | float | bytes, ...]:
+def decode(command: OdriveCommand, data: bytes) -> tuple[int | float | bytes, ...]:
     """Return the signals of a message in the order of its table row.
 
     A frame may be padded up to eight bytes, as the vendor's DBC file declares most messages.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from platforms.probes.reading import Reading, measure
-from platforms.tree import Missing, Tree, number_in
+from platforms.tree import Tree, ValueMissing, number_in
 
 MOUNT: Final = "/sys/fs/cgroup"
 UNIFIED: Final = f"{MOUNT}/unified"  # where both versions live side by side
@@ -29,7 +29,7 @@ def read_cgroup(tree: Tree) -> Cgroup:
     """Return our control group; never fails."""
     try:
         lines = tree.text("/proc/self/cgroup").splitlines()
-    except Missing as missing:
+    except ValueMissing as missing:
         return Cgroup(version=0, folder="", controllers=(), reason=str(missing))
     path = next((line[len(_PREFIX) :] for line in lines if line.startswith(_PREFIX)), None)
     mount = UNIFIED if tree.exists(f"{UNIFIED}/cgroup.controllers") else MOUNT
@@ -40,7 +40,7 @@ def read_cgroup(tree: Tree) -> Cgroup:
     folder = f"{mount}/{path.strip('/')}".rstrip("/")
     try:
         controllers = tuple(tree.text(f"{folder}/cgroup.controllers").split())
-    except Missing as missing:
+    except ValueMissing as missing:
         return Cgroup(version=2, folder=folder, controllers=(), reason=str(missing))
     reason = "version 1 holds the other controllers" if old else ""
     return Cgroup(version=2, folder=folder, controllers=controllers, reason=reason)
@@ -64,12 +64,12 @@ class CgroupSource:
 
     def _known(self, take: Callable[[], float]) -> float:
         if not self._cgroup.folder:
-            raise Missing(self._cgroup.reason)
+            raise ValueMissing(self._cgroup.reason)
         return take()
 
     def _limit_bytes(self) -> float:
         if self._limit.text() == "max":
-            raise Missing("our control group has no memory limit")
+            raise ValueMissing("our control group has no memory limit")
         return self._limit.number()
 
     def _throttled_s(self) -> float:
@@ -77,4 +77,4 @@ class CgroupSource:
             key, _, value = line.partition(" ")
             if key == "throttled_usec":
                 return number_in(value, str(self._cpu)) * 1e-6
-        raise Missing(f"{self._cpu} counts no throttled_usec")
+        raise ValueMissing(f"{self._cpu} counts no throttled_usec")

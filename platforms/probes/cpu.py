@@ -5,7 +5,7 @@ from functools import partial
 
 from platforms.probes.discovery import Discovery
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import SystemFile, Tree, ValueMissing
 
 CPUFREQ = "/sys/devices/system/cpu/cpufreq"
 PRESSURES = ("cpu", "memory", "io")
@@ -35,9 +35,9 @@ class CpuSource:
         busy, total = self._counters()
         last, self._last = self._last, (busy, total)
         if last is None:
-            raise Missing("this is the first look at /proc/stat, and it takes two")
+            raise ValueMissing("this is the first look at /proc/stat, and it takes two")
         if total <= last[1] or busy < last[0]:
-            raise Missing("the counters in /proc/stat have not moved on since the last look")
+            raise ValueMissing("the counters in /proc/stat have not moved on since the last look")
         return min((busy - last[0]) / (total - last[1]), 1.0)
 
     def _counters(self) -> tuple[int, int]:
@@ -46,7 +46,7 @@ class CpuSource:
             ticks = [int(word[:_MOST_DIGITS]) for word in lines[0].split()[1 : _STEAL + 1]]
             idle = ticks[_IDLE] + ticks[_IOWAIT]
         except (ValueError, IndexError) as error:
-            raise Missing("/proc/stat does not begin with a line of counters") from error
+            raise ValueMissing("/proc/stat does not begin with a line of counters") from error
         self._cores = sum(line.startswith("cpu") for line in lines) - 1
         return sum(ticks) - idle, sum(ticks)
 
@@ -102,5 +102,5 @@ def _some_ratio(file: SystemFile) -> float:
             try:
                 return float(value) / 100
             except ValueError as error:
-                raise Missing(f"{file} holds avg10={value!r}, expected a number") from error
-    raise Missing(f"{file} tells no avg10")
+                raise ValueMissing(f"{file} holds avg10={value!r}, expected a number") from error
+    raise ValueMissing(f"{file} tells no avg10")

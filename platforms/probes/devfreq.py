@@ -5,7 +5,7 @@ from typing import Final
 
 from platforms.probes.discovery import Discovery
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import SystemFile, Tree, ValueMissing
 
 DEVFREQ: Final = "/sys/class/devfreq"
 # The device tree's names of the integrated GPUs; Thor lists clocks only, under a name of its own.
@@ -59,7 +59,7 @@ class GpuSource:
     def _node_name(self, folder: str) -> str:
         try:
             return self._tree.text(f"{folder}/device/of_node/name")
-        except Missing:
+        except ValueMissing:
             return ""
 
 
@@ -77,7 +77,7 @@ class MemoryBusSource:
     def _load(self) -> float:
         rate_khz = self._rate.number() * _KHZ_PER_HZ
         if rate_khz <= 0:
-            raise Missing(f"{self._rate} tells no clock")
+            raise ValueMissing(f"{self._rate} tells no clock")
         # activity / kHz is per cent, as every monitor of these boards has it
         return within(self._activity.number() / rate_khz / 100, 1.0, self._activity)
 
@@ -89,5 +89,5 @@ def within(value: float, most: float, where: SystemFile) -> float:
         Missing: it is below 0 or above `most`, so the file means something else.
     """
     if not 0 <= value <= most:
-        raise Missing(f"{where} makes {value:g}, expected 0 to {most:g}")
+        raise ValueMissing(f"{where} makes {value:g}, expected 0 to {most:g}")
     return value

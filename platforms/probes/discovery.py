@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sized
 from typing import Generic, TypeVar
 
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 Found = TypeVar("Found", bound=Sized)
 
@@ -47,7 +47,7 @@ class Hwmon:
             folder = f"{self.FOLDER}/{name}"
             try:
                 chip = self._tree.text(f"{folder}/name")
-            except Missing:
+            except ValueMissing:
                 continue
             chips[chip] = (*chips.get(chip, ()), folder)
         return chips

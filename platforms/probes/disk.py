@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from platforms.probes.reading import Reading, measure
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 
 class DiskSource:
@@ -32,9 +32,9 @@ class DiskSource:
 def _least(each: Sequence[Reading]) -> float:
     for reading in each:
         if reading.value is None:
-            raise Missing(reading.reason.removeprefix("missing, because "))
+            raise ValueMissing(reading.reason.removeprefix("missing, because "))
     if not each:
-        raise Missing("no folder was named")
+        raise ValueMissing("no folder was named")
     return min(reading.value for reading in each if reading.value is not None)
 
 
@@ -46,7 +46,7 @@ def _free_bytes(path: Path) -> float:
 def _free_ratio(path: Path) -> float:
     found = _statistics(path)
     if not found.f_blocks:
-        raise Missing(f"the file system of {path} has no size")
+        raise ValueMissing(f"the file system of {path} has no size")
     return found.f_bavail / found.f_blocks
 
 
@@ -54,4 +54,4 @@ def _statistics(path: Path) -> os.statvfs_result:
     try:
         return os.statvfs(path)
     except OSError as error:
-        raise Missing(f"{path}: {error.strerror}") from error
+        raise ValueMissing(f"{path}: {error.strerror}") from error

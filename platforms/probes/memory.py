@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 CLIENTS: Final = "/sys/kernel/debug/nvmap/iovmm/clients"
 _SIZE_ROW: Final = re.compile(r"^(\w+):\s+(\d{1,15}) kB$", re.MULTILINE | re.ASCII)
@@ -26,14 +26,14 @@ class MemorySource:
         """Return sizes in bytes."""
         try:
             rows = meminfo_bytes(self._meminfo.text())
-        except Missing as missing:
+        except ValueMissing as missing:
             rows, because = {}, str(missing)
         else:
             because = ""
 
         def row(key: str) -> float:
             if key not in rows:
-                raise Missing(because or f"/proc/meminfo has no {key}")
+                raise ValueMissing(because or f"/proc/meminfo has no {key}")
             return rows[key]
 
         yield measure("memory_total_bytes", "bytes", lambda: row("MemTotal"))
@@ -58,7 +58,7 @@ class NvmapSource:
         """Return the sum, then one reading `gpu_memory_used_bytes.<pid>` per process."""
         try:
             sizes = nvmap_bytes(self._clients.text())
-        except Missing as missing:
+        except ValueMissing as missing:
             yield lacking("gpu_memory_used_bytes", "bytes", str(missing))
             return
         yield Reading(name="gpu_memory_used_bytes", value=sum(sizes.values()), unit="bytes")
@@ -76,8 +76,8 @@ def nvmap_bytes(text: str) -> dict[int, float]:
     for pid, size in _CLIENT_ROW.findall(text):  # neither the head nor the total has a pid
         found = _CLIENT_SIZE.fullmatch(size)
         if found is None:
-            raise Missing(f"{CLIENTS} holds the size {size!r}")
+            raise ValueMissing(f"{CLIENTS} holds the size {size!r}")
         sizes[int(pid)] = sizes.get(int(pid), 0.0) + int(found[1]) * _FACTORS[found[2]]
     if not sizes and "CLIENT" not in text:
-        raise Missing(f"{CLIENTS} holds no table of clients")
+        raise ValueMissing(f"{CLIENTS} holds no table of clients")
     return sizes

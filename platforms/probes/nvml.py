@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing
+from platforms.tree import ValueMissing
 
 READS_BETWEEN_TRIALS: Final = 60  # a driver may be loaded late, and asking for it is not cheap
 _PERCENT: Final = 100.0
@@ -62,7 +62,7 @@ class NvmlSource:
             self._devices = tuple(
                 self._ask("nvmlDeviceGetHandleByIndex", index) for index in range(count)
             )
-        except Missing as missing:
+        except ValueMissing as missing:
             self._reason = str(missing)
         else:
             self._reason = "NVML knows no GPU"
@@ -72,7 +72,7 @@ class NvmlSource:
         try:
             return getattr(nvml, function)(*arguments)
         except nvml.NVMLError as error:
-            raise Missing(f"{function}: {error}") from error
+            raise ValueMissing(f"{function}: {error}") from error
 
     def _load_ratio(self) -> float:
         loads = [self._ask("nvmlDeviceGetUtilizationRates", one).gpu for one in self._devices]
@@ -90,7 +90,7 @@ class NvmlSource:
                 for one in self._ask("nvmlDeviceGetComputeRunningProcesses", device):
                     sizes[one.pid] = sizes.get(one.pid, 0.0) + float(one.usedGpuMemory or 0)
             self._memory("used")
-        except Missing:
+        except ValueMissing:
             yield measure("gpu_memory_used_bytes", "bytes", partial(_sum_of, sizes))
         for pid, size in sizes.items():
             yield Reading(name=f"gpu_memory_used_bytes.{pid}", value=size, unit="bytes")
@@ -109,5 +109,5 @@ class NvmlSource:
 
 def _sum_of(sizes: dict[int, float]) -> float:
     if not sizes:
-        raise Missing("NVML names no process with GPU memory")
+        raise ValueMissing("NVML names no process with GPU memory")
     return sum(sizes.values())

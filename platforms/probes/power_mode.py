@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from platforms.probes.reading import Reading, measure
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 
 CONFIGURATION: Final = "/etc/nvpmodel.conf"
 STATUS: Final = "/var/lib/nvpmodel/status"
@@ -46,7 +46,7 @@ def read_power_modes(tree: Tree) -> PowerModes:
     reasons = []
     try:
         text = tree.text(CONFIGURATION)
-    except Missing as missing:
+    except ValueMissing as missing:
         text = ""
         reasons.append(str(missing))
     names = {int(number): name for number, name in _MODE.findall(text)}
@@ -55,7 +55,7 @@ def read_power_modes(tree: Tree) -> PowerModes:
     default = _DEFAULT.search(text)
     try:
         current = _current(tree.text(STATUS))
-    except Missing as missing:
+    except ValueMissing as missing:
         current = None
         reasons.append(str(missing))
     return PowerModes(
@@ -69,5 +69,5 @@ def read_power_modes(tree: Tree) -> PowerModes:
 def _current(status: str) -> int:
     found = _CURRENT.search(status)
     if found is None:
-        raise Missing(f"{STATUS} names no pmode")
+        raise ValueMissing(f"{STATUS} names no pmode")
     return int(found.group(1))

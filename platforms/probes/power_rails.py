@@ -6,7 +6,7 @@ from typing import Final
 
 from platforms.probes.discovery import Hwmon
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import SystemFile, Tree, ValueMissing
 
 CHIP: Final = "ina3221"
 CHANNELS: Final = (1, 2, 3)  # channel 7 is the chip's own sum, which means nothing here
@@ -18,7 +18,7 @@ _W_PER_MV_MA: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rail:
+class PowerRail:
     """Hold the two files of one rail."""
 
     voltage: SystemFile
@@ -39,7 +39,7 @@ class PowerSource:
     def __init__(self, tree: Tree, hwmon: Hwmon) -> None:
         self._tree, self._hwmon = tree, hwmon
         self._folders: tuple[str, ...] | None = None
-        self._rails: Mapping[str, Rail] = {}
+        self._rails: Mapping[str, PowerRail] = {}
 
     def readings(self) -> Iterator[Reading]:
         """Return the total and each rail."""
@@ -53,13 +53,13 @@ class PowerSource:
         yield total_power(each)
         yield from each.values()
 
-    def _find(self, folders: Sequence[str]) -> dict[str, Rail]:
-        rails: dict[str, Rail] = {}
+    def _find(self, folders: Sequence[str]) -> dict[str, PowerRail]:
+        rails: dict[str, PowerRail] = {}
         for folder in folders:
             for channel in CHANNELS:
                 label = self._label(f"{folder}/in{channel}_label")
                 if label not in ("", NOT_CONNECTED):
-                    rails[label] = Rail(
+                    rails[label] = PowerRail(
                         voltage=self._tree.file(f"{folder}/in{channel}_input"),
                         current=self._tree.file(f"{folder}/curr{channel}_input"),
                     )
@@ -68,7 +68,7 @@ class PowerSource:
     def _label(self, path: str) -> str:
         try:
             return self._tree.text(path)
-        except Missing:
+        except ValueMissing:
             return ""
 
 

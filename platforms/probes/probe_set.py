@@ -15,7 +15,7 @@ from platforms.probes.memory import MemorySource, NvmapSource
 from platforms.probes.nvml import NvmlSource
 from platforms.probes.power_mode import PowerModeSource
 from platforms.probes.power_rails import PowerSource
-from platforms.probes.reading import Reading, Source
+from platforms.probes.reading import Reading, ReadingSource
 from platforms.probes.thermal import ThermalSource, hottest
 from platforms.probes.throttling import ThrottleSource
 from platforms.tree import Tree
@@ -24,7 +24,9 @@ from platforms.tree import Tree
 class ProbeSet:
     """Read everything that this computer tells of itself; files stay open between two reads."""
 
-    def __init__(self, tree: Tree, sources: Sequence[Source], nvml: NvmlSource | None) -> None:
+    def __init__(
+        self, tree: Tree, sources: Sequence[ReadingSource], nvml: NvmlSource | None
+    ) -> None:
         self._tree, self._nvml = tree, nvml
         self._sources = (*sources, nvml) if nvml is not None else tuple(sources)
 
@@ -61,7 +63,7 @@ def open_probes(
     """Open the probes below a root; NVML, which has no root, is asked for `/` only by default."""
     tree = Tree(root)
     hwmon = Hwmon(tree)
-    sources: tuple[Source, ...] = (
+    sources: tuple[ReadingSource, ...] = (
         CpuSource(tree),
         CpuFrequencySource(tree),
         PressureSource(tree),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from platforms.tree import Missing
+from platforms.tree import ValueMissing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,7 +17,7 @@ class Reading:
     reason: str = ""
 
 
-class Source(Protocol):
+class ReadingSource(Protocol):
     """Give the readings of one place in the system."""
 
     def readings(self) -> Iterable[Reading]:
@@ -28,7 +28,7 @@ def measure(name: str, unit: str, take: Callable[[], float]) -> Reading:
     """Take one number; what cannot be had becomes a reading with a reason."""
     try:
         return Reading(name=name, value=take(), unit=unit)
-    except Missing as missing:
+    except ValueMissing as missing:
         return lacking(name, unit, str(missing))
 
 

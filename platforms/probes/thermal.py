@@ -6,7 +6,7 @@ from typing import Final
 
 from platforms.probes.discovery import Discovery
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import SystemFile, Tree, ValueMissing
 
 ZONES: Final = "/sys/class/thermal"
 TEMPERATURE: Final = "temperature_c"
@@ -39,7 +39,7 @@ class ThermalSource:
     def _type(self, folder: str) -> str:
         try:
             return self._tree.text(f"{ZONES}/{folder}/type") or folder
-        except Missing:
+        except ValueMissing:
             return folder
 
 
@@ -56,5 +56,5 @@ def hottest(readings: Iterable[Reading]) -> Reading:
 def _celsius(file: SystemFile) -> float:
     value = file.number() / 1000
     if not COLDEST_C <= value <= HOTTEST_C:
-        raise Missing(f"{file} says {value:g} degC, which its sensor cannot measure")
+        raise ValueMissing(f"{file} says {value:g} degC, which its sensor cannot measure")
     return value

@@ -9,7 +9,7 @@ from typing import Final
 
 from platforms.probes.discovery import Hwmon
 from platforms.probes.reading import Reading, lacking, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import SystemFile, Tree, ValueMissing
 
 CHIP: Final = "soctherm_oc"
 COUNTERS: Final = ("oc1", "oc2", "oc3")
@@ -52,7 +52,7 @@ class ThrottleSource:
 
 def _rise(last: float | None, now: float) -> float:
     if last is None:
-        raise Missing("this is the first look at the counter, and it takes two")
+        raise ValueMissing("this is the first look at the counter, and it takes two")
     if now < last:
-        raise Missing(f"the counter went back from {last:g} to {now:g}")
+        raise ValueMissing(f"the counter went back from {last:g} to {now:g}")
     return now - last

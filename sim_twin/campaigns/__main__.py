@@ -9,12 +9,14 @@ from typing import Final
 
 from sim_twin.campaigns import fault_matrix, kills, load, pressure, soak, switches
 from sim_twin.campaigns.orderly_end import end_on_sigterm
-from sim_twin.campaigns.report import Report, make_room
+from sim_twin.campaigns.report import CampaignReport, make_room
 from sim_twin.campaigns.selection import NothingChosen
 from vla_deploy.cli.example import OneLineParser
 from vla_deploy.cli.validate import duration_h, whole_number
 
-CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
+CAMPAIGNS: Final[
+    Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
+] = {
     "faults": fault_matrix.run,
     "kills": kills.run,
     "load": load.run,

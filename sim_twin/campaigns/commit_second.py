@@ -14,7 +14,7 @@ _COMMITTED: Final = ("commit", "watch")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class CommitLook:
     """Hold what control had counted, and the switch's phase, at a moment of monotonic time."""
 
     now_ns: int
@@ -22,12 +22,12 @@ class Look:
     phase: str
 
 
-def commit_ns(looks: Sequence[Look]) -> int | None:
+def commit_ns(looks: Sequence[CommitLook]) -> int | None:
     """Return when the commit was seen first; None where there was none."""
     return next((look.now_ns for look in looks if look.phase in _COMMITTED), None)
 
 
-def late_around(looks: Sequence[Look], at_ns: int) -> tuple[int, int, int]:
+def late_around(looks: Sequence[CommitLook], at_ns: int) -> tuple[int, int, int]:
     """Return how many ticks were late within the looks that enclose the second, and their times."""
     half_ns = round(HALF_S * NS_PER_S)
     first = max((x for x in looks if x.now_ns <= at_ns - half_ns), key=_when, default=looks[0])
@@ -44,5 +44,5 @@ def explained(stalls: Sequence[Stall], begin_ns: int, end_ns: int, period_s: flo
     )
 
 
-def _when(look: Look) -> int:
+def _when(look: CommitLook) -> int:
     return look.now_ns

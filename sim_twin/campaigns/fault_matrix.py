@@ -13,17 +13,17 @@ from typing import Any, Final
 import numpy as np
 
 from sim_twin.campaigns.orderly_end import end_on_sigterm
-from sim_twin.campaigns.phases import PAYLOAD, NotSet, Phase, Stage
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.phases import PAYLOAD, NotSet, Phase, PhaseStage
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.separation import Separation
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.table import faults_of
-from sim_twin.faults.witness import Witness
+from sim_twin.faults.witness import FaultWitness
 from sim_twin.hazards import Hazard
-from sim_twin.stack import LockstepControl, LockstepStack, NotReady
+from sim_twin.stack import LockstepControl, LockstepStack, StackNotReady
 from sim_twin.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot
 
@@ -113,7 +113,7 @@ def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
     return True
 
 
-def play(cell: Cell, seed: int = 0) -> Case:
+def play(cell: Cell, seed: int = 0) -> CampaignCase:
     """Play one case on a robot of its own and judge it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         takes_all = cell.component in _SENSORS
@@ -122,8 +122,8 @@ def play(cell: Cell, seed: int = 0) -> Case:
             if not takes_all:
                 stack.add_senses()
             return _Trial(cell, stack).run()
-        except (NotSet, NotReady) as error:
-            return Case(name=cell.name, failures=(f"the stage could not be set: {error}",))
+        except (NotSet, StackNotReady) as error:
+            return CampaignCase(name=cell.name, failures=(f"the stage could not be set: {error}",))
         finally:
             stack.close()
 
@@ -134,7 +134,7 @@ class _Trial:
     def __init__(self, cell: Cell, stack: LockstepControl) -> None:
         self._cell = cell
         self._stack = stack
-        self._stage = Stage(stack)
+        self._stage = PhaseStage(stack)
         self._limp = cell.limp_joints(stack.robot)
         engine = stack.lockstep.twin.engine
         self._separation = Separation(engine.model, engine.data)
@@ -143,20 +143,20 @@ class _Trial:
         self._rest_places = np.zeros(0)
         self._moved_rad = 0.0
 
-    def run(self) -> Case:
+    def run(self) -> CampaignCase:
         """Set the stage, let it fail, and judge."""
         lockstep, cell = self._stack.lockstep, self._cell
         self._stage.begin(cell.phase)
         lockstep.twin.hazards.begin()
         firm = [name for name in self._stack.robot.joint_names if name not in self._limp]
-        seen = Witness(self._stack, lockstep.now_s, (*firm, *_WHEELS))
+        seen = FaultWitness(self._stack, lockstep.now_s, (*firm, *_WHEELS))
         lockstep.faults.inject_checked(cell.request(self._stack.robot))
         while seen.since_s < _FAULT_S + _AFTER_S:
             self._stage.run_for(_LOOK_S)
             seen.look()
             self._separation.look()
             self._watch_stop(seen)
-        return Case(
+        return CampaignCase(
             name=cell.name,
             failures=tuple(self._failures()),
             figures={
@@ -168,7 +168,7 @@ class _Trial:
             seconds=seen.since_s,
         )
 
-    def _watch_stop(self, seen: Witness) -> None:
+    def _watch_stop(self, seen: FaultWitness) -> None:
         """Note when it stops and first rests, and how far it moves after that."""
         if math.isnan(self._stopped_s):
             if seen.states & set(_STOPPED):
@@ -210,7 +210,7 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Play every case whose name contains `options.only`, several at a time."""
     robot = load_robot("butler")
     mine = chosen(cells(robot), options.only, lambda cell: cell.name)
@@ -221,10 +221,10 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
         for case in pool.imap(partial(play, seed=options.seed), mine):
             tell(case.row)
             cases.append(case)
-    return Report(campaign="faults", cases=tuple(cases), summary=_summary(cases))
+    return CampaignReport(campaign="faults", cases=tuple(cases), summary=_summary(cases))
 
 
-def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
     """Return the longest way to rest in each phase, and how near the base came to anything."""
     longest = {}
     for phase in Phase:
@@ -234,6 +234,6 @@ def _summary(cases: Sequence[Case]) -> dict[str, Any]:
     return {**longest, "least_gap_m": nearest, "unsafe": sum(bool(case.failures) for case in cases)}
 
 
-def _figures(name: str, cases: Sequence[Case]) -> list[float]:
+def _figures(name: str, cases: Sequence[CampaignCase]) -> list[float]:
     told = [case.figures.get(name) for case in cases]
     return [value for value in told if value is not None]

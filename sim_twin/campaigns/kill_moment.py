@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.campaigns.kill_rules import COMMANDS, PUT_DOWN, Injection, Moment
+from sim_twin.campaigns.kill_rules import COMMANDS, PUT_DOWN, Injection, KillMoment
 from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.robot_service import RobotService
 from vla_deploy.robots import load_robot
@@ -16,7 +16,7 @@ MOVING_RAD_S: Final = 0.1
 _POLL_S: Final = 0.02
 _LONGEST_S: Final = 120.0
 """A command that waits longer than this waits for what the kill took with it."""
-_WITHIN_S: Final[Mapping[Moment, float]] = {Moment.MOVING: 10.0, Moment.CARRYING: 60.0}
+_WITHIN_S: Final[Mapping[KillMoment, float]] = {KillMoment.MOVING: 10.0, KillMoment.CARRYING: 60.0}
 _WHEELS: Final = ("left_wheel", "right_wheel")
 
 
@@ -50,7 +50,7 @@ class Work:
         while True:
             self._keep_at_it(commands)
             met = self._met()
-            is_carrying = bool(met["held"]) or injection.moment is not Moment.CARRYING
+            is_carrying = bool(met["held"]) or injection.moment is not KillMoment.CARRYING
             now_ns = self._clock.now_ns()
             if now_ns >= end_ns or (now_ns >= due_ns and met["motion"] and is_carrying):
                 return met

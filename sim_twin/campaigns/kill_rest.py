@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from sim_twin.campaigns.kill_failures import late
-from sim_twin.campaigns.kill_rules import Rule
+from sim_twin.campaigns.kill_rules import KillRule
 from sim_twin.truth import fastest_joint
 
 _REST_FOR_S: Final = 0.3
@@ -19,7 +19,7 @@ class RestWatch:
     `rest_s` is NaN where the rule lets the robot carry on.
     """
 
-    def __init__(self, rule: Rule) -> None:
+    def __init__(self, rule: KillRule) -> None:
         self.rule = rule
         self.rest_s = math.nan if rule.rest_s is None else math.inf
         self.least_s = 0.0 if rule.rest_s is None else rule.rest_s + _REST_FOR_S

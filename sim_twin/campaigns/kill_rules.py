@@ -31,7 +31,7 @@ _EARLIEST_S, _LATEST_S = 0.5, 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rule:
+class KillRule:
     """Declare what must follow from the end of a process.
 
     `rest_s` is until when everything rests, None where the robot may carry on; `ready_s` until when
@@ -55,36 +55,36 @@ class Rule:
 _CARRIES_ON: Final = ("armed",)
 _WANTS_A_HAND: Final = ("disarmed", "stopped", "fault")
 # A frozen process is noticed by its silence, so it takes its row's limit longer than a dead one.
-RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
-    ("control", signal.SIGKILL): Rule(rest_s=1.5, ready_s=30.0, states=_WANTS_A_HAND),
-    ("control", signal.SIGSTOP): Rule(rest_s=1.5, ready_s=40.0, states=_WANTS_A_HAND),
-    ("control", signal.SIGTERM): Rule(rest_s=4.0, ready_s=30.0, states=_WANTS_A_HAND),
-    ("stop_door", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("stop_door", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("stop_door", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("executor", signal.SIGKILL): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
-    ("executor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=40.0, states=_CARRIES_ON),
-    ("executor", signal.SIGTERM): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
-    ("perception", signal.SIGKILL): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
-    ("perception", signal.SIGSTOP): Rule(rest_s=None, ready_s=60.0, states=_CARRIES_ON),
-    ("perception", signal.SIGTERM): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
-    ("speech", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("speech", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("speech", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("planner", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("planner", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("planner", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("recorder", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("recorder", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("recorder", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
-    ("dashboard", signal.SIGKILL): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("dashboard", signal.SIGSTOP): Rule(rest_s=None, ready_s=70.0, states=_CARRIES_ON),
-    ("dashboard", signal.SIGTERM): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
-    ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
-    ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
+RULES: Final[Mapping[tuple[str, signal.Signals], KillRule]] = {
+    ("control", signal.SIGKILL): KillRule(rest_s=1.5, ready_s=30.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGSTOP): KillRule(rest_s=1.5, ready_s=40.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGTERM): KillRule(rest_s=4.0, ready_s=30.0, states=_WANTS_A_HAND),
+    ("stop_door", signal.SIGKILL): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("stop_door", signal.SIGSTOP): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("stop_door", signal.SIGTERM): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("executor", signal.SIGKILL): KillRule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("executor", signal.SIGSTOP): KillRule(rest_s=6.0, ready_s=40.0, states=_CARRIES_ON),
+    ("executor", signal.SIGTERM): KillRule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("perception", signal.SIGKILL): KillRule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("perception", signal.SIGSTOP): KillRule(rest_s=None, ready_s=60.0, states=_CARRIES_ON),
+    ("perception", signal.SIGTERM): KillRule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("speech", signal.SIGKILL): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("speech", signal.SIGSTOP): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("speech", signal.SIGTERM): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("planner", signal.SIGKILL): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("planner", signal.SIGSTOP): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("planner", signal.SIGTERM): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGKILL): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGSTOP): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGTERM): KillRule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGKILL): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGSTOP): KillRule(rest_s=None, ready_s=70.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGTERM): KillRule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("supervisor", signal.SIGKILL): KillRule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
+    ("supervisor", signal.SIGSTOP): KillRule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
     # An orderly end takes the power: the arms come down slowly, until they lie on something. A limp
     # one that slides on there is braked by its own motors alone: 3 cm/s at a hand counts as rest.
-    ("supervisor", signal.SIGTERM): Rule(
+    ("supervisor", signal.SIGTERM): KillRule(
         rest_s=15.0, ready_s=30.0, states=("silent",), ends=True, rest_rad_s=0.05
     ),
 }
@@ -101,7 +101,7 @@ WITH_A_FULL_HAND: Final = (GRAVEST[0], GRAVEST[-1])
 """In a short round these alone wait for one."""
 
 
-class Moment(Enum):
+class KillMoment(Enum):
     """Name what the robot should be doing when the signal comes."""
 
     MOVING = "moving"
@@ -120,7 +120,7 @@ class Injection:
     signal: signal.Signals
     after_s: float
     command: str
-    moment: Moment = Moment.MOVING
+    moment: KillMoment = KillMoment.MOVING
 
     @property
     def name(self) -> str:
@@ -145,9 +145,9 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
             signal=what,
             after_s=draw.uniform(_EARLIEST_S, latest_s),
             command=COMMANDS[number % len(COMMANDS)],
-            moment=Moment.CARRYING
+            moment=KillMoment.CARRYING
             if short and (process, what) in WITH_A_FULL_HAND
-            else Moment.MOVING,
+            else KillMoment.MOVING,
         )
         for number, (process, what) in enumerate(pairs)
     ]

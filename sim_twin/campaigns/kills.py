@@ -17,10 +17,10 @@ from drivers.clock import NS_PER_S
 from sim_twin.campaigns.kill_failures import late_ready, wrong_state
 from sim_twin.campaigns.kill_moment import Work
 from sim_twin.campaigns.kill_rest import RestWatch
-from sim_twin.campaigns.kill_rules import RULES, Injection, Rule, injections
+from sim_twin.campaigns.kill_rules import RULES, Injection, KillRule, injections
 from sim_twin.campaigns.machine import Machine
-from sim_twin.campaigns.report import Case, Report, told
-from sim_twin.campaigns.robot_service import NotReady, RobotService
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.robot_service import RobotService, ServiceNotReady
 from sim_twin.campaigns.selection import chosen
 from vla_deploy.supervisor.table import RestartPolicy
 
@@ -44,7 +44,7 @@ class KillCampaign:
             raise
         self._work = Work(self._robot, self._machine, self._clock)
 
-    def inject(self, injection: Injection) -> Case:
+    def inject(self, injection: Injection) -> CampaignCase:
         """Do one and judge it."""
         self._let_run_stably(injection.process)
         self._robot.make_ready()
@@ -55,7 +55,7 @@ class KillCampaign:
                 self._work.end()  # the robot stopped, and with it what it was told to do
             self._hit_ns[injection.process] = self._clock.now_ns()
 
-    def _hit(self, injection: Injection) -> Case:
+    def _hit(self, injection: Injection) -> CampaignCase:
         """Wait for the moment, send the signal, and judge what follows."""
         rule = RULES[injection.process, injection.signal]
         met = self._work.meet(injection)
@@ -71,7 +71,7 @@ class KillCampaign:
             failures.append(wrong_state(state, self._robot.why(), rule.states))
         failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
         figures = {"rest_s": rest.rest_s, "ready_s": ready_s, "state": state, **met}
-        return Case(
+        return CampaignCase(
             name=injection.name,
             failures=tuple(failures),
             figures={**figures, "moved_rad": rest.moved_rad},
@@ -122,20 +122,22 @@ class KillCampaign:
     def _since(self, began_ns: int) -> float:
         return (self._clock.now_ns() - began_ns) / NS_PER_S
 
-    def _is_back(self, rule: Rule, process: str, pid: int) -> bool:
+    def _is_back(self, rule: KillRule, process: str, pid: int) -> bool:
         if rule.ends:
             return self._robot.has_ended()
         return self._robot.is_ready() and self._robot.pid_of(process) not in (0, pid)
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Do `options.count` injections, 200 unless told otherwise."""
     count = INJECTIONS if options.count is None else options.count
     drawn = injections(count, options.seed)
     return inject_all(chosen(drawn, options.only, lambda each: each.name), options.seed, tell)
 
 
-def inject_all(drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]) -> Report:
+def inject_all(
+    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]
+) -> CampaignReport:
     """Do injections one after the other on one machine."""
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
@@ -143,21 +145,21 @@ def inject_all(drawn: Sequence[Injection], seed: int, tell: Callable[[str], None
             cases = [told(_injected(campaign, injection), tell) for injection in drawn]
         finally:
             campaign.close()
-    return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+    return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
-def _injected(campaign: KillCampaign, injection: Injection) -> Case:
+def _injected(campaign: KillCampaign, injection: Injection) -> CampaignCase:
     try:
         return campaign.inject(injection)
-    except NotReady as error:
-        return Case(name=injection.name, failures=(str(error),))
+    except ServiceNotReady as error:
+        return CampaignCase(name=injection.name, failures=(str(error),))
 
 
 def _share(met: Sequence[Mapping[str, Any]], is_so: Callable[[Mapping[str, Any]], object]) -> float:
     return sum(bool(is_so(each)) for each in met) / max(len(met), 1)
 
 
-def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
     """Return what was hit in motion, and each process' longest way to rest and back to ready."""
     met = [case.figures for case in cases if "motion" in case.figures]
     summary: dict[str, Any] = {

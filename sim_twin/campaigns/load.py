@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from sim_twin.campaigns.report import Case, Report, told
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 
 BUSY_LOOPS: Final = 8
 COUNT: Final = 10
@@ -23,7 +23,7 @@ _NONE_OF: Final = ("late_ticks", "bus_timeouts")
 Outcome = Mapping[str, Any]
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Do the job once alone, then `options.count` times beside busy loops, 10 unless given."""
     count = COUNT if options.count is None else options.count
     alone = _demo(options.seed)
@@ -32,10 +32,10 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
         for number in range(count):
             case = judge(f"beside_{BUSY_LOOPS}_loops/{number}", _demo(options.seed), alone)
             cases.append(told(case, tell))
-    return Report(campaign="load", cases=tuple(cases), summary=_summary(cases[1:]))
+    return CampaignReport(campaign="load", cases=tuple(cases), summary=_summary(cases[1:]))
 
 
-def judge(name: str, outcome: Outcome, alone: Outcome) -> Case:
+def judge(name: str, outcome: Outcome, alone: Outcome) -> CampaignCase:
     """Return the verdict on one run by the one that had the computer for itself."""
     failures = [] if outcome["success"] else [f"failed: {outcome['error'] or outcome['refused']}"]
     failures += [f"{what}: {outcome[what]}, expected 0" for what in _NONE_OF if outcome.get(what)]
@@ -47,7 +47,7 @@ def judge(name: str, outcome: Outcome, alone: Outcome) -> Case:
     if outcome.get("wire_digest") != alone.get("wire_digest"):
         failures.append("other bytes on the buses than alone")
     names = ("took_s", "wall_s", "ticks", "placement_error_m", "wire_digest")
-    return Case(
+    return CampaignCase(
         name=name,
         failures=tuple(failures),
         figures={what: outcome.get(what) for what in names},
@@ -64,7 +64,7 @@ def _apart_m(outcome: Outcome, alone: Outcome) -> float:
     return 0.0 if None in places else abs(places[0] - places[1])
 
 
-def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
     ratios = [case.figures["took_s"] / case.figures["wall_s"] for case in cases if case.seconds]
     return {
         "failed": sum(bool(case.failures) for case in cases),

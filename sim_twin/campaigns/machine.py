@@ -10,7 +10,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.twin_clock import TwinClock
 from drivers.twin_page import TwinPace
-from sim_twin.errors import TwinError, Unreachable
+from sim_twin.errors import TwinError, TwinUnreachable
 from sim_twin.process import READY_FILE
 from sim_twin.referee import ask, told_hazards
 
@@ -79,6 +79,6 @@ class Machine:
             return False
         try:
             self.truth()
-        except Unreachable:
+        except TwinUnreachable:
             return False
         return bool(json.loads(path.read_text(encoding="utf-8")))

@@ -49,7 +49,7 @@ class NotSet(Exception):
     """Say that the stage could not be set: nothing can be said about the phase."""
 
 
-class Stage:
+class PhaseStage:
     """Own a robot's motions in a phase; control alone is needed, or the whole stack."""
 
     def __init__(self, stack: LockstepControl) -> None:

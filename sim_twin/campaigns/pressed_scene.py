@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from drivers.clock import Clock
 from sim_twin.campaigns.clock_shift import CannotShift, ClockShift
-from sim_twin.campaigns.talk import Talk
+from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.working_robot import WorkingRobot
 from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.supervisor.crash_reports import crash_folder
@@ -60,7 +60,7 @@ class CannotPress(Exception):
     """Say why a trouble cannot be made on this computer."""
 
 
-class Scene:
+class PressedScene:
     """Own folder, board, disk, clock and robot of one case; use it as a context manager."""
 
     def __init__(self, clock: Clock, seed: int, *, small_disk: bool, shifted_clock: bool) -> None:
@@ -69,7 +69,7 @@ class Scene:
         self._wants = (small_disk, shifted_clock)
         self._closing = contextlib.ExitStack()
 
-    def __enter__(self) -> "Scene":
+    def __enter__(self) -> "PressedScene":
         """Start the robot.
 
         Raises:
@@ -88,7 +88,7 @@ class Scene:
             self.lay_out_board()
             self.robot = self._start()
             stack.callback(self.robot.close)
-            self.talk: Talk = self.robot.talk()
+            self.talk: CommandTalk = self.robot.talk()
             self._closing = stack.pop_all()
         return self
 

@@ -10,26 +10,26 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from sim_twin.campaigns.pressed_scene import CannotPress, Scene
+from sim_twin.campaigns.pressed_scene import CannotPress, PressedScene
 from sim_twin.campaigns.pressure_judge import judge, listed
-from sim_twin.campaigns.pressure_trial import Trial
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.pressure_trial import PressureTrial
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.troubles import TROUBLES, Trouble
 from sim_twin.campaigns.working_robot import RobotFailed
 
 
-def play(trouble: Trouble, seed: int, clock: Clock) -> Case:
+def play(trouble: Trouble, seed: int, clock: Clock) -> CampaignCase:
     """Give one trouble to a robot of its own and judge what follows."""
     began_ns = clock.now_ns()
     wants = {"small_disk": trouble.small_disk, "shifted_clock": trouble.shifted_clock}
     try:
-        with Scene(clock, seed, **wants) as scene:
-            seen = Trial(trouble, scene, clock).run()
+        with PressedScene(clock, seed, **wants) as scene:
+            seen = PressureTrial(trouble, scene, clock).run()
     except CannotPress as error:
-        return Case(name=trouble.name, skipped=str(error))
+        return CampaignCase(name=trouble.name, skipped=str(error))
     except RobotFailed as error:
-        return Case(name=trouble.name, failures=(str(error),))
+        return CampaignCase(name=trouble.name, failures=(str(error),))
     figures = {
         "late_ratio_before": seen.before.late_ratio,
         "late_ratio_during": seen.during.late_ratio,
@@ -40,19 +40,19 @@ def play(trouble: Trouble, seed: int, clock: Clock) -> Case:
     }
     seconds = (clock.now_ns() - began_ns) / NS_PER_S
     failures = tuple(judge(trouble, seen))
-    return Case(name=trouble.name, failures=failures, figures=figures, seconds=seconds)
+    return CampaignCase(name=trouble.name, failures=failures, figures=figures, seconds=seconds)
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Play every trouble whose name contains `options.only`, one after the other."""
     clock = MonotonicClock()
     cases = []
     for trouble in chosen(TROUBLES, options.only, lambda trouble: trouble.name):
         cases.append(play(trouble, options.seed, clock))
         tell(cases[-1].row)
-    return Report(campaign="pressure", cases=tuple(cases), summary=_summary(cases))
+    return CampaignReport(campaign="pressure", cases=tuple(cases), summary=_summary(cases))
 
 
-def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
     times = [float(case.figures["service_s"]) for case in cases if "service_s" in case.figures]
     return {"longest_way_to_full_service_s": max(times, default=math.nan)}

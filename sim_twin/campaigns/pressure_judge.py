@@ -4,12 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sim_twin.campaigns.ticks import Ticks, late_limit
+from sim_twin.campaigns.ticks import TickWatch, late_limit
 from sim_twin.campaigns.troubles import Trouble
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class TroubleSeen:
     """Hold what one trouble led to; NaN is what never came.
 
     `states` are those in which control was, each with what control said the first time.
@@ -18,9 +18,9 @@ class Seen:
     taken: tuple[str, ...]
     undone: tuple[str, ...]
     metrics_over: frozenset[str]
-    before: Ticks
-    during: Ticks
-    after: Ticks
+    before: TickWatch
+    during: TickWatch
+    after: TickWatch
     states: Mapping[str, str]
     replaced: frozenset[str]
     crashed: tuple[str, ...]
@@ -29,7 +29,7 @@ class Seen:
     service_s: float
 
 
-def judge(trouble: Trouble, seen: Seen) -> Iterator[str]:
+def judge(trouble: Trouble, seen: TroubleSeen) -> Iterator[str]:
     """Return what was not as declared."""
     if seen.taken != trouble.steps:
         yield f"steps taken: {listed(seen.taken)}; expected {listed(trouble.steps)}"

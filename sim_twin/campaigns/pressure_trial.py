@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.campaigns.pressed_scene import Scene
-from sim_twin.campaigns.pressure_judge import Seen, steps_of
+from sim_twin.campaigns.pressed_scene import PressedScene
+from sim_twin.campaigns.pressure_judge import TroubleSeen, steps_of
 from sim_twin.campaigns.troubles import Trouble
 from sim_twin.campaigns.working_robot import RobotFailed
 
@@ -25,10 +25,10 @@ _JOBS: Final = (
 _PROOF: Final = "look left"
 
 
-class Trial:
+class PressureTrial:
     """Lead one robot through one trouble."""
 
-    def __init__(self, trouble: Trouble, scene: Scene, clock: Clock) -> None:
+    def __init__(self, trouble: Trouble, scene: PressedScene, clock: Clock) -> None:
         self._trouble = trouble
         self._scene = scene
         self._clock = clock
@@ -38,7 +38,7 @@ class Trial:
         self._over: set[str] = set()
         self._history_before = 0
 
-    def run(self) -> Seen:
+    def run(self) -> TroubleSeen:
         """Work, press, lift, and wait for full service."""
         self._settle()
         scene, robot = self._scene, self._scene.robot
@@ -57,7 +57,7 @@ class Trial:
         service_s = self._time_to_service()
         history = self._history()
         later = robot.pids()
-        return Seen(
+        return TroubleSeen(
             taken=steps_of(history, taken=True),
             undone=steps_of(history, taken=False),
             metrics_over=frozenset(self._over),

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class CampaignCase:
     """Tell one case: no `failures` means that all was as it must be; `figures` are for tables.
 
     `skipped` is why the case was not played.
@@ -34,20 +34,20 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class CampaignReport:
     """Hold what a campaign found."""
 
     campaign: str
-    cases: tuple[Case, ...]
+    cases: tuple[CampaignCase, ...]
     summary: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def failed(self) -> tuple[Case, ...]:
+    def failed(self) -> tuple[CampaignCase, ...]:
         """Return the cases that failed."""
         return tuple(case for case in self.cases if case.failures)
 
     @property
-    def skipped(self) -> tuple[Case, ...]:
+    def skipped(self) -> tuple[CampaignCase, ...]:
         """Return the cases that could not be played."""
         return tuple(case for case in self.cases if case.skipped)
 
@@ -74,7 +74,7 @@ class Report:
         write_junit(path, self.campaign, self.cases)
 
 
-def told(case: Case, tell: Callable[[str], None]) -> Case:
+def told(case: CampaignCase, tell: Callable[[str], None]) -> CampaignCase:
     """Tell a case as soon as it is over, and return it."""
     tell(case.row)
     return case
@@ -93,7 +93,7 @@ def make_room(path: Path) -> None:
         raise PermissionError(errno.EACCES, "it cannot be written", str(path))
 
 
-def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
+def write_junit(path: Path, suite: str, cases: Sequence[CampaignCase]) -> None:
     """Write cases in the JUnit format."""
     counts = {
         "name": suite,

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.campaigns.strays import MARK, strays
-from sim_twin.service_runner import ServiceRunner, ServiceState
+from sim_twin.service_runner import RunnerState, ServiceRunner
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.lifecycle import is_settled
@@ -28,7 +28,7 @@ _FRESH_STATUS_S: Final = 0.5
 _TABLE_NS: Final = NS_PER_S  # twice as long as the table grows old
 
 
-class NotReady(Exception):
+class ServiceNotReady(Exception):
     """Say that the robot does not come up, or cannot be armed."""
 
 
@@ -60,7 +60,7 @@ class RobotService:
 
     def has_ended(self) -> bool:
         """Tell whether the service has ended as a person wanted: nobody starts it again."""
-        return self._runner.state is ServiceState.INACTIVE
+        return self._runner.state is RunnerState.INACTIVE
 
     def is_ready(self) -> bool:
         """Tell whether every process that should run is ready."""
@@ -100,7 +100,7 @@ class RobotService:
         """
         pid = self.pid_of(process)
         if not pid:  # kill(2) would take 0 for everyone in our own process group
-            raise NotReady(f"{process} does not run, so it cannot get {number.name}")
+            raise ServiceNotReady(f"{process} does not run, so it cannot get {number.name}")
         os.kill(pid, number)
         return pid
 
@@ -157,7 +157,9 @@ class RobotService:
         while self.control_state() not in wanted:
             if self._clock.now_ns() > deadline_ns:
                 status = self._document("control_status", _FRESH_S)
-                raise NotReady(f"{act}: control is not {' or '.join(wanted)}: {json.dumps(status)}")
+                raise ServiceNotReady(
+                    f"{act}: control is not {' or '.join(wanted)}: {json.dumps(status)}"
+                )
             self._attached().operate(act)
             soon_ns = self._clock.now_ns() + round(_AGAIN_S * NS_PER_S)
             while self.control_state() not in wanted and self._clock.now_ns() < soon_ns:
@@ -169,13 +171,15 @@ class RobotService:
             if self._clock.now_ns() > deadline_ns:
                 table = self._document("process_table", _FRESH_S)
                 report = self._runner.report
-                raise NotReady(f"{what} after {timeout_s:g} s: {report}, {json.dumps(table)}")
+                raise ServiceNotReady(
+                    f"{what} after {timeout_s:g} s: {report}, {json.dumps(table)}"
+                )
             self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
 
     def _document(self, topic: str, age_limit_s: float) -> dict[str, Any] | None:
         try:
             return self._attached().document(topic, age_limit_s)
-        except (NotReady, IpcError, OSError):
+        except (ServiceNotReady, IpcError, OSError):
             return None  # the run is about to come or to go
 
     def _attached(self) -> Session:
@@ -183,7 +187,7 @@ class RobotService:
         owner = running(self._base)
         if owner is None:
             self._detach()
-            raise NotReady(f"no robot runs in {self._base}")
+            raise ServiceNotReady(f"no robot runs in {self._base}")
         run_dir = Path(owner.run_dir)
         if self._session is None or self._session.run_dir != run_dir:
             self._detach()

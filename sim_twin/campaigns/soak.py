@@ -13,9 +13,9 @@ import numpy as np
 import psutil
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
-from sim_twin.stack import LockstepStack, NotReady
+from sim_twin.stack import LockstepStack, StackNotReady
 from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0
@@ -45,7 +45,7 @@ JOBS: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
+class SoakSample:
     """Hold what the process has, at a moment of the wall clock and of the simulation.
 
     `memory_mib` is its own memory. What it maps of files is not in it: pages of topics come into
@@ -80,9 +80,9 @@ class Soak:
         self.stopped = 0
         self.failed: list[str] = []
 
-    def work(self, hours: float, tell: Callable[[str], None]) -> list[Sample]:
+    def work(self, hours: float, tell: Callable[[str], None]) -> list[SoakSample]:
         """Do job after job for so long on the wall clock, and take a sample after each."""
-        samples: list[Sample] = []
+        samples: list[SoakSample] = []
         while not samples or samples[-1].wall_h < hours:
             self.do(JOBS[self.done % len(JOBS)])
             samples.append(self._sample())
@@ -97,7 +97,7 @@ class Soak:
         """Have one job done, and note how it ended; a robot that stopped is let go on after it."""
         try:
             outcome = self.stack.say(job, _JOB_S)
-        except NotReady as error:
+        except StackNotReady as error:
             self.stack.give(cancel=True)
             outcome = {"error": str(error)}
         self.stack.events.clear()
@@ -114,10 +114,10 @@ class Soak:
             self.stack.insist("reset")
             self.stack.arm()
 
-    def _sample(self) -> Sample:
+    def _sample(self) -> SoakSample:
         memory = self._process.memory_info()
         files = [Path(root, name) for root, _, names in os.walk(self._folder) for name in names]
-        return Sample(
+        return SoakSample(
             wall_h=(self._clock.now_ns() - self._began_ns) / NS_PER_S / _S_PER_H,
             sim_h=(self.stack.lockstep.now_s - self._began_s) / _S_PER_H,
             memory_mib=(memory.rss - memory.shared) / _MIB,
@@ -135,7 +135,7 @@ def fill_cache_of_small_arrays() -> None:
         del held
 
 
-def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
+def growth(samples: Sequence[SoakSample], field: str, per: str = "sim_h") -> float:
     """Return the slope of a figure after the warm-up, per hour.
 
     Raises:
@@ -150,7 +150,7 @@ def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
     return float(slope)
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Work for `options.hours`, one unless told otherwise.
 
     Raises:
@@ -167,18 +167,20 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
             soak.close()
     cases = (*judge(samples), jobs_case(soak.done, len(soak.failed)))
     mine = tuple(case for case in cases if case.name in names)
-    return Report(campaign="soak", cases=mine, summary=_summary(soak, samples))
+    return CampaignReport(campaign="soak", cases=mine, summary=_summary(soak, samples))
 
 
-def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
+def judge(samples: Sequence[SoakSample]) -> tuple[CampaignCase, ...]:
     """Return a case for each thing that must not grow; too short a soak cannot judge them."""
     too_few = _too_few(samples)
     if too_few:
-        return tuple(Case(name=name, skipped=too_few) for name in ("memory", *_MUST_NOT_GROW))
+        return tuple(
+            CampaignCase(name=name, skipped=too_few) for name in ("memory", *_MUST_NOT_GROW)
+        )
     slope = growth(samples, "memory_mib")
     too_much = (f"grows by {slope:.2f} MiB/h, limit {MOST_MIB_PER_H:g}",)
     cases = [
-        Case(
+        CampaignCase(
             name="memory",
             failures=too_much if slope > MOST_MIB_PER_H else (),
             figures={
@@ -191,22 +193,24 @@ def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
     for field in _MUST_NOT_GROW:
         first, last = getattr(warm[0], field), getattr(samples[-1], field)
         grown = (f"grew from {first} to {last}",) if last > first else ()
-        cases.append(Case(name=field, failures=grown, figures={"first": first, "last": last}))
+        cases.append(
+            CampaignCase(name=field, failures=grown, figures={"first": first, "last": last})
+        )
     return tuple(cases)
 
 
-def _warm(samples: Sequence[Sample]) -> Sequence[Sample]:
+def _warm(samples: Sequence[SoakSample]) -> Sequence[SoakSample]:
     return samples[round(_WARM_UP_RATIO * len(samples)) :]
 
 
-def _too_few(samples: Sequence[Sample]) -> str:
+def _too_few(samples: Sequence[SoakSample]) -> str:
     """Return why the samples say nothing of growth, empty where they are enough."""
     count = len(_warm(samples))
     enough = count >= _LEAST_SAMPLES
     return "" if enough else f"{count} samples after the warm-up, expected {_LEAST_SAMPLES}"
 
 
-def jobs_case(done: int, failed: int) -> Case:
+def jobs_case(done: int, failed: int) -> CampaignCase:
     """Return the verdict about the work itself."""
     ratio = (done - failed) / done if done else 0.0
     failures = (
@@ -215,10 +219,10 @@ def jobs_case(done: int, failed: int) -> Case:
         else ()
     )
     figures = {"done": done, "failed": failed, "ended_well_ratio": ratio}
-    return Case(name="jobs", failures=failures, figures=figures)
+    return CampaignCase(name="jobs", failures=failures, figures=figures)
 
 
-def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
+def _summary(soak: Soak, samples: Sequence[SoakSample]) -> dict[str, Any]:
     return {
         "wall_h": samples[-1].wall_h,
         "sim_h": samples[-1].sim_h,
@@ -231,7 +235,7 @@ def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
     }
 
 
-def _row(number: int, sample: Sample) -> str:
+def _row(number: int, sample: SoakSample) -> str:
     return (
         f"job {number}: {sample.sim_h:.3f} h simulated, {sample.memory_mib:.1f} MiB, "
         f"{sample.open_files} files open, {sample.threads} threads, "

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sim_twin.campaigns.report import Case
-from sim_twin.campaigns.ticks import Ticks, late_limit, total
+from sim_twin.campaigns.report import CampaignCase
+from sim_twin.campaigns.ticks import TickWatch, late_limit, total
 
 MOST_MIB_PER_SWITCH: Final = 0.05
 """A hundred switches may leave 5 MiB: allocators and caches never stand quite still."""
@@ -18,13 +18,13 @@ _WARM_UP_RATIO: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class SwitchSeen:
     """Hold what was measured across one switch; memory is each process' own, in MiB."""
 
     outcome: str
     reason: str
     seconds: float
-    ticks: Ticks
+    ticks: TickWatch
     least_rate_hz: float
     moved_rad: float
     states: frozenset[str]
@@ -34,7 +34,7 @@ class Seen:
     explained_at_commit: int = 0
 
 
-def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str]:
+def judge(seen: SwitchSeen, outcomes: Sequence[str], reason: str = "") -> Iterator[str]:
     """Return what was wrong with one switch; late ticks far from its commit count over all."""
     if seen.late_at_commit is not None and seen.late_at_commit > seen.explained_at_commit:
         yield (
@@ -55,7 +55,7 @@ def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str
         yield f"moved {seen.moved_rad:.3f} rad, expected {LEAST_MOTION_RAD} at least"
 
 
-def slopes(history: Sequence[Seen]) -> dict[str, float]:
+def slopes(history: Sequence[SwitchSeen]) -> dict[str, float]:
     """Return by how many MiB each process grows with a switch, after the warm-up."""
     warm = history[round(_WARM_UP_RATIO * len(history)) :]
     if len(warm) < 2:
@@ -72,7 +72,7 @@ def slopes(history: Sequence[Seen]) -> dict[str, float]:
     }
 
 
-def memory_case(history: Sequence[Seen]) -> Case:
+def memory_case(history: Sequence[SwitchSeen]) -> CampaignCase:
     """Return the verdict about memory; too few switches give figures without a verdict."""
     found = slopes(history)
     enough = len(history) >= FEWEST_FOR_A_SLOPE
@@ -84,10 +84,10 @@ def memory_case(history: Sequence[Seen]) -> Case:
     figures: dict[str, Any] = {f"{name}_mib_per_switch": slope for name, slope in found.items()}
     if not enough:
         figures["not_judged"] = f"{len(history)} switches, {FEWEST_FOR_A_SLOPE} are needed"
-    return Case(name="memory", failures=failures, figures=figures)
+    return CampaignCase(name="memory", failures=failures, figures=figures)
 
 
-def ticks_case(before: Ticks, history: Sequence[Seen]) -> Case:
+def ticks_case(before: TickWatch, history: Sequence[SwitchSeen]) -> CampaignCase:
     """Return the verdict about late ticks across all switches."""
     during = total(seen.ticks for seen in history)
     limit = late_limit(before)
@@ -102,4 +102,4 @@ def ticks_case(before: Ticks, history: Sequence[Seen]) -> Case:
         "ticks": during.ticks,
         "late_ticks": during.late,
     }
-    return Case(name="deadlines", failures=failures, figures=figures)
+    return CampaignCase(name="deadlines", failures=failures, figures=figures)

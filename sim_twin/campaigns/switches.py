@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from sim_twin.campaigns.commit_second import Look, commit_ns, explained, late_around
-from sim_twin.campaigns.report import Case, Report, told
+from sim_twin.campaigns.commit_second import CommitLook, commit_ns, explained, late_around
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
-from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
+from sim_twin.campaigns.switch_judge import SwitchSeen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
-from sim_twin.campaigns.ticks import Ticks
+from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.campaigns.working_robot import RobotFailed, WorkingRobot
 from sim_twin.stillness import FINE_STEP_S, StillnessWatch
 from vla_deploy.robots import load_robot
@@ -54,7 +54,7 @@ class SwitchCampaign:
             self.close()
             raise
 
-    def before(self) -> Ticks:
+    def before(self) -> TickWatch:
         """Return the ticks of a while without any switch, in the same motion."""
         start = self._robot.ticks()
         self._keep_moving(_BEFORE_S)
@@ -65,7 +65,7 @@ class SwitchCampaign:
         """Return the profile that is not in force."""
         return "calm" if self._now == "swift" else "swift"
 
-    def switch(self, name: str) -> tuple[Seen, Case]:
+    def switch(self, name: str) -> tuple[SwitchSeen, CampaignCase]:
         """Take the robot to the other profile."""
         target = self.next_profile
         rate_hz = min(control_rate_hz(self._now), control_rate_hz(target))
@@ -74,7 +74,7 @@ class SwitchCampaign:
         self._now = target if seen.outcome == "kept" else self._now
         return seen, _case(name, failures, seen)
 
-    def refuse(self, bad: Bad) -> Case:
+    def refuse(self, bad: Bad) -> CampaignCase:
         """Ask for a profile that must not stay."""
         in_force = self._robot.document("profile_status").get("profile")
         seen = self._seen(bad.name, control_rate_hz(self._now), _AFTER_BAD_S)
@@ -95,7 +95,7 @@ class SwitchCampaign:
         self._robot.go(**load_robot("butler").poses["tuck"])
         self._robot.pause(_TUCK_S)
 
-    def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> Seen:
+    def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> SwitchSeen:
         began_ns, start = self._clock.now_ns(), self._robot.ticks()
         self._stillness.stalls()
         self._meter.begin()
@@ -103,7 +103,7 @@ class SwitchCampaign:
         self._keep_moving(after_s)
         late, due = self._around_commit(least_rate_hz)
         seconds = (self._clock.now_ns() - began_ns) / NS_PER_S
-        return Seen(
+        return SwitchSeen(
             outcome=last["outcome"],
             reason=last["reason"],
             seconds=seconds,
@@ -161,14 +161,14 @@ class _Meter:
         self.states: set[str] = set()
         self.cause = ""
         self.moved_rad = 0.0
-        self.looks: list[Look] = []
+        self.looks: list[CommitLook] = []
         self._before: np.ndarray[Any, np.dtype[np.float64]] | None = None
 
     def look(self) -> None:
         """Look once."""
         phase = str(self._robot.document("profile_status").get("phase", ""))
         late = self._robot.ticks().late
-        self.looks.append(Look(now_ns=self._clock.now_ns(), late=late, phase=phase))
+        self.looks.append(CommitLook(now_ns=self._clock.now_ns(), late=late, phase=phase))
         state = self._robot.state()
         self.states.add(state)
         if state != "armed":
@@ -180,7 +180,7 @@ class _Meter:
         self._before = place
 
 
-def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Switch `options.count` times, 100 unless told otherwise, then ask for every bad profile."""
     count = SWITCHES if options.count is None else options.count
     chosen(
@@ -188,14 +188,16 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
         options.only,
         str,
     )  # a mistake is told before anything starts
-    history: list[Seen] = []
-    cases: list[Case] = []
-    before = Ticks(ticks=0, late=0)
+    history: list[SwitchSeen] = []
+    cases: list[CampaignCase] = []
+    before = TickWatch(ticks=0, late=0)
     with tempfile.TemporaryDirectory(prefix="vla-switch-") as folder:
         try:
             campaign = SwitchCampaign(Path(folder), options.seed)
         except RobotFailed as error:
-            return Report(campaign="switches", cases=(Case(name="start", failures=(str(error),)),))
+            return CampaignReport(
+                campaign="switches", cases=(CampaignCase(name="start", failures=(str(error),)),)
+            )
         try:
             before = campaign.before()
             for number in range(count):
@@ -206,15 +208,15 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
                     cases.append(told(case, tell))
             cases += [told(campaign.refuse(bad), tell) for bad in BAD if options.only in bad.case]
         except RobotFailed as error:
-            cases.append(told(Case(name="robot", failures=(str(error),)), tell))
+            cases.append(told(CampaignCase(name="robot", failures=(str(error),)), tell))
         finally:
             campaign.close()
     if history:
         cases += [told(ticks_case(before, history), tell), told(memory_case(history), tell)]
-    return Report(campaign="switches", cases=tuple(cases), summary=_summary(cases, history))
+    return CampaignReport(campaign="switches", cases=tuple(cases), summary=_summary(cases, history))
 
 
-def _summary(cases: Sequence[Case], history: Sequence[Seen]) -> dict[str, Any]:
+def _summary(cases: Sequence[CampaignCase], history: Sequence[SwitchSeen]) -> dict[str, Any]:
     sums = [case for case in cases if case.name in ("deadlines", "memory")]
     figures = {key: value for case in sums for key, value in case.figures.items()}
     kept = sum(seen.outcome == "kept" for seen in history)
@@ -222,7 +224,7 @@ def _summary(cases: Sequence[Case], history: Sequence[Seen]) -> dict[str, Any]:
     return {"switches": len(history), "kept": kept, "longest_switch_s": longest_s, **figures}
 
 
-def _case(name: str, failures: Sequence[str], seen: Seen) -> Case:
+def _case(name: str, failures: Sequence[str], seen: SwitchSeen) -> CampaignCase:
     figures = {
         "outcome": seen.outcome,
         "ticks": seen.ticks.ticks,
@@ -233,7 +235,7 @@ def _case(name: str, failures: Sequence[str], seen: Seen) -> Case:
         "reason": seen.reason,
         "cause": seen.cause,
     }
-    return Case(name=name, failures=tuple(failures), figures=figures, seconds=seen.seconds)
+    return CampaignCase(name=name, failures=tuple(failures), figures=figures, seconds=seen.seconds)
 
 
 def _written(folder: Path, name: str, text: str) -> Path:

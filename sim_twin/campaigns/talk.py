@@ -11,7 +11,7 @@ _ANSWER_NS: Final = 8 * NS_PER_S
 """After so long without a word nobody has heard the command: the planner was away."""
 
 
-class Talk:
+class CommandTalk:
     """Give commands one at a time and see how each ends, without ever waiting."""
 
     def __init__(self, utterances: RingWriter, events: RingReader, clock: Clock) -> None:

@@ -10,7 +10,7 @@ LATE_FACTOR: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ticks:
+class TickWatch:
     """Count control's ticks over a time, and how many of them came late."""
 
     ticks: int
@@ -21,19 +21,19 @@ class Ticks:
         """Return the late share; everything is late where nothing ticks."""
         return self.late / self.ticks if self.ticks > 0 else 1.0
 
-    def since(self, before: "Ticks") -> "Ticks":
+    def since(self, before: "TickWatch") -> "TickWatch":
         """Return what came after `before`; a control that started anew counts from 0."""
         if self.ticks < before.ticks:
             return self
-        return Ticks(ticks=self.ticks - before.ticks, late=self.late - before.late)
+        return TickWatch(ticks=self.ticks - before.ticks, late=self.late - before.late)
 
 
-def late_limit(before: Ticks) -> float:
+def late_limit(before: TickWatch) -> float:
     """Return which share of ticks may be late, given the share before."""
     return max(LATE_FACTOR * before.late_ratio, before.late_ratio + LATE_MARGIN_RATIO)
 
 
-def total(parts: Iterable[Ticks]) -> Ticks:
+def total(parts: Iterable[TickWatch]) -> TickWatch:
     """Return all ticks together."""
     counted = list(parts)
-    return Ticks(ticks=sum(one.ticks for one in counted), late=sum(one.late for one in counted))
+    return TickWatch(ticks=sum(one.ticks for one in counted), late=sum(one.late for one in counted))

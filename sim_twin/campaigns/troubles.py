@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from sim_twin.campaigns.pressed_scene import COOL_C, Scene
+from sim_twin.campaigns.pressed_scene import COOL_C, PressedScene
 
 _DAY_S: Final = 86_400
 
@@ -20,8 +20,8 @@ class Trouble:
     """
 
     name: str
-    press: Callable[[Scene, float], None]
-    lift: Callable[[Scene], None]
+    press: Callable[[PressedScene, float], None]
+    lift: Callable[[PressedScene], None]
     steps: tuple[str, ...] = ()
     metric: str = ""
     states: tuple[str, ...] = ("armed",)
@@ -32,22 +32,22 @@ class Trouble:
     shifted_clock: bool = False
 
 
-def _ramp(scene: Scene, seconds: float) -> None:
+def _ramp(scene: PressedScene, seconds: float) -> None:
     scene.heat(min(COOL_C + 5.0 * seconds, 92.0))
 
 
-def _brown_out(scene: Scene, seconds: float) -> None:
+def _brown_out(scene: PressedScene, seconds: float) -> None:
     if seconds == 0.0:
         scene.brown_out()
 
 
-def _fill(scene: Scene, seconds: float) -> None:
+def _fill(scene: PressedScene, seconds: float) -> None:
     if seconds == 0.0:
         scene.fill_disk()
 
 
-def _jump(days: int) -> Callable[[Scene, float], None]:
-    def press(scene: Scene, seconds: float) -> None:
+def _jump(days: int) -> Callable[[PressedScene, float], None]:
+    def press(scene: PressedScene, seconds: float) -> None:
         if seconds == 0.0:
             scene.shift_clock(days * _DAY_S)
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.campaigns.talk import Talk
-from sim_twin.campaigns.ticks import Ticks
+from sim_twin.campaigns.talk import CommandTalk
+from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.referee import ask, told_hazards
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
@@ -89,10 +89,10 @@ class WorkingRobot:
         status = self.document("control_status", _FRESH_STATUS_S)
         return str(status.get("state", "silent")), str(status.get("detail", ""))
 
-    def ticks(self) -> Ticks:
+    def ticks(self) -> TickWatch:
         """Return what control has counted since it started."""
         status = self.document("control_status")
-        return Ticks(ticks=int(status.get("tick", 0)), late=int(status.get("late_ticks", 0)))
+        return TickWatch(ticks=int(status.get("tick", 0)), late=int(status.get("late_ticks", 0)))
 
     def setpoint(self) -> list[float]:
         """Return what control sent to the joints last."""
@@ -143,11 +143,11 @@ class WorkingRobot:
             return {"outcome": "no answer", "reason": f"none within {_SWITCH_S:g} s"}
         return last()
 
-    def talk(self) -> Talk:
+    def talk(self) -> CommandTalk:
         """Return a way to give commands."""
         space = self._space
         events = space.ring_reader("task_event", from_start=False)
-        return Talk(space.ring_writer("utterance"), events, self.clock)
+        return CommandTalk(space.ring_writer("utterance"), events, self.clock)
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Return whether something came true in time.

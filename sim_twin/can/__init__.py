@@ -2,7 +2,7 @@
 
 from sim_twin.can.drive import WheelDrive
 from sim_twin.can.drives import DRIVES, robot_drives
-from sim_twin.can.emulated_drive import EmulatedDrive, Mounting
+from sim_twin.can.emulated_drive import EmulatedDrive, MotorMounting
 from sim_twin.can.hub import CanHub
 from sim_twin.can.memory_bus import MemoryBus
 from sim_twin.can.odrive import ODriveAxis
@@ -15,7 +15,7 @@ __all__ = [
     "CanWire",
     "EmulatedDrive",
     "MemoryBus",
-    "Mounting",
+    "MotorMounting",
     "ODriveAxis",
     "WheelDrive",
     "robot_drives",

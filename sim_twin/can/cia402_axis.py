@@ -27,10 +27,10 @@ from drivers.canopen.objects import (
     VELOCITY_THRESHOLD,
     VELOCITY_WINDOW,
     AbortConnection,
-    OperatingMode,
+    DriveMode,
 )
 from sim_twin.can.object_dictionary import VALUE_RANGE, ObjectDictionary, SdoAbort
-from sim_twin.can.power_stage import Encoder, PowerStage
+from sim_twin.can.power_stage import PowerStage, ShaftEncoder
 from sim_twin.can.power_state_machine import POWERED, RAMP_OPTIONS, STATE_BITS, PowerStateMachine
 from sim_twin.can.velocity_loop import VelocityLoop, ramp_towards
 
@@ -50,7 +50,7 @@ ARMED: Final = (
     PowerState.QUICK_STOP_ACTIVE,
 )
 # Bound here because every step asks for them.
-_CYCLIC: Final = int(OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY)
+_CYCLIC: Final = int(DriveMode.CYCLIC_SYNCHRONOUS_VELOCITY)
 _ENABLED: Final = PowerState.OPERATION_ENABLED
 _CONTROLWORD, _TARGET, _MODE = (CONTROLWORD, 0), (TARGET_VELOCITY, 0), (MODE_OF_OPERATION, 0)
 _ACCELERATION, _DECELERATION = (PROFILE_ACCELERATION, 0), (PROFILE_DECELERATION, 0)
@@ -66,7 +66,11 @@ class Cia402Axis:
     """Turn controlwords and a velocity target into torque; all values are on the motor's side."""
 
     def __init__(
-        self, objects: ObjectDictionary, loop: VelocityLoop, stage: PowerStage, encoder: Encoder
+        self,
+        objects: ObjectDictionary,
+        loop: VelocityLoop,
+        stage: PowerStage,
+        encoder: ShaftEncoder,
     ) -> None:
         self._objects = objects
         self._loop = loop
@@ -100,7 +104,7 @@ class Cia402Axis:
         self._objects.on_write.update(
             {
                 (CONTROLWORD, 0): self.on_controlword,
-                (MODE_OF_OPERATION, 0): _one_of(tuple(OperatingMode)),
+                (MODE_OF_OPERATION, 0): _one_of(tuple(DriveMode)),
                 (QUICK_STOP_OPTION, 0): _one_of(RAMP_OPTIONS),
                 (FAULT_REACTION_OPTION, 0): _one_of(FAULT_REACTION_OPTIONS),
             }

@@ -27,7 +27,7 @@ from drivers.canopen.objects import (
     NmtState,
 )
 from sim_twin.can.cia402_axis import Cia402Axis
-from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, Mounting
+from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, MotorMounting
 from sim_twin.can.error_frames import is_restart
 from sim_twin.can.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from sim_twin.can.object_dictionary import VALUE_RANGE, Key, ObjectDictionary, SdoAbort
@@ -57,7 +57,7 @@ class WheelDrive(EmulatedDrive):
     """
 
     def __init__(
-        self, node_id: int, mounting: Mounting = HUB_MOTOR, eds_path: Path = EDS_PATH
+        self, node_id: int, mounting: MotorMounting = HUB_MOTOR, eds_path: Path = EDS_PATH
     ) -> None:
         super().__init__(node_id, mounting)
         self._objects = ObjectDictionary(node_id, eds_path)

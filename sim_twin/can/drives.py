@@ -6,7 +6,7 @@ from typing import Final
 from drivers.canopen import EDS_PATH
 from drivers.odrive import EMULATED_ENDPOINTS
 from sim_twin.can.drive import WheelDrive
-from sim_twin.can.emulated_drive import EmulatedDrive, Mounting
+from sim_twin.can.emulated_drive import EmulatedDrive, MotorMounting
 from sim_twin.can.odrive import ODriveAxis
 from vla_deploy.robots.description import CanBus, Drive
 
@@ -30,7 +30,7 @@ def robot_drives(wiring: CanBus) -> tuple[EmulatedDrive, ...]:
     return tuple(kind(drive.node_id, _mounting(drive), path) for drive in wiring.drives)
 
 
-def _mounting(drive: Drive) -> Mounting:
-    return Mounting(
+def _mounting(drive: Drive) -> MotorMounting:
+    return MotorMounting(
         sign=drive.sign, counts_per_rev=drive.counts_per_rev, gear_ratio=drive.gear_ratio
     )

@@ -8,11 +8,11 @@ from typing import Final
 import can
 
 from drivers.clock import NS_PER_S
-from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
+from sim_twin.can.power_stage import MotorSpec, PowerStage, ShaftEncoder, Trip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mounting:
+class MotorMounting:
     """Say how a motor turns its joint.
 
     `sign` is -1 where its positive direction turns the joint backwards, `gear_ratio` motor turns
@@ -34,7 +34,7 @@ class Mounting:
         return self.kv / self.gear_ratio**2, self.ki / self.gear_ratio**2
 
 
-HUB_MOTOR: Final = Mounting()
+HUB_MOTOR: Final = MotorMounting()
 LOAD_PERIOD_S: Final = 0.01
 """How often supply and heat are followed up, which are slow beside the velocity loop."""
 
@@ -45,11 +45,11 @@ class EmulatedDrive(ABC):
     The joint's loop is stable where kv · step < 2 · (wheel inertia + armature).
     """
 
-    def __init__(self, node_id: int, mounting: Mounting) -> None:
+    def __init__(self, node_id: int, mounting: MotorMounting) -> None:
         self.node_id = node_id
         self._per_joint = mounting.sign * mounting.gear_ratio
         self._stage = PowerStage(mounting.motor or MotorSpec().behind_gear(mounting.gear_ratio))
-        self._encoder = Encoder(mounting.counts_per_rev)
+        self._encoder = ShaftEncoder(mounting.counts_per_rev)
         self._send_frame: Callable[[can.Message], None] = lambda frame: None
         self._now_ns: int | None = None
         self._unfollowed_s = 0.0

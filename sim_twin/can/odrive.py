@@ -13,7 +13,7 @@ from drivers.odrive.codec import (
     BROADCAST_NODE_ID,
     AxisError,
     AxisState,
-    Command,
+    OdriveCommand,
     SdoOpcode,
     can_id,
     decode,
@@ -30,7 +30,7 @@ from drivers.odrive.endpoints import (
     WATCHDOG_TIMEOUT,
     read_endpoints,
 )
-from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, Mounting
+from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, MotorMounting
 from sim_twin.can.odrive_controller import ODriveController
 from sim_twin.can.odrive_inputs import INPUTS, refuse_nan
 from sim_twin.can.odrive_meters import METERS, ODriveMeters
@@ -61,7 +61,7 @@ class ODriveAxis(EmulatedDrive):
     def __init__(
         self,
         node_id: int,
-        mounting: Mounting = HUB_MOTOR,
+        mounting: MotorMounting = HUB_MOTOR,
         endpoints_path: Path = EMULATED_ENDPOINTS,
     ) -> None:
         """Build the axis as its integrator left it: calibrated, its limit fit for the gear.
@@ -141,14 +141,14 @@ class ODriveAxis(EmulatedDrive):
             self._disarm_reason |= AxisError(code)
             self._procedure_result = DISARMED
             self._state = AxisState.IDLE
-        self._tell(Command.HEARTBEAT)
+        self._tell(OdriveCommand.HEARTBEAT)
 
     def _trip(self, cause: Trip) -> None:
         self.raise_fault(TRIP_ERRORS[cause])
 
     def _boot(self) -> None:
         self._forget()
-        self._tell(Command.HEARTBEAT)
+        self._tell(OdriveCommand.HEARTBEAT)
 
     def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
         self._watch(now_ns)
@@ -187,7 +187,7 @@ class ODriveAxis(EmulatedDrive):
         if node_id == self.node_id and self._now_ns is not None:
             self._fed_ns = self._now_ns
         try:
-            command = Command(number)
+            command = OdriveCommand(number)
             if frame.is_remote_frame:
                 self._tell(command)
             else:
@@ -196,13 +196,13 @@ class ODriveAxis(EmulatedDrive):
             # CANSimple has no way to refuse: what does not fit changes nothing.
             return
 
-    def _react(self, command: Command, data: bytes) -> None:
+    def _react(self, command: OdriveCommand, data: bytes) -> None:
         if command in INPUTS:
             INPUTS[command](self._controller, *decode(command, data))
         elif command in _REACTIONS:
             _REACTIONS[command](self, *decode(command, data))
 
-    def _tell(self, command: Command) -> None:
+    def _tell(self, command: OdriveCommand) -> None:
         told: tuple[Any, ...]
         if command in METERS:
             told = METERS[command](self._meters)
@@ -220,7 +220,7 @@ class ODriveAxis(EmulatedDrive):
             self._arm()
         else:
             self._procedure_result = CANCELLED  # calibrations: the emulated motor needs none
-        self._tell(Command.HEARTBEAT)
+        self._tell(OdriveCommand.HEARTBEAT)
 
     def _arm(self) -> None:
         if self.armed:
@@ -258,7 +258,7 @@ class ODriveAxis(EmulatedDrive):
     def _on_address(self, node_id: int, serial: bytes, _connection: int) -> None:
         if int.from_bytes(serial, "little") == self._serial and node_id < BROADCAST_NODE_ID:
             self.node_id = node_id
-            self._tell(Command.ADDRESS)
+            self._tell(OdriveCommand.ADDRESS)
 
     def _on_sdo(self, opcode: int, number: int, data: bytes) -> None:
         if opcode == SdoOpcode.WRITE:
@@ -266,8 +266,8 @@ class ODriveAxis(EmulatedDrive):
             return
         told = self.properties.read_number(number) if opcode == SdoOpcode.READ else None
         if told is not None:
-            answer = encode(Command.TX_SDO, number, told)
-            self._transmit(can_id(self.node_id, Command.TX_SDO), answer)
+            answer = encode(OdriveCommand.TX_SDO, number, told)
+            self._transmit(can_id(self.node_id, OdriveCommand.TX_SDO), answer)
 
     def _heartbeat(self) -> tuple[int, ...]:
         arrived = 1  # velocity and torque inputs have no trajectory to wait for
@@ -275,21 +275,21 @@ class ODriveAxis(EmulatedDrive):
 
 
 _CYCLIC: Final = {
-    HEARTBEAT_RATE: Command.HEARTBEAT,
-    ENCODER_RATE: Command.GET_ENCODER_ESTIMATES,
+    HEARTBEAT_RATE: OdriveCommand.HEARTBEAT,
+    ENCODER_RATE: OdriveCommand.GET_ENCODER_ESTIMATES,
 }
-_REACTIONS: Final[Mapping[Command, Callable[..., None]]] = {
-    Command.ESTOP: ODriveAxis._on_estop,
-    Command.RX_SDO: ODriveAxis._on_sdo,
-    Command.ADDRESS: ODriveAxis._on_address,
-    Command.SET_AXIS_STATE: ODriveAxis._on_axis_state,
-    Command.REBOOT: ODriveAxis._on_reboot,
-    Command.CLEAR_ERRORS: ODriveAxis._on_clear_errors,
-    Command.SET_ABSOLUTE_POSITION: ODriveAxis._on_position,
+_REACTIONS: Final[Mapping[OdriveCommand, Callable[..., None]]] = {
+    OdriveCommand.ESTOP: ODriveAxis._on_estop,
+    OdriveCommand.RX_SDO: ODriveAxis._on_sdo,
+    OdriveCommand.ADDRESS: ODriveAxis._on_address,
+    OdriveCommand.SET_AXIS_STATE: ODriveAxis._on_axis_state,
+    OdriveCommand.REBOOT: ODriveAxis._on_reboot,
+    OdriveCommand.CLEAR_ERRORS: ODriveAxis._on_clear_errors,
+    OdriveCommand.SET_ABSOLUTE_POSITION: ODriveAxis._on_position,
 }
-_TOLD: Final[Mapping[Command, Callable[[ODriveAxis], tuple[Any, ...]]]] = {
-    Command.GET_VERSION: lambda axis: axis._version,
-    Command.HEARTBEAT: ODriveAxis._heartbeat,
-    Command.GET_ERROR: lambda axis: (axis._errors, axis._disarm_reason),
-    Command.ADDRESS: lambda axis: (axis.node_id, axis._serial.to_bytes(6, "little"), 0),
+_TOLD: Final[Mapping[OdriveCommand, Callable[[ODriveAxis], tuple[Any, ...]]]] = {
+    OdriveCommand.GET_VERSION: lambda axis: axis._version,
+    OdriveCommand.HEARTBEAT: ODriveAxis._heartbeat,
+    OdriveCommand.GET_ERROR: lambda axis: (axis._errors, axis._disarm_reason),
+    OdriveCommand.ADDRESS: lambda axis: (axis.node_id, axis._serial.to_bytes(6, "little"), 0),
 }

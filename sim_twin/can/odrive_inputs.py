@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from drivers.odrive.codec import Command, ControlMode, InputMode
+from drivers.odrive.codec import ControlMode, InputMode, OdriveCommand
 from sim_twin.can.odrive_controller import ODriveController
 
 FEED_FORWARD_PER_UNIT: Final = 1000.0
@@ -59,12 +59,12 @@ def _velocity_gains(controller: ODriveController, gain: float, integrator_gain: 
     controller.set_gains(gain, integrator_gain)
 
 
-INPUTS: Final[Mapping[Command, Callable[..., None]]] = {
-    Command.SET_CONTROLLER_MODE: _modes,
-    Command.SET_INPUT_POS: _position,
-    Command.SET_INPUT_VEL: _velocity,
-    Command.SET_INPUT_TORQUE: _torque,
-    Command.SET_LIMITS: _limits,
-    Command.SET_POS_GAIN: _position_gain,
-    Command.SET_VEL_GAINS: _velocity_gains,
+INPUTS: Final[Mapping[OdriveCommand, Callable[..., None]]] = {
+    OdriveCommand.SET_CONTROLLER_MODE: _modes,
+    OdriveCommand.SET_INPUT_POS: _position,
+    OdriveCommand.SET_INPUT_VEL: _velocity,
+    OdriveCommand.SET_INPUT_TORQUE: _torque,
+    OdriveCommand.SET_LIMITS: _limits,
+    OdriveCommand.SET_POS_GAIN: _position_gain,
+    OdriveCommand.SET_VEL_GAINS: _velocity_gains,
 }

@@ -4,15 +4,17 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from drivers.odrive.codec import Command
+from drivers.odrive.codec import OdriveCommand
 from sim_twin.can.odrive_controller import ODriveController
-from sim_twin.can.power_stage import Encoder, PowerStage
+from sim_twin.can.power_stage import PowerStage, ShaftEncoder
 
 
 class ODriveMeters:
     """Read encoder, controller and power stage; what the encoder's freezing holds is held here."""
 
-    def __init__(self, stage: PowerStage, encoder: Encoder, controller: ODriveController) -> None:
+    def __init__(
+        self, stage: PowerStage, encoder: ShaftEncoder, controller: ODriveController
+    ) -> None:
         self._stage = stage
         self._encoder = encoder
         self._controller = controller
@@ -69,11 +71,11 @@ class ODriveMeters:
         return self._stage.bus_v * self._stage.bus_current_a, mechanical_w
 
 
-METERS: Final[Mapping[Command, Callable[[ODriveMeters], tuple[float, ...]]]] = {
-    Command.GET_ENCODER_ESTIMATES: ODriveMeters.estimates,
-    Command.GET_IQ: ODriveMeters.currents,
-    Command.GET_TEMPERATURE: ODriveMeters.temperatures,
-    Command.GET_BUS_VOLTAGE_CURRENT: ODriveMeters.supply,
-    Command.GET_TORQUES: ODriveMeters.torques,
-    Command.GET_POWERS: ODriveMeters.powers,
+METERS: Final[Mapping[OdriveCommand, Callable[[ODriveMeters], tuple[float, ...]]]] = {
+    OdriveCommand.GET_ENCODER_ESTIMATES: ODriveMeters.estimates,
+    OdriveCommand.GET_IQ: ODriveMeters.currents,
+    OdriveCommand.GET_TEMPERATURE: ODriveMeters.temperatures,
+    OdriveCommand.GET_BUS_VOLTAGE_CURRENT: ODriveMeters.supply,
+    OdriveCommand.GET_TORQUES: ODriveMeters.torques,
+    OdriveCommand.GET_POWERS: ODriveMeters.powers,
 }

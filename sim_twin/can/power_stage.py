@@ -163,7 +163,7 @@ class PowerStage:
         self.limit_current(self.spec.current_limit_a)
 
 
-class Encoder:
+class ShaftEncoder:
     """Count whole steps since power-on; the velocity comes from the time between their edges."""
 
     def __init__(self, counts_per_rev: int) -> None:

@@ -6,7 +6,7 @@ from typing import Final
 from drivers.canopen.cia402 import PowerState
 
 
-class Command(Enum):
+class ControlwordCommand(Enum):
     """Name what a controlword asks for (CiA 402-2, command coding)."""
 
     DISABLE_VOLTAGE = "disable voltage"
@@ -18,18 +18,18 @@ class Command(Enum):
 
 # (mask, bits, command) in the order of the standard's table; bit 7 is judged apart, by its edge.
 _COMMAND_PATTERNS: Final = (
-    (0b0010, 0b0000, Command.DISABLE_VOLTAGE),
-    (0b0110, 0b0010, Command.QUICK_STOP),
-    (0b0111, 0b0110, Command.SHUTDOWN),
-    (0b1111, 0b0111, Command.SWITCH_ON),
-    (0b1111, 0b1111, Command.ENABLE_OPERATION),
+    (0b0010, 0b0000, ControlwordCommand.DISABLE_VOLTAGE),
+    (0b0110, 0b0010, ControlwordCommand.QUICK_STOP),
+    (0b0111, 0b0110, ControlwordCommand.SHUTDOWN),
+    (0b1111, 0b0111, ControlwordCommand.SWITCH_ON),
+    (0b1111, 0b1111, ControlwordCommand.ENABLE_OPERATION),
 )
 FAULT_RESET_BIT: Final = 0x80
 
 _S = PowerState
-_C = Command
+_C = ControlwordCommand
 # Transition numbers are those of the standard.
-TRANSITIONS: Final[dict[tuple[PowerState, Command], PowerState]] = {
+TRANSITIONS: Final[dict[tuple[PowerState, ControlwordCommand], PowerState]] = {
     (_S.SWITCH_ON_DISABLED, _C.SHUTDOWN): _S.READY_TO_SWITCH_ON,  # 2
     (_S.READY_TO_SWITCH_ON, _C.SWITCH_ON): _S.SWITCHED_ON,  # 3
     (_S.READY_TO_SWITCH_ON, _C.ENABLE_OPERATION): _S.OPERATION_ENABLED,  # 3 and 4
@@ -62,7 +62,7 @@ RAMP_OPTIONS: Final = (0, 1, 2, 5, 6)
 STAYING_OPTIONS: Final = (5, 6)
 
 
-def decode_command(controlword: int) -> Command | None:
+def decode_command(controlword: int) -> ControlwordCommand | None:
     """Return what a controlword asks for."""
     for mask, bits, command in _COMMAND_PATTERNS:
         if controlword & mask == bits:
@@ -96,9 +96,12 @@ class PowerStateMachine:
                 self.state = PowerState.SWITCH_ON_DISABLED  # 15
             return rising
         command = decode_command(controlword)
-        if command is Command.QUICK_STOP and self.state is PowerState.OPERATION_ENABLED:
+        if command is ControlwordCommand.QUICK_STOP and self.state is PowerState.OPERATION_ENABLED:
             self.quick_stop(quick_stop_option)
-        elif command is Command.ENABLE_OPERATION and self.state is PowerState.QUICK_STOP_ACTIVE:
+        elif (
+            command is ControlwordCommand.ENABLE_OPERATION
+            and self.state is PowerState.QUICK_STOP_ACTIVE
+        ):
             self._leave_quick_stop(quick_stop_option)
         elif command is not None:
             self.state = TRANSITIONS.get((self.state, command), self.state)

@@ -4,7 +4,7 @@ from typing import Final
 
 from sim_twin.can import EmulatedDrive
 from sim_twin.can.power_stage import MotorSpec
-from sim_twin.faults.effect import Effect, Ending, Parameter, Target
+from sim_twin.faults.effect import Effect, Ending, FaultParameter, Target
 from sim_twin.faults.line_effects import DELAY, Rows
 from sim_twin.faults.vocabulary import Component, Fault
 
@@ -111,14 +111,14 @@ def _brown_out(target: Target) -> Ending:
     return lambda: drive.set_supply_v(_SUPPLY_V)
 
 
-_DAMAGED: Final = Parameter(
+_DAMAGED: Final = FaultParameter(
     name="ratio", default=1.0, low=0.001, high=1.0, meaning="share of the frames that are destroyed"
 )
 
-_SPEED: Final = Parameter(
+_SPEED: Final = FaultParameter(
     name="speed_rad_s", default=2.0, low=-20.0, high=20.0, meaning="wheel speed beyond what is told"
 )
-_VOLTS: Final = Parameter(
+_VOLTS: Final = FaultParameter(
     name="volts_v", default=12.0, low=0.0, high=60.0, meaning="voltage it drops to"
 )
 

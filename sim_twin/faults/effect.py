@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
+class FaultParameter:
     """Declare how bad a fault may be made; the unit is part of the name, as in `volts_v`."""
 
     name: str
@@ -40,4 +40,4 @@ class Effect:
 
     summary: str
     begin: Callable[[Target], Ending]
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[FaultParameter, ...] = ()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drivers.clock import NS_PER_S
 from sim_twin.errors import FaultRefused
-from sim_twin.faults.effect import Ending, Parameter, Target
+from sim_twin.faults.effect import Ending, FaultParameter, Target
 from sim_twin.faults.request import FaultRequest, instances_of, parse_request
 from sim_twin.faults.table import EFFECTS, faults_of
 from sim_twin.faults.vocabulary import Component, Fault
@@ -172,7 +172,7 @@ def _described(component: Component, fault: Fault) -> dict[str, Any]:
     }
 
 
-def _parameter(parameter: Parameter) -> dict[str, Any]:
+def _parameter(parameter: FaultParameter) -> dict[str, Any]:
     return {
         "name": parameter.name,
         "default": parameter.default,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final, TypeVar
 
 from sim_twin.errors import FaultRefused
-from sim_twin.faults.effect import Effect, Ending, Parameter, Target
+from sim_twin.faults.effect import Effect, Ending, FaultParameter, Target
 from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck, Tampering
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.vocabulary import Component, Fault
@@ -14,7 +14,7 @@ PlugOf = Callable[[Target], Plug]
 Declared = TypeVar("Declared")
 Rows = dict[tuple[Component, Fault], Effect]
 
-DELAY: Final = Parameter(
+DELAY: Final = FaultParameter(
     name="delay_s", default=0.5, low=0.001, high=60.0, meaning="how late everything comes"
 )
 
@@ -142,13 +142,13 @@ def _press(target: Target) -> Ending:
     return button.release
 
 
-_SLOW: Final = Parameter(
+_SLOW: Final = FaultParameter(
     name="ratio", default=0.2, low=0.001, high=0.999, meaning="share of the usual rate"
 )
-_SCALE: Final = Parameter(
+_SCALE: Final = FaultParameter(
     name="ratio", default=0.5, low=0.01, high=10.0, meaning="told over true distance"
 )
-_TURN: Final = Parameter(
+_TURN: Final = FaultParameter(
     name="rate_rad_s", default=0.5, low=-10.0, high=10.0, meaning="how fast yaw runs away"
 )
 

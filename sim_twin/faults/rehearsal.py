@@ -10,7 +10,7 @@ import numpy as np
 
 from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.faults.verdict import failures
-from sim_twin.faults.witness import Witness
+from sim_twin.faults.witness import FaultWitness
 from sim_twin.stack import LockstepControl, LockstepStack
 
 _SAMPLE_S: Final = 0.004
@@ -27,7 +27,7 @@ _WHEELS: Final = ("left_wheel", "right_wheel")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class RehearsalOutcome:
     """Tell what happened: `failures` is empty when the stack did all that it must do."""
 
     scenario: str
@@ -56,21 +56,21 @@ class Rehearsal:
             self._stack.add_senses()
         self._start_s = 0.0
 
-    def run(self) -> Outcome:
+    def run(self) -> RehearsalOutcome:
         """Play the scenario to its end."""
         try:
             return self._play()
         finally:
             self._stack.close()
 
-    def _play(self) -> Outcome:
+    def _play(self) -> RehearsalOutcome:
         scenario, lockstep = self._scenario, self._stack.lockstep
         self._stack.arm()
         lockstep.run_for(_SETTLE_S)
         self._start_s = lockstep.now_s
         joints = () if scenario.meanwhile.takes_all else self._stack.robot.joint_names
         parts = (*joints, *_WHEELS)
-        seen = Witness(self._stack, self._start_s + scenario.begin_s, parts)
+        seen = FaultWitness(self._stack, self._start_s + scenario.begin_s, parts)
         before, command = seen.counters(), self._begin_activity()
         for request in scenario.faults:
             lockstep.faults.inject_checked(request)
@@ -79,7 +79,7 @@ class Rehearsal:
                 seen.look()
         wrong = [*failures(scenario.expect, seen, before), *self._return(seen)]
         wrong += self._judge_travel(command) if command else []
-        return Outcome(
+        return RehearsalOutcome(
             scenario=scenario.name,
             cause=seen.cause,
             cause_s=seen.cause_s,
@@ -114,7 +114,7 @@ class Rehearsal:
             count += 1
             yield
 
-    def _return(self, seen: Witness) -> list[str]:
+    def _return(self, seen: FaultWitness) -> list[str]:
         """See what happens once the fault has gone: nothing moves without an operator's act."""
         expect, wrong = self._scenario.expect, []
         stands = expect.recovery and not expect.runs_back and not math.isnan(seen.rest_s)

@@ -7,7 +7,7 @@ from enum import Enum
 from typing import Any, Final, TypeVar
 
 from sim_twin.errors import FaultRefused
-from sim_twin.faults.effect import Effect, Parameter
+from sim_twin.faults.effect import Effect, FaultParameter
 from sim_twin.faults.table import EFFECTS, faults_of
 from sim_twin.faults.timing import FaultTiming
 from sim_twin.faults.vocabulary import Component, Fault
@@ -145,7 +145,7 @@ def _timing(raw: Mapping[str, Any], faults: list[str], *, rhythmic: bool) -> Fau
     return FaultTiming(**given, seed=seed)
 
 
-def _value(parameter: Parameter, raw: Mapping[str, Any], faults: list[str]) -> float:
+def _value(parameter: FaultParameter, raw: Mapping[str, Any], faults: list[str]) -> float:
     given = raw.get(parameter.name, parameter.default)
     return _number(parameter.name, given, parameter.low, parameter.high, faults)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
-from sim_twin.faults.effect import Effect, Ending, Parameter, Target
+from sim_twin.faults.effect import Effect, Ending, FaultParameter, Target
 from sim_twin.faults.line_effects import DELAY, Rows, line_rows
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
@@ -88,16 +88,16 @@ def _brown_out(target: Target) -> Ending:
     return lambda: twin.servo_supply.ramp_to(NOMINAL_V, twin.now_ns, values["ramp_s"])
 
 
-_VOLTS: Final = Parameter(
+_VOLTS: Final = FaultParameter(
     name="volts_v", default=4.0, low=0.0, high=30.0, meaning="voltage it drops to"
 )
-_RAMP: Final = Parameter(
+_RAMP: Final = FaultParameter(
     name="ramp_s", default=0.05, low=0.0, high=60.0, meaning="how long it takes, each way"
 )
-_OFFSET: Final = Parameter(
+_OFFSET: Final = FaultParameter(
     name="offset_rad", default=1.0, low=-3.0, high=3.0, meaning="jump of the measured shaft angle"
 )
-_HEAT: Final = Parameter(
+_HEAT: Final = FaultParameter(
     name="temperature_c", default=95.0, low=-20.0, high=150.0, meaning="what it is heated to"
 )
 

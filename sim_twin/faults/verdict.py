@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 
 from sim_twin.faults.scenario import NO_CAUSE, Expectation
-from sim_twin.faults.witness import Witness
+from sim_twin.faults.witness import FaultWitness
 
 
-def failures(expect: Expectation, seen: Witness, before: Mapping[str, int]) -> Iterator[str]:
+def failures(expect: Expectation, seen: FaultWitness, before: Mapping[str, int]) -> Iterator[str]:
     """Yield everything that is not as it must be at the end of the fault."""
     yield from _cause(expect, seen)
     if expect.rest_within_s is not None and not seen.rest_s <= expect.rest_within_s:
@@ -23,7 +23,7 @@ def failures(expect: Expectation, seen: Witness, before: Mapping[str, int]) -> I
             yield f"{name} did not rise from {before.get(name)}; there are {', '.join(after)}"
 
 
-def _cause(expect: Expectation, seen: Witness) -> Iterator[str]:
+def _cause(expect: Expectation, seen: FaultWitness) -> Iterator[str]:
     if seen.cause != expect.cause:
         yield f"cause {seen.cause}, expected {expect.cause}"
     elif expect.cause == NO_CAUSE and seen.states != {"armed"}:
@@ -37,7 +37,7 @@ def _same(what: str, seen: set[str], wanted: tuple[str, ...] | None) -> Iterator
         yield f"{what}: {sorted(seen)}, expected {sorted(wanted)}"
 
 
-def _torque(expect: Expectation, seen: Witness) -> Iterator[str]:
+def _torque(expect: Expectation, seen: FaultWitness) -> Iterator[str]:
     on = {joint for joint, has_torque in seen.torques().items() if has_torque}
     if expect.torque == "kept" and on != set(seen.torques()):
         yield f"torque was lost on {sorted(set(seen.torques()) - on)}"

@@ -18,7 +18,7 @@ SENSOR_CELLS: Final = ("scan", "imu", "pose")
 _IMAGES: Final = "rgbd"
 
 
-class Witness:
+class FaultWitness:
     """Collect what a judge needs; all times count from the fault's beginning.
 
     `parts` are the joints that must come to rest. `cause_s` and `rest_s` are NaN as long as there

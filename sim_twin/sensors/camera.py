@@ -10,7 +10,7 @@ from drivers.camera.protocol import (
     CRC,
     REQUEST_BYTES,
     REQUEST_MAGIC,
-    Command,
+    CameraCommand,
     FrameHeader,
     Intrinsics,
     decode_request,
@@ -97,8 +97,8 @@ class CameraDevice:
         while self._in_flight and self._in_flight[0][0] <= now_ns:
             self._out += self._in_flight.pop(0)[1]
 
-    def _apply(self, command: Command, rate_hz: float) -> None:
-        streaming = command is Command.START and rate_hz > 0.0
+    def _apply(self, command: CameraCommand, rate_hz: float) -> None:
+        streaming = command is CameraCommand.START and rate_hz > 0.0
         period_ns = round(NS_PER_S / rate_hz) if streaming else 0
         if period_ns != self._period_ns:
             self._period_ns, self._due_ns = period_ns, None

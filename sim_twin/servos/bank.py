@@ -10,7 +10,7 @@ from sim_twin.servos.profile import Floats
 from sim_twin.servos.protocol import BusProtocol
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.timing import ReplyQueue, WireTiming
-from sim_twin.servos.wire_faults import Spoiler
+from sim_twin.servos.wire_faults import ReplySpoiler
 
 _PACKET_GAP_NS: Final = 1_500_000
 """A pause within an instruction packet after which a servo looks for a new header."""
@@ -147,19 +147,19 @@ class ServoBank:
 
     def garble(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
         """Damage one byte of every reply of this servo."""
-        self._spoil(servo_id, Spoiler.GARBLE, on=on, seed=seed)
+        self._spoil(servo_id, ReplySpoiler.GARBLE, on=on, seed=seed)
 
     def truncate(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
         """Lose the end of every reply of this servo."""
-        self._spoil(servo_id, Spoiler.TRUNCATE, on=on, seed=seed)
+        self._spoil(servo_id, ReplySpoiler.TRUNCATE, on=on, seed=seed)
 
     def duplicate(self, servo_id: int, on: bool = True) -> None:
         """Let this servo say everything twice."""
-        self._spoil(servo_id, Spoiler.DUPLICATE, on=on)
+        self._spoil(servo_id, ReplySpoiler.DUPLICATE, on=on)
 
     def set_clash(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
         """Let a second servo answer to this id at the same time: all of it becomes garbage."""
-        self._spoil(servo_id, Spoiler.CLASH, on=on, seed=seed)
+        self._spoil(servo_id, ReplySpoiler.CLASH, on=on, seed=seed)
 
     def stick(self, servo_id: int, on: bool = True) -> None:
         """Let this servo show for ever what it senses now, realtime tick included."""
@@ -188,7 +188,7 @@ class ServoBank:
         """Put a few random bytes before every reply."""
         self._faults.set_noise(on=on, seed=seed)
 
-    def _spoil(self, servo_id: int, spoiler: Spoiler, *, on: bool, seed: int = 0) -> None:
+    def _spoil(self, servo_id: int, spoiler: ReplySpoiler, *, on: bool, seed: int = 0) -> None:
         self._faults.set_spoiler(self._row(servo_id), spoiler, on=on, seed=seed)
 
     def _mark(self, rows: set[int], servo_id: int, *, on: bool) -> None:

@@ -31,7 +31,7 @@ def _all_registers() -> dict[str, Register]:
 _REGISTERS: Final = _all_registers()
 
 
-class Columns:
+class TableColumns:
     """Give writable arrays that share the memory of the control tables.
 
     Where a model lacks the register its entry is spare memory, which reads as zero.

@@ -8,10 +8,10 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.control_table import VOLTAGE_UNIT_V, OperatingMode
-from sim_twin.servos.columns import Columns
-from sim_twin.servos.motion import Motion
+from sim_twin.servos.columns import TableColumns
+from sim_twin.servos.motion import ServoMotion
 from sim_twin.servos.profile import PULSES_S_PER_UNIT, Floats
-from sim_twin.servos.protection import Protection
+from sim_twin.servos.protection import ServoProtection
 
 FIRST_ADDRESS: Final = 116
 END_ADDRESS: Final = 148
@@ -28,7 +28,9 @@ EFFORT_CYCLES: Final = 4
 class Feedback:
     """Write what the servos sense into their tables."""
 
-    def __init__(self, columns: Columns, motion: Motion, protection: Protection) -> None:
+    def __init__(
+        self, columns: TableColumns, motion: ServoMotion, protection: ServoProtection
+    ) -> None:
         self._columns = columns
         self._motion = motion
         self._protection = protection

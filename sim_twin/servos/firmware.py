@@ -18,13 +18,13 @@ from drivers.dynamixel.control_table import (
     Register,
     StatusReturnLevel,
 )
-from sim_twin.servos.columns import Columns
+from sim_twin.servos.columns import TableColumns
 from sim_twin.servos.coupling import Coupling
 from sim_twin.servos.feedback import Feedback
 from sim_twin.servos.goal_window import GoalWindow
-from sim_twin.servos.motion import Motion
+from sim_twin.servos.motion import ServoMotion
 from sim_twin.servos.profile import Floats
-from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
+from sim_twin.servos.protection import CHECK_PERIOD_S, ServoProtection
 from sim_twin.servos.rail import Rail
 from sim_twin.servos.reactions import Reactions
 from sim_twin.servos.register_file import RegisterFile
@@ -46,12 +46,12 @@ class Firmware:
         coupling: Coupling | None = None,
     ) -> None:
         self.registers = RegisterFile(specs)
-        self._columns = Columns(self.registers)
+        self._columns = TableColumns(self.registers)
         self._options = options
         joints = coupling or Coupling.direct(len(specs))
-        self._motion = Motion(self.registers, self._columns, joints)
+        self._motion = ServoMotion(self.registers, self._columns, joints)
         models = [table.model for table in self.registers.tables]
-        self._protection = Protection(models, self._columns, options)
+        self._protection = ServoProtection(models, self._columns, options)
         self._rail = Rail(models, options.supply_ohm)
         self._brownout_v = min(
             min(options.brownout_v, _BROWNOUT_RATIO * model.voltage_v) for model in models

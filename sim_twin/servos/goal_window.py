@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.control_table import OperatingMode
-from sim_twin.servos.columns import Columns
+from sim_twin.servos.columns import TableColumns
 from sim_twin.servos.profile import TIME_BASED
 
 _GOAL_MAXIMUM: Final = 1_048_575
@@ -19,7 +19,7 @@ _GOAL_MAXIMUM: Final = 1_048_575
 class GoalWindow:
     """Hold the range of goals that each servo takes without further ado; none while it is off."""
 
-    def __init__(self, columns: Columns) -> None:
+    def __init__(self, columns: TableColumns) -> None:
         self._columns = columns
         self._lowest = columns.named("min_position_limit")
         self._highest = columns.named("max_position_limit")

@@ -22,8 +22,8 @@ from sim_twin.servos.audience import Audience
 from sim_twin.servos.firmware import Firmware
 from sim_twin.servos.params import GROUP_WRITES, READ_REQUESTS, Request, range_of
 from sim_twin.servos.register_file import LOWEST_SLOT
-from sim_twin.servos.registers import Refused
-from sim_twin.servos.speaker import Speaker, Store
+from sim_twin.servos.registers import AccessRefused
+from sim_twin.servos.speaker import ServoSpeaker, Store
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.timing import Reply
 
@@ -45,7 +45,7 @@ class GroupAccess:
         firmware: Firmware,
         options: FirmwareOptions,
         audience: Audience,
-        speaker: Speaker,
+        speaker: ServoSpeaker,
         store: Store,
     ) -> None:
         self._firmware = firmware
@@ -178,6 +178,6 @@ class GroupAccess:
     def _try_write(self, row: int, address: int, data: bytes) -> None:
         try:
             writes = self._tables[row].check_write(address, data)
-        except Refused:  # nobody answers a sync or bulk write
+        except AccessRefused:  # nobody answers a sync or bulk write
             return
         self._store(row, writes)

@@ -20,9 +20,9 @@ from drivers.dynamixel.model import (
     OperatingMode,
 )
 from drivers.dynamixel.models import X330_CURRENT_UNIT_A
-from sim_twin.servos.columns import Columns
+from sim_twin.servos.columns import TableColumns
 from sim_twin.servos.coupling import Coupling
-from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, Profile
+from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, TrajectoryProfile
 from sim_twin.servos.register_file import RegisterFile
 
 CENTRE_PULSES: Final = PULSES_PER_REV // 2
@@ -67,20 +67,20 @@ class Motors:
         )
 
 
-class Motion:
+class ServoMotion:
     """Run the control loops; `pulses`, `velocity_rad_s` and `pwm` are the latest results.
 
     Positions and efforts come in, and duties go out, as the joints have them: the scales between
     joint, shaft and register are multiplied beforehand, for every array operation of a step counts.
     """
 
-    def __init__(self, registers: RegisterFile, columns: Columns, coupling: Coupling) -> None:
+    def __init__(self, registers: RegisterFile, columns: TableColumns, coupling: Coupling) -> None:
         count = len(registers)
         self._columns = columns
         self._coupling = coupling
         self._motors = Motors.of(registers)
         self._joint_stall_nm = self._motors.stall_nm * coupling.sign
-        self.profile = Profile(columns)
+        self.profile = TrajectoryProfile(columns)
         self.pulses = np.full(count, float(CENTRE_PULSES))
         # Position and speed are rows of one array, so that one operation does for both.
         self._sensed = np.zeros((2, count))

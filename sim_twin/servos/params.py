@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from drivers.dynamixel.codec import Instruction, StatusError
-from sim_twin.servos.registers import Refused
+from sim_twin.servos.registers import AccessRefused
 
 _RANGE: Final = struct.Struct("<HH")
 _BULK: Final = struct.Struct("<BHH")
@@ -24,7 +24,7 @@ def range_of(params: bytes) -> tuple[int, int]:
         Refused: `params` is too short.
     """
     if len(params) < _RANGE.size:
-        raise Refused(StatusError.DATA_LENGTH)
+        raise AccessRefused(StatusError.DATA_LENGTH)
     address, length = _RANGE.unpack_from(params)
     return address, length
 
@@ -36,7 +36,7 @@ def address_of(params: bytes) -> int:
         Refused: `params` is too short.
     """
     if len(params) < 2:
-        raise Refused(StatusError.DATA_LENGTH)
+        raise AccessRefused(StatusError.DATA_LENGTH)
     return int.from_bytes(params[:2], "little")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.control_table import PULSES_PER_REV
-from sim_twin.servos.columns import Columns
+from sim_twin.servos.columns import TableColumns
 
 PULSES_S_PER_UNIT: Final = 0.229 * PULSES_PER_REV / 60
 PULSES_S2_PER_UNIT: Final = 214.577 * PULSES_PER_REV / 3600
@@ -20,10 +20,10 @@ _UNBOUNDED: Final = 1e12
 Floats = NDArray[np.float64]
 
 
-class Profile:
+class TrajectoryProfile:
     """Hold the trajectory of each servo in pulses and pulses per second."""
 
-    def __init__(self, columns: Columns) -> None:
+    def __init__(self, columns: TableColumns) -> None:
         count = len(columns.goal_position)
         self._columns = columns
         self.position = np.zeros(count)

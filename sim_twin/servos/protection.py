@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.model import VOLTAGE_UNIT_V, HardwareError, Model
-from sim_twin.servos.columns import Columns
+from drivers.dynamixel.model import VOLTAGE_UNIT_V, HardwareError, ServoDatasheet
+from sim_twin.servos.columns import TableColumns
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.thermal import Thermals
@@ -16,10 +16,12 @@ CHECK_PERIOD_S: Final = 0.02
 _peak: Final = np.maximum.reduce
 
 
-class Protection:
+class ServoProtection:
     """Follow each servo's temperature and overload time; checked every `CHECK_PERIOD_S`."""
 
-    def __init__(self, models: Sequence[Model], columns: Columns, options: FirmwareOptions) -> None:
+    def __init__(
+        self, models: Sequence[ServoDatasheet], columns: TableColumns, options: FirmwareOptions
+    ) -> None:
         count = len(models)
         self._options = options
         self._temperature_limit = columns.named("temperature_limit")

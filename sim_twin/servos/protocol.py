@@ -17,8 +17,8 @@ from sim_twin.servos.firmware import Firmware
 from sim_twin.servos.groups import FAST_READS, GroupAccess
 from sim_twin.servos.instructions import BrokenPacket
 from sim_twin.servos.params import GROUP_WRITES, READ_REQUESTS, address_of, range_of
-from sim_twin.servos.registers import Refused
-from sim_twin.servos.speaker import Speaker
+from sim_twin.servos.registers import AccessRefused
+from sim_twin.servos.speaker import ServoSpeaker
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.timing import Reply
 
@@ -41,7 +41,7 @@ class BusProtocol:
 
     def __init__(self, firmware: Firmware, options: FirmwareOptions) -> None:
         self.audience = Audience(firmware, options)
-        self.speaker = Speaker(firmware)
+        self.speaker = ServoSpeaker(firmware)
         self._firmware = firmware
         self._tables = firmware.registers.tables
         self._groups = GroupAccess(firmware, options, self.audience, self.speaker, self._store)
@@ -70,7 +70,7 @@ class BusProtocol:
             if packet.instruction in GROUP_WRITES:
                 self._groups.write(packet)
                 return []
-        except Refused:  # too short to be meant for anybody
+        except AccessRefused:  # too short to be meant for anybody
             return []
         return self._address(packet)
 
@@ -126,7 +126,7 @@ class BusProtocol:
             return StatusError.RESULT_FAIL, b""
         try:
             return StatusError.NONE, action(row, packet.params)
-        except Refused as refusal:
+        except AccessRefused as refusal:
             return refusal.number, b""
 
     def _is_refused_reset(self, packet: Packet) -> bool:
@@ -144,7 +144,7 @@ class BusProtocol:
         self.speaker.refresh((row,), address, length)
         error, data = self.speaker.read(row, address, length)
         if error & ~ALERT:
-            raise Refused(StatusError(error & ~ALERT))
+            raise AccessRefused(StatusError(error & ~ALERT))
         return data
 
     def _write(self, row: int, params: bytes) -> bytes:
@@ -158,16 +158,16 @@ class BusProtocol:
 
     def _action(self, row: int, _params: bytes) -> bytes:
         if not self._tables[row].get("registered_instruction"):
-            raise Refused(StatusError.INSTRUCTION)
+            raise AccessRefused(StatusError.INSTRUCTION)
         self._tables[row].put("registered_instruction", 0)
         self._store(row, self._registered.pop(row))
         return b""
 
     def _factory_reset(self, row: int, params: bytes) -> bytes:
         if len(params) != 1:
-            raise Refused(StatusError.DATA_LENGTH)
+            raise AccessRefused(StatusError.DATA_LENGTH)
         if self._tables[row].get("torque_enable"):
-            raise Refused(StatusError.ACCESS)
+            raise AccessRefused(StatusError.ACCESS)
         self._firmware.factory_reset(row, params[0])
         self._index()
         return b""
@@ -178,19 +178,19 @@ class BusProtocol:
 
     def _clear(self, row: int, params: bytes) -> bytes:
         if params != _CLEAR_TURNS:
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if not self._firmware.clear_turns(row):
-            raise Refused(StatusError.RESULT_FAIL)
+            raise AccessRefused(StatusError.RESULT_FAIL)
         return b""
 
     def _back_up(self, row: int, params: bytes) -> bytes:
         table = self._tables[row]
         if not self.speaker.has_backup(row):
-            raise Refused(StatusError.INSTRUCTION)
+            raise AccessRefused(StatusError.INSTRUCTION)
         if params not in (_BACK_UP, _RESTORE):
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if table.get("torque_enable"):
-            raise Refused(StatusError.RESULT_FAIL)
+            raise AccessRefused(StatusError.RESULT_FAIL)
         if params == _BACK_UP:
             table.back_up()
             return b""

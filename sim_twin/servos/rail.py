@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.dynamixel.model import Model
+from drivers.dynamixel.model import ServoDatasheet
 from sim_twin.servos.profile import Floats
 
 
@@ -16,7 +16,7 @@ class Rail:
     raise the voltage.
     """
 
-    def __init__(self, models: Sequence[Model], resistance_ohm: float) -> None:
+    def __init__(self, models: Sequence[ServoDatasheet], resistance_ohm: float) -> None:
         self._resistance_ohm = resistance_ohm
         stall_a = np.array([model.stall_current_a for model in models])
         self._per_volt = np.array([1.0 / model.voltage_v for model in models])

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Final
 
 from drivers.dynamixel.control_table import WATCHDOG_TRIPPED, OperatingMode
-from sim_twin.servos.columns import Columns
-from sim_twin.servos.motion import Motion
+from sim_twin.servos.columns import TableColumns
+from sim_twin.servos.motion import ServoMotion
 from sim_twin.servos.register_file import RegisterFile
 from sim_twin.servos.watchdog import BusWatchdog
 
@@ -27,7 +27,12 @@ class Reactions:
     """
 
     def __init__(
-        self, registers: RegisterFile, columns: Columns, motion: Motion, *, trip_holds_present: bool
+        self,
+        registers: RegisterFile,
+        columns: TableColumns,
+        motion: ServoMotion,
+        *,
+        trip_holds_present: bool,
     ) -> None:
         self.watchdog = BusWatchdog(columns)
         self.stale = True

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Final
 
 from drivers.dynamixel.codec import StatusError
-from drivers.dynamixel.control_table import MODELS, Model, OperatingMode, Register
+from drivers.dynamixel.control_table import MODELS, OperatingMode, Register, ServoDatasheet
 from sim_twin.servos.indirect import ADDRESS_PREFIX, indirect_registers
 from sim_twin.servos.spec import EmulatedServoSpec
 
@@ -71,7 +71,7 @@ _KEPT_BY_RESET: Final = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
 """What each factory reset option keeps."""
 
 
-class Refused(Exception):
+class AccessRefused(Exception):
     """Carry the status error number of an access that the firmware refuses."""
 
     def __init__(self, number: StatusError) -> None:
@@ -85,7 +85,7 @@ class ControlTable:
     def __init__(
         self, spec: EmulatedServoSpec, memory: memoryview, on_remap: Callable[[], None]
     ) -> None:
-        self.model: Model = MODELS[spec.model_name]
+        self.model: ServoDatasheet = MODELS[spec.model_name]
         self._spec = spec
         self._memory = memory
         self._on_remap = on_remap
@@ -145,9 +145,9 @@ class ControlTable:
             Refused: the range is empty or ends beyond the table.
         """
         if length == 0:
-            raise Refused(StatusError.DATA_LENGTH)
+            raise AccessRefused(StatusError.DATA_LENGTH)
         if address + length > self.end:
-            raise Refused(StatusError.ACCESS)
+            raise AccessRefused(StatusError.ACCESS)
         memory: memoryview | bytearray = self._memory
         if sensed is not None:
             memory = bytearray(memory)
@@ -164,7 +164,7 @@ class ControlTable:
             Refused: the firmware answers the write with an error.
         """
         if not data:
-            raise Refused(StatusError.DATA_LENGTH)
+            raise AccessRefused(StatusError.DATA_LENGTH)
         writes: list[tuple[Register, int]] = []
         for start, run in self._runs(address, data):
             writes += self._check_run(start, run)
@@ -197,7 +197,7 @@ class ControlTable:
             Refused: there is no backup.
         """
         if not self._backup:
-            raise Refused(StatusError.RESULT_FAIL)
+            raise AccessRefused(StatusError.RESULT_FAIL)
         self._restore(eeprom=True)
 
     def _restore(self, *, eeprom: bool) -> None:
@@ -219,7 +219,7 @@ class ControlTable:
             Refused: the option is none of 0xFF, 1 and 2.
         """
         if option not in _KEPT_BY_RESET:
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         kept = {name: self.get(name) for name in _KEPT_BY_RESET[option]}
         self._load_defaults(eeprom=True)
         self.put("firmware_version", self._spec.firmware_version)
@@ -261,27 +261,27 @@ class ControlTable:
     def _writable_register(self, address: int, available: int) -> Register:
         register = self._by_address.get(address)
         if register is None or not register.writable:
-            raise Refused(StatusError.ACCESS)
+            raise AccessRefused(StatusError.ACCESS)
         if available < register.size:
-            raise Refused(StatusError.DATA_LENGTH)
+            raise AccessRefused(StatusError.DATA_LENGTH)
         if register.eeprom and self.get("torque_enable"):
-            raise Refused(StatusError.ACCESS)
+            raise AccessRefused(StatusError.ACCESS)
         return register
 
     def _check_value(self, register: Register, value: int) -> None:
         name = register.name
         if register.minimum is not None and value < register.minimum:
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if register.maximum is not None and value > register.maximum:
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if name == "operating_mode" and value not in self.model.operating_modes:
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if self.get("bus_watchdog") < 0 and (name in GOALS or (name == "bus_watchdog" and value)):
-            raise Refused(StatusError.DATA_RANGE)
+            raise AccessRefused(StatusError.DATA_RANGE)
         if name in _LIMITS and abs(value) > self.get(_LIMITS[name]):
-            raise Refused(StatusError.DATA_LIMIT)
+            raise AccessRefused(StatusError.DATA_LIMIT)
         if name == "goal_position" and not self._within_position_limits(value):
-            raise Refused(StatusError.DATA_LIMIT)
+            raise AccessRefused(StatusError.DATA_LIMIT)
 
     def _within_position_limits(self, value: int) -> bool:
         if self.get("operating_mode") != OperatingMode.POSITION:
@@ -289,7 +289,7 @@ class ControlTable:
         return self.get("min_position_limit") <= value <= self.get("max_position_limit")
 
 
-def _too_new(model: Model, firmware: int) -> frozenset[str]:
+def _too_new(model: ServoDatasheet, firmware: int) -> frozenset[str]:
     """Return the registers that came with a later firmware, and cannot be written in this one."""
     late = (
         frozenset({"startup_configuration"}) if not model.has_fast_sync(firmware) else frozenset()

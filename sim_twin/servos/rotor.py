@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.dynamixel.control_table import Model
+from drivers.dynamixel.control_table import ServoDatasheet
 from sim_twin.servos.profile import Floats
 
 
@@ -14,7 +14,7 @@ class FreeRotors:
     torque = stall * duty - stall / no_load * velocity
     """
 
-    def __init__(self, models: Sequence[Model], inertia_kg_m2: float = 0.01) -> None:
+    def __init__(self, models: Sequence[ServoDatasheet], inertia_kg_m2: float = 0.01) -> None:
         self._stall_nm = np.array([model.stall_torque_nm for model in models])
         self._damping = self._stall_nm / np.array([model.no_load_speed_rad_s for model in models])
         self._inertia_kg_m2 = inertia_kg_m2

@@ -6,7 +6,7 @@ from typing import Final
 from drivers.dynamixel.codec import ALERT, encode_status
 from drivers.dynamixel.control_table import Register
 from sim_twin.servos.firmware import Firmware
-from sim_twin.servos.registers import SENSED, Refused
+from sim_twin.servos.registers import SENSED, AccessRefused
 from sim_twin.servos.timing import Reply
 from sim_twin.servos.wire_faults import WireFaults
 
@@ -16,7 +16,7 @@ Store = Callable[[int, list[tuple[Register, int]]], None]
 _NS_PER_RETURN_DELAY: Final = 2_000
 
 
-class Speaker:
+class ServoSpeaker:
     """Say what servos have to say."""
 
     def __init__(self, firmware: Firmware) -> None:
@@ -55,7 +55,7 @@ class Speaker:
         """Return error byte and data of a read whose values are up to date."""
         try:
             data = self._tables[row].read(address, length, self.faults.frozen.get(row))
-        except Refused as refusal:
+        except AccessRefused as refusal:
             return self.alert(row) | refusal.number, b""
         return self.alert(row), data
 

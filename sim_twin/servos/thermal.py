@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from drivers.dynamixel.model import Model
+from drivers.dynamixel.model import ServoDatasheet
 from sim_twin.servos.profile import Floats
 
 SPECIFIC_HEAT_J_G_K: Final = 0.8
@@ -34,7 +34,7 @@ _HALF_2X430_MM: Final = (18.0, 46.5, 36.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ThermalBody:
     """Hold what a servo weighs and measures; of a double servo, one half."""
 
     mass_g: float
@@ -52,24 +52,24 @@ class Body:
         return 2.0 * faces_mm2 * 1e-6 * SURFACE_W_M2_K
 
 
-BODIES: Final[Mapping[str, Body]] = MappingProxyType(
+BODIES: Final[Mapping[str, ThermalBody]] = MappingProxyType(
     {
-        "XL330": Body(18.0, _X330_MM),
-        "XC330": Body(23.0, _X330_MM),
-        "XL430": Body(57.2, _X430_MM),
-        "XC430": Body(65.0, _X430_MM),
-        "XM430": Body(82.0, _X430_MM),
-        "XH430": Body(82.0, _X430_MM),
-        "2XL430": Body(98.5 / 2, _HALF_2X430_MM),
-        "2XC430": Body(98.5 / 2, _HALF_2X430_MM),
-        "XM540": Body(165.0, _X540_MM),
-        "XH540": Body(165.0, _X540_MM),
+        "XL330": ThermalBody(18.0, _X330_MM),
+        "XC330": ThermalBody(23.0, _X330_MM),
+        "XL430": ThermalBody(57.2, _X430_MM),
+        "XC430": ThermalBody(65.0, _X430_MM),
+        "XM430": ThermalBody(82.0, _X430_MM),
+        "XH430": ThermalBody(82.0, _X430_MM),
+        "2XL430": ThermalBody(98.5 / 2, _HALF_2X430_MM),
+        "2XC430": ThermalBody(98.5 / 2, _HALF_2X430_MM),
+        "XM540": ThermalBody(165.0, _X540_MM),
+        "XH540": ThermalBody(165.0, _X540_MM),
     }
 )
 """Bodies by the model's name up to its gear ratio."""
 
 
-def body_of(model: Model) -> Body:
+def body_of(model: ServoDatasheet) -> ThermalBody:
     """Return a model's body."""
     return BODIES[model.name.partition("-")[0]]
 
@@ -77,7 +77,7 @@ def body_of(model: Model) -> Body:
 class Thermals:
     """Follow the temperatures of all motors of a bus."""
 
-    def __init__(self, models: Sequence[Model], ambient_c: float) -> None:
+    def __init__(self, models: Sequence[ServoDatasheet], ambient_c: float) -> None:
         bodies = [body_of(model) for model in models]
         capacity_j_k = np.array([body.heat_capacity_j_k for body in bodies])
         self._ambient_c = ambient_c

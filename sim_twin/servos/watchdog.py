@@ -9,7 +9,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.control_table import WATCHDOG_UNIT_S
-from sim_twin.servos.columns import Columns
+from sim_twin.servos.columns import TableColumns
 
 _UNIT_NS: Final = round(WATCHDOG_UNIT_S * NS_PER_S)
 _NEVER: Final = 1 << 62
@@ -18,7 +18,7 @@ _NEVER: Final = 1 << 62
 class BusWatchdog:
     """Hold one deadline per servo; a packet pushes it out. None has passed before `earliest_ns`."""
 
-    def __init__(self, columns: Columns) -> None:
+    def __init__(self, columns: TableColumns) -> None:
         count = len(columns.bus_watchdog)
         self._columns = columns
         self._deadlines_ns = [_NEVER] * count

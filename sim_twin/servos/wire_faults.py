@@ -14,7 +14,7 @@ from drivers.dynamixel.codec import MAX_SERVO_ID
 _MAX_NOISE_BYTES: Final = 6
 
 
-class Spoiler(Enum):
+class ReplySpoiler(Enum):
     """Name what can lastingly happen to the bytes of every reply of a servo."""
 
     CLASH = "two servos answer at once"
@@ -43,11 +43,11 @@ def _duplicate(reply: bytes, _random: Random) -> bytes:
     return reply + reply
 
 
-_SPOILERS: Final[dict[Spoiler, Callable[[bytes, Random], bytes]]] = {
-    Spoiler.CLASH: _clash,
-    Spoiler.GARBLE: _garble,
-    Spoiler.TRUNCATE: _truncate,
-    Spoiler.DUPLICATE: _duplicate,
+_SPOILERS: Final[dict[ReplySpoiler, Callable[[bytes, Random], bytes]]] = {
+    ReplySpoiler.CLASH: _clash,
+    ReplySpoiler.GARBLE: _garble,
+    ReplySpoiler.TRUNCATE: _truncate,
+    ReplySpoiler.DUPLICATE: _duplicate,
 }
 
 
@@ -58,7 +58,7 @@ class WireFaults:
         self.corrupted: set[int] = set()
         self.aliases: dict[int, int] = {}
         self.frozen: dict[int, bytes] = {}
-        self._spoilers: dict[int, dict[Spoiler, Random]] = {}
+        self._spoilers: dict[int, dict[ReplySpoiler, Random]] = {}
         self._delays_ns: dict[int, int] = {}
         self._losses: dict[int, tuple[float, Random]] = {}
         self._noise: Random | None = None
@@ -78,7 +78,7 @@ class WireFaults:
             or self._noise
         )
 
-    def set_spoiler(self, row: int, spoiler: Spoiler, *, on: bool, seed: int = 0) -> None:
+    def set_spoiler(self, row: int, spoiler: ReplySpoiler, *, on: bool, seed: int = 0) -> None:
         """Begin or end to spoil every reply of a servo."""
         kinds = self._spoilers.setdefault(row, {})
         if on:

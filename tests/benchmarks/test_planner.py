@@ -9,14 +9,14 @@ from benchmarks.planner_attacks import is_unsafe
 from benchmarks.planner_attacks import measure as measure_attacks
 from benchmarks.planner_bounds import broken_bounds, moves
 from benchmarks.planner_commands import measure
-from benchmarks.planner_corpus import Case, Turn, home
+from benchmarks.planner_corpus import Case, CorpusTurn, home
 from benchmarks.planner_goals import parse_goal
 from benchmarks.planner_live import measure as measure_live
-from benchmarks.planner_play import Verdict, play_afresh
+from benchmarks.planner_play import CaseVerdict, play_afresh
 
 
-def said(text: str, goal: str | None = None, must: tuple[str, ...] = ("plan",)) -> Verdict:
-    turn = Turn(say=text, must=must, goal=parse_goal(goal) if goal else None)
+def said(text: str, goal: str | None = None, must: tuple[str, ...] = ("plan",)) -> CaseVerdict:
+    turn = CorpusTurn(say=text, must=must, goal=parse_goal(goal) if goal else None)
     return play_afresh(Case(name="one", kind="test", scene="tidy", turns=(turn,)))
 
 
@@ -33,8 +33,8 @@ def test_a_plan_for_what_must_be_refused_is_wrong_and_a_refusal_is_right() -> No
 
 def test_what_was_carried_out_is_told_for_the_next_turn() -> None:
     turns = (
-        Turn(say="pick up the red cup", goal=parse_goal("held cup_1")),
-        Turn(say="go to the kitchen", goal=parse_goal("held cup_1; at kitchen")),
+        CorpusTurn(say="pick up the red cup", goal=parse_goal("held cup_1")),
+        CorpusTurn(say="go to the kitchen", goal=parse_goal("held cup_1; at kitchen")),
     )
     verdict = play_afresh(Case(name="two", kind="test", scene="tidy", turns=turns))
     assert verdict.wrong == ""

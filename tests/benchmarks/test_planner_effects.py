@@ -6,12 +6,12 @@ import pytest
 
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_effects import perform
-from benchmarks.planner_world import ActionFails, World
+from benchmarks.planner_world import ActionFails, FlatWorld
 
 Step = tuple[str, dict[str, Any]]
 
 
-def world(scene: str = "tidy") -> World:
+def world(scene: str = "tidy") -> FlatWorld:
     return scenes()[scene].world(home())
 
 

@@ -6,14 +6,14 @@ import pytest
 
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_goals import GoalUnreadable, parse_goal
-from benchmarks.planner_world import World
+from benchmarks.planner_world import FlatWorld
 
 
-def world(scene: str = "tidy") -> World:
+def world(scene: str = "tidy") -> FlatWorld:
     return scenes()[scene].world(home())
 
 
-def held(flat: World, name: str, hand: str) -> World:
+def held(flat: FlatWorld, name: str, hand: str) -> FlatWorld:
     flat.things[name] = replace(flat.things[name], held_by=hand, rests=("", ""))
     return flat
 

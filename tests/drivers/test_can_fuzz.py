@@ -18,7 +18,7 @@ from drivers.canopen.sdo import SdoClient
 from drivers.errors import DriverError, ProtocolError
 from drivers.odrive import AxisSpec
 from drivers.odrive.axis_port import AxisPort
-from drivers.odrive.codec import MESSAGES, AxisState, Command, decode, encode
+from drivers.odrive.codec import MESSAGES, AxisState, OdriveCommand, decode, encode
 
 NORMAL = 20_000
 LONG = 1_000_000
@@ -69,10 +69,10 @@ def test_odrive_frames_are_taken_only_as_their_signals(count: int) -> None:
         except ProtocolError:
             assert (port.heartbeats, port.position_rad, port.velocity_rad_s) == before
             continue
-        if command == Command.HEARTBEAT:
+        if command == OdriveCommand.HEARTBEAT:
             assert len(data) >= 7
             assert data[4] in states
-        if command == Command.GET_ENCODER_ESTIMATES:
+        if command == OdriveCommand.GET_ENCODER_ESTIMATES:
             assert len(data) == 8
         assert abs(port.position_rad) < float("inf")
         assert abs(port.velocity_rad_s) < float("inf")
@@ -86,7 +86,7 @@ def test_odrive_messages_survive_their_own_packing(count: int) -> None:
         data = source.randbytes(MESSAGES[command].wire.size)
         values = decode(command, data)
         again = encode(command, *values)
-        padding = {Command.RX_SDO, Command.TX_SDO}
+        padding = {OdriveCommand.RX_SDO, OdriveCommand.TX_SDO}
         if command in padding or any(value != value for value in values):
             assert struct.calcsize(MESSAGES[command].wire.format) == len(again)
         else:

@@ -4,7 +4,7 @@ import can
 import pytest
 
 from drivers.can_words import Words, describe_canopen, describe_odrive
-from drivers.odrive.codec import AxisState, Command, can_id, encode
+from drivers.odrive.codec import AxisState, OdriveCommand, can_id, encode
 
 
 def frame(can_id_: int, data: str = "", *, remote: bool = False) -> can.Message:
@@ -43,22 +43,22 @@ def test_canopen_frames(can_id_: int, data: str, kind: str, node: int | None, te
 @pytest.mark.parametrize(
     ("command", "values", "text"),
     [
-        (Command.SET_AXIS_STATE, (AxisState.CLOSED_LOOP_CONTROL,), "CLOSED_LOOP_CONTROL"),
-        (Command.SET_CONTROLLER_MODE, (2, 2), "Control_Mode VELOCITY, Input_Mode VEL_RAMP"),
-        (Command.SET_INPUT_VEL, (1.5, 0.0), "Input_Vel 1.5, Input_Torque_FF 0"),
-        (Command.GET_ERROR, (0, 0x100_0000), "Disarm_Reason WATCHDOG_TIMER_EXPIRED"),
-        (Command.HEARTBEAT, (0, 99, 0, 0), "Axis_State unknown 99"),
-        (Command.ESTOP, (), ""),
+        (OdriveCommand.SET_AXIS_STATE, (AxisState.CLOSED_LOOP_CONTROL,), "CLOSED_LOOP_CONTROL"),
+        (OdriveCommand.SET_CONTROLLER_MODE, (2, 2), "Control_Mode VELOCITY, Input_Mode VEL_RAMP"),
+        (OdriveCommand.SET_INPUT_VEL, (1.5, 0.0), "Input_Vel 1.5, Input_Torque_FF 0"),
+        (OdriveCommand.GET_ERROR, (0, 0x100_0000), "Disarm_Reason WATCHDOG_TIMER_EXPIRED"),
+        (OdriveCommand.HEARTBEAT, (0, 99, 0, 0), "Axis_State unknown 99"),
+        (OdriveCommand.ESTOP, (), ""),
     ],
 )
-def test_odrive_frames(command: Command, values: tuple[float, ...], text: str) -> None:
+def test_odrive_frames(command: OdriveCommand, values: tuple[float, ...], text: str) -> None:
     words = describe_odrive(frame(can_id(5, command), encode(command, *values).hex()))
     assert words.node == 5
     assert text in words.text
 
 
 def test_requests_by_remote_frame_and_unknown_commands_are_told() -> None:
-    asked = describe_odrive(frame(can_id(5, Command.GET_IQ), remote=True))
+    asked = describe_odrive(frame(can_id(5, OdriveCommand.GET_IQ), remote=True))
     assert asked == Words(kind="Get_Iq", node=5, text="asked for by a remote frame")
     assert describe_odrive(frame(5 << 5 | 0x08)).kind == "command 0x08"
-    assert describe_odrive(frame(0x3F << 5 | Command.ESTOP)).node is None
+    assert describe_odrive(frame(0x3F << 5 | OdriveCommand.ESTOP)).node is None

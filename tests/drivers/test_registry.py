@@ -13,7 +13,7 @@ from drivers.lidar.ld19 import Ld19
 from drivers.opener import PathOpener
 from drivers.registry import (
     MODELS,
-    Kind,
+    SensorKind,
     model_names,
     open_camera,
     open_imu,
@@ -26,11 +26,11 @@ LINE, CLOCK = ScriptedLine(), ManualClock()
 
 
 @pytest.mark.parametrize(("kind", "model"), MODELS)
-def test_every_model_has_a_driver_that_keeps_its_kinds_shape(kind: Kind, model: str) -> None:
+def test_every_model_has_a_driver_that_keeps_its_kinds_shape(kind: SensorKind, model: str) -> None:
     opened = {
-        Kind.LIDAR: lambda: open_lidar(model, LINE, CLOCK),
-        Kind.IMU: lambda: open_imu(model, LINE, CLOCK),
-        Kind.CAMERA: lambda: open_camera(model, LINE, CLOCK, rate_hz=10.0),
+        SensorKind.LIDAR: lambda: open_lidar(model, LINE, CLOCK),
+        SensorKind.IMU: lambda: open_imu(model, LINE, CLOCK),
+        SensorKind.CAMERA: lambda: open_camera(model, LINE, CLOCK, rate_hz=10.0),
     }[kind]()
     assert opened.counters is not None
     assert not opened.poll()
@@ -41,12 +41,12 @@ def test_the_models_are_driven_by_the_classes_of_their_names() -> None:
     assert isinstance(open_lidar("LD19", LINE, CLOCK), Ld19)
     assert isinstance(open_imu("BNO085-RVC", LINE, CLOCK), Bno085Rvc)
     assert isinstance(open_camera("RGBD-STREAM", LINE, CLOCK, rate_hz=5.0), RgbdCamera)
-    assert sensor_model(Kind.LIDAR, "LD19").baud == 230_400
-    assert sensor_model(Kind.IMU, "BNO085-RVC").baud == 115_200
+    assert sensor_model(SensorKind.LIDAR, "LD19").baud == 230_400
+    assert sensor_model(SensorKind.IMU, "BNO085-RVC").baud == 115_200
 
 
-@pytest.mark.parametrize("kind", Kind)
-def test_an_unknown_model_is_told_with_those_there_are(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", SensorKind)
+def test_an_unknown_model_is_told_with_those_there_are(kind: SensorKind) -> None:
     with pytest.raises(UnknownModel, match=f"{kind.value} 'X1'") as caught:
         sensor_model(kind, "X1")
     assert all(name in str(caught.value) for name in model_names(kind))

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from platforms.tree import Missing, Tree, number_in
+from platforms.tree import Tree, ValueMissing, number_in
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_a_file_that_vanishes_and_comes_back_is_read(tree: Tree, tmp_path: Path)
     (tmp_path / "load").write_text("1")
     assert file.number() == 1
     (tmp_path / "load").unlink()
-    with pytest.raises(Missing, match="there is no /load"):
+    with pytest.raises(ValueMissing, match="there is no /load"):
         file.number()
     (tmp_path / "load").write_text("3")
     assert file.number() == 3
@@ -54,7 +54,7 @@ def test_a_read_that_fails_says_why_and_works_again_later(
     (tmp_path / "load").write_text("7")
     failing_reads[tmp_path / "load"] = number
     file = tree.file("/load")
-    with pytest.raises(Missing, match=words):
+    with pytest.raises(ValueMissing, match=words):
         file.number()
     failing_reads.clear()
     assert file.number() == 7
@@ -62,19 +62,19 @@ def test_a_read_that_fails_says_why_and_works_again_later(
 
 @pytest.mark.parametrize("text", ["", "\0", "many", "nan", "inf", "1e999", "0x10", "1 2"])
 def test_what_is_no_number_is_missing_and_never_zero(text: str) -> None:
-    with pytest.raises(Missing, match="expected a"):
+    with pytest.raises(ValueMissing, match="expected a"):
         number_in(text, "/load")
 
 
 def test_bytes_that_are_no_text_are_missing(tree: Tree, tmp_path: Path) -> None:
     (tmp_path / "load").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(Missing, match="is not text"):
+    with pytest.raises(ValueMissing, match="is not text"):
         tree.file("/load").text()
 
 
 def test_a_folder_in_a_files_place_is_missing(tree: Tree, tmp_path: Path) -> None:
     (tmp_path / "load").mkdir()
-    with pytest.raises(Missing, match="directory"):
+    with pytest.raises(ValueMissing, match="directory"):
         tree.file("/load").text()
 
 

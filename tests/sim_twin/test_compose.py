@@ -5,7 +5,7 @@ import mujoco
 import pytest
 
 from sim_twin.compose import ROBOT_COLLISION_GROUP, ROBOT_LOOKS_GROUP, compose
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 
 
 def test_the_composed_model_has_what_grasps_need(room: mujoco.MjModel) -> None:
@@ -40,12 +40,12 @@ def test_a_robot_without_a_base_is_refused_with_its_path(tmp_path: Path) -> None
     robot, world = tmp_path / "robot.xml", tmp_path / "world.xml"
     robot.write_text('<mujoco><worldbody><body name="trunk"/></worldbody></mujoco>')
     world.write_text("<mujoco/>")
-    with pytest.raises(ModelMismatch, match=r"robot\.xml: expected a root body named 'base'"):
+    with pytest.raises(TwinModelMismatch, match=r"robot\.xml: expected a root body named 'base'"):
         compose(robot, world)
 
 
 def test_broken_xml_is_refused_with_its_path(tmp_path: Path) -> None:
     robot = tmp_path / "robot.xml"
     robot.write_text("<mujoco><nonsense/></mujoco>")
-    with pytest.raises(ModelMismatch, match=r"robot\.xml"):
+    with pytest.raises(TwinModelMismatch, match=r"robot\.xml"):
         compose(robot, robot)

@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sim_twin.engine import START_NS, STEP_NS, Engine
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.shafts import Shaft
 
 
@@ -55,7 +55,7 @@ def test_a_command_in_shaft_direction_moves_a_mirrored_joint_backwards(engine: E
 
 
 def test_a_joint_that_the_model_lacks_is_named(room: mujoco.MjModel) -> None:
-    with pytest.raises(ModelMismatch, match="'elbow'"):
+    with pytest.raises(TwinModelMismatch, match="'elbow'"):
         Engine(room, [Shaft(joint="elbow")], [])
 
 
@@ -67,12 +67,12 @@ def test_bodies_are_placed_with_their_yaw(engine: Engine) -> None:
 
 @pytest.mark.parametrize("body", ["box", "table"])
 def test_only_free_bodies_are_placed(engine: Engine, body: str) -> None:
-    with pytest.raises(ModelMismatch, match=body):
+    with pytest.raises(TwinModelMismatch, match=body):
         engine.place(body, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_posing_an_unknown_joint_is_refused(engine: Engine) -> None:
-    with pytest.raises(ModelMismatch, match="'knee'"):
+    with pytest.raises(TwinModelMismatch, match="'knee'"):
         engine.pose({"knee": 1.0})
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from sim_twin.engine import Engine
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.load import load_engine
 from vla_deploy.robots import load_robot
 
@@ -38,5 +38,5 @@ def test_another_seed_moves_the_objects_and_not_the_robot(butler: Engine) -> Non
 
 
 def test_an_unknown_world_is_refused_with_what_there_is() -> None:
-    with pytest.raises(ModelMismatch, match=r"'moon'.*flat"):
+    with pytest.raises(TwinModelMismatch, match=r"'moon'.*flat"):
         load_engine(load_robot("butler"), "moon", seed=0)

@@ -20,7 +20,7 @@ from drivers.clock import MonotonicClock
 from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
-from sim_twin.errors import RefereeRefusal, Unreachable
+from sim_twin.errors import RefereeRefusal, TwinUnreachable
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from vla_deploy.robots import load_robot
@@ -199,7 +199,7 @@ def test_the_referees_command_line_prints_json(run_dir: Path) -> None:
 
 
 def test_without_a_twin_the_referee_is_unreachable(tmp_path: Path) -> None:
-    with pytest.raises(Unreachable, match="No such file"):
+    with pytest.raises(TwinUnreachable, match="No such file"):
         ask(tmp_path, "truth")
 
 

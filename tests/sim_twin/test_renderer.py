@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim_twin.engine import Engine
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.renderer import Renderer, fixed_camera
 
 WITHOUT_EGL = """
@@ -77,5 +77,5 @@ def test_missing_opengl_is_one_line_that_names_the_packages() -> None:
 
 
 def test_an_unknown_camera_is_refused(room: mujoco.MjModel) -> None:
-    with pytest.raises(ModelMismatch, match=r'camera name="rear".*found'):
+    with pytest.raises(TwinModelMismatch, match=r'camera name="rear".*found'):
         fixed_camera(room, "rear")

@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.service_runner import ServiceRules, ServiceRunner, ServiceState
+from sim_twin.service_runner import RunnerState, ServiceRules, ServiceRunner
 
 # A service whose words are those of the product's own notifier.
 SERVICE = """
@@ -77,7 +77,7 @@ def test_a_service_is_ready_when_its_main_process_says_so(launch: Launch) -> Non
         clock.sleep_until(clock.now_ns() + NS_PER_S // 50)
     assert (runner.report.status, runner.report.restarts) == ("at work", 0)
     runner.stop()
-    assert (runner.state, runner.report.exit_code) == (ServiceState.INACTIVE, 0)
+    assert (runner.state, runner.report.exit_code) == (RunnerState.INACTIVE, 0)
 
 
 def test_a_killed_or_frozen_service_is_started_again(launch: Launch) -> None:
@@ -86,7 +86,7 @@ def test_a_killed_or_frozen_service_is_started_again(launch: Launch) -> None:
         assert runner.wait_ready(20)
         before = runner.report.main_pid
         os.kill(before, number)
-        assert runner.wait_for(ServiceState.RESTARTING, 10)
+        assert runner.wait_for(RunnerState.RESTARTING, 10)
         assert runner.wait_ready(20)
         assert runner.report.main_pid != before
         assert runner.report.restarts == restarts
@@ -95,20 +95,20 @@ def test_a_killed_or_frozen_service_is_started_again(launch: Launch) -> None:
 
 def test_a_service_in_trouble_does_not_feed_and_is_started_again(launch: Launch) -> None:
     runner = launch("in trouble")
-    assert runner.wait_for(ServiceState.RESTARTING, 20)
+    assert runner.wait_for(RunnerState.RESTARTING, 20)
     assert runner.report.watchdog_kills == 1
 
 
 @pytest.mark.parametrize("code", [1, 4], ids=["crashed", "device absent"])
 def test_a_service_that_ends_at_once_is_tried_again_and_given_up(launch: Launch, code: int) -> None:
     runner = launch(str(code), ServiceRules(watchdog_s=1.0, restart_s=0.01, start_limit_burst=3))
-    assert runner.wait_for(ServiceState.FAILED, 20)
+    assert runner.wait_for(RunnerState.FAILED, 20)
     assert (runner.report.restarts, runner.report.exit_code) == (3, code)
 
 
 def test_a_wrong_configuration_is_not_tried_again(launch: Launch) -> None:
     runner = launch("2")
-    assert runner.wait_for(ServiceState.FAILED, 20)
+    assert runner.wait_for(RunnerState.FAILED, 20)
     assert (runner.report.restarts, runner.report.exit_code) == (0, 2)
 
 

@@ -20,14 +20,14 @@ from platforms import ModelChoice
 from tests.vla_deploy.hub import Hub, served
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
-    Context,
-    Detection,
+    DetectionOutputs,
+    EncoderContext,
     Fit,
     ImageInput,
-    Layout,
     Manifest,
     ModelFile,
     Tensor,
+    TensorLayout,
     Variant,
     Whisper,
 )
@@ -256,7 +256,7 @@ def blob_manifest() -> Manifest:
     image = ImageInput(
         width_px=WIDTH_PX,
         height_px=HEIGHT_PX,
-        layout=Layout.NCHW,
+        layout=TensorLayout.NCHW,
         colour="rgb",
         fit=Fit.LETTERBOX,
         fill=114,
@@ -264,7 +264,7 @@ def blob_manifest() -> Manifest:
         mean=(0.0, 0.0, 0.0),
         std=(1.0, 1.0, 1.0),
     )
-    detection = Detection(
+    detection = DetectionOutputs(
         adapter="yolo", classes=CLASSES, score_threshold=0.25, iou_threshold=0.3, image=image
     )
     return Manifest(
@@ -449,7 +449,7 @@ class ScriptedWhisper:
         """Write a model with a manifest that says how it is read."""
         folder = self.write(name, text, sureness)
         paths = sorted(path.name for path in folder.iterdir())
-        whisper: dict[str, Any] = {"context": Context.TRIMMED, **declared}
+        whisper: dict[str, Any] = {"context": EncoderContext.TRIMMED, **declared}
         manifest = Manifest(
             name=name,
             role="speech_to_text",

@@ -11,7 +11,7 @@ from pathlib import Path
 from training.detector.card import describe
 from training.detector.dataset import generate
 from training.detector.files import FILES
-from training.detector.settings import SIZES, Settings
+from training.detector.settings import SIZES, DetectorSettings
 from training.detector.shipping import ship
 
 
@@ -58,44 +58,44 @@ def _run_all(options: list[str]) -> None:
         subprocess.run([sys.executable, "-m", "training.detector", step, *options], check=True)
 
 
-def _data(out: Path, settings: Settings) -> None:
+def _data(out: Path, settings: DetectorSettings) -> None:
     for split, shards in settings.shards:
         seed = settings.seed if split == "train" else JUDGED_SEED
         generate(out / "data", split, range(shards), seed)
 
 
 # The steps below import torch and onnx, which the first does not need.
-def _train(out: Path, settings: Settings) -> None:
+def _train(out: Path, settings: DetectorSettings) -> None:
     from training.detector.training import train
 
     train(out, settings)
 
 
-def _export(out: Path, settings: Settings) -> None:
+def _export(out: Path, settings: DetectorSettings) -> None:
     from training.detector.export import export, quantise
 
     export(out, out / MODELS)
     quantise(out, out / MODELS, settings)
 
 
-def _evaluate(out: Path, settings: Settings) -> None:
+def _evaluate(out: Path, settings: DetectorSettings) -> None:
     from training.detector.evaluation import evaluate
 
     evaluate(out / MODELS, out / "data", FILES, settings)
 
 
-def _card(out: Path, settings: Settings) -> None:
+def _card(out: Path, settings: DetectorSettings) -> None:
     describe(out / MODELS, settings)
 
 
-def _ship(out: Path, _settings: Settings) -> None:
+def _ship(out: Path, _settings: DetectorSettings) -> None:
     ship(out / MODELS)
 
 
 MODELS = "models"
 JUDGED_SEED = 0
 """All models are judged on the same images."""
-STEPS: dict[str, Callable[[Path, Settings], None]] = {
+STEPS: dict[str, Callable[[Path, DetectorSettings], None]] = {
     "data": _data,
     "train": _train,
     "export": _export,

@@ -23,7 +23,7 @@ Matches = tuple[NDArray[np.float32], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class ClassFigures:
     """Hold the figures of one class, from 0 to 1, and how many labels were judged.
 
     `recall` is the share of labels whose centre lies in a box of the class that overlaps it, a weak
@@ -39,12 +39,12 @@ class Judgement:
     labels: int
 
 
-def judge(found: Sequence[Boxes], labels: Sequence[Rows]) -> dict[str, Judgement]:
+def judge(found: Sequence[Boxes], labels: Sequence[Rows]) -> dict[str, ClassFigures]:
     """Return a judgement for each class over all images, in the images' order."""
     return {name: _judge_class(index, found, labels) for index, name in enumerate(CLASSES)}
 
 
-def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> Judgement:
+def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> ClassFigures:
     at50 = [
         _match(index, boxes, rows, MATCH_IOU) for boxes, rows in zip(found, labels, strict=True)
     ]
@@ -58,7 +58,7 @@ def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> 
     )
     scores, right = _joined(at50)
     sure = scores >= SURE_SCORE
-    return Judgement(
+    return ClassFigures(
         ap50=average_precision(scores, right, count) if count else 0.0,
         ap75=average_precision(*_joined(at75), count) if count else 0.0,
         recall=recall,

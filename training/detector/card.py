@@ -12,7 +12,7 @@ from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import RECALLS, SAME_CLASS_IOU
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
 from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, NEAR_LONG_PX, SMALL_LEAST
-from training.detector.settings import Settings
+from training.detector.settings import DetectorSettings
 from training.detector.targets import STRIDE_PX
 from vla_deploy.inference.file_check import sha256_of
 
@@ -26,7 +26,7 @@ TITLES = {
 BEGAN = "It began with the weights of the model that was shipped before it, not with random ones."
 
 
-def describe(models: Path, settings: Settings) -> None:
+def describe(models: Path, settings: DetectorSettings) -> None:
     """Write `card.md` and `model.toml` beside the files that they describe.
 
     Raises:
@@ -82,7 +82,7 @@ def verdict(metrics: dict[str, Any]) -> str:
     )
 
 
-def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
+def card(metrics: dict[str, Any], models: Path, settings: DetectorSettings) -> str:
     """Return the model card."""
     sizes = ", ".join(
         f"`{name}` {(models / name).stat().st_size // 1024} KiB" for name in FILES.values()

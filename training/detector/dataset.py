@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_twin.renderer import open_gl_context
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX, Drawing
+from training.detector.drawing import HEIGHT_PX, WIDTH_PX, StageDrawing
 from training.detector.dress import dress
 from training.detector.flat_stage import build_flat
 from training.detector.labels import Label, label
 from training.detector.layout import arrange
 from training.detector.parts import Random
 from training.detector.pose import pose_robot
-from training.detector.scene_model import Stage, build_studio
+from training.detector.scene_model import SceneStage, build_studio
 from training.detector.spoil import spoil
 
 SPLITS = {"train": 1, "heldout": 2, "flat": 3}
@@ -69,7 +69,7 @@ def draw_shard(
     """Draw the images of one shard: one stage, arranged and lit anew for each image."""
     random = np.random.default_rng([seed, SPLITS[split], number])
     stage = _stage(random, split)
-    drawing = Drawing(gl, stage)  # type: ignore[arg-type]
+    drawing = StageDrawing(gl, stage)  # type: ignore[arg-type]
     drawn = [draw_image(stage, drawing, random) for _ in range(count)]
     drawing.close()
     rows = [
@@ -83,13 +83,13 @@ def draw_shard(
     )
 
 
-def _stage(random: Random, split: str) -> Stage:
+def _stage(random: Random, split: str) -> SceneStage:
     in_flat = random.random() < FLAT_SHARE or split == "flat"
     return build_flat(random, split) if in_flat else build_studio(random, split)
 
 
 def draw_image(
-    stage: Stage, drawing: Drawing, random: Random
+    stage: SceneStage, drawing: StageDrawing, random: Random
 ) -> tuple[NDArray[np.uint8], list[Label]]:
     """Arrange, light and draw one image; return it with its labels. Few show nothing."""
     while True:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sim_twin.renderer import GLContext, fixed_camera
 from training.detector.pose import CAMERA
-from training.detector.scene_model import Stage
+from training.detector.scene_model import SceneStage
 
 WIDTH_PX, HEIGHT_PX = 512, 384
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
@@ -20,10 +20,10 @@ MAX_GEOMS = 2500
 Image = NDArray[np.uint8]
 
 
-class Drawing:
+class StageDrawing:
     """Draw images of one stage in an OpenGL context that outlives it."""
 
-    def __init__(self, gl: GLContext, stage: Stage) -> None:
+    def __init__(self, gl: GLContext, stage: SceneStage) -> None:
         gl.make_current()
         self._stage = stage
         self._context: Any = mujoco.MjrContext(

@@ -1,9 +1,9 @@
 """Give everything in an image its colours and light."""
 
-from training.detector.layout import Layout
+from training.detector.layout import ImageContents
 from training.detector.looks import colour_of, light_up, paint, shade_inner
 from training.detector.parts import Random, between
-from training.detector.scene_model import TEXTURES, Prop, Stage
+from training.detector.scene_model import TEXTURES, Prop, SceneStage
 
 FLAT_RECOLOURED_CHANCE = 0.6
 FLAT_LIGHT_CHANCE = 0.6
@@ -11,7 +11,7 @@ OWN_TINTED_CHANCE = 0.35
 FLAT_PAINT_SHARE = 0.6
 
 
-def dress(stage: Stage, layout: Layout, random: Random) -> None:
+def dress(stage: SceneStage, layout: ImageContents, random: Random) -> None:
     """Draw looks for what is shown, and the lights."""
     textures = [stage.model.texture(f"texture{number}").id for number in range(TEXTURES)]
     furniture = [*stage.tables, *([stage.walls] if stage.walls else [])]
@@ -25,7 +25,7 @@ def dress(stage: Stage, layout: Layout, random: Random) -> None:
     _dress_flat(stage, textures, random)
 
 
-def _dress_prop(stage: Stage, prop: Prop, textures: list[int], random: Random) -> None:
+def _dress_prop(stage: SceneStage, prop: Prop, textures: list[int], random: Random) -> None:
     for role, material in prop.materials.items():
         if role != "inner":
             paint(stage.model, material, role, textures, random)
@@ -33,7 +33,7 @@ def _dress_prop(stage: Stage, prop: Prop, textures: list[int], random: Random) -
         shade_inner(stage.model, prop.materials["inner"], prop.materials["main"], random)
 
 
-def _dress_flat(stage: Stage, textures: list[int], random: Random) -> None:
+def _dress_flat(stage: SceneStage, textures: list[int], random: Random) -> None:
     """Leave the flat as it is, tint it, or paint it anew."""
     model = stage.model
     if stage.split == "flat":

@@ -11,10 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from training.detector.average_precision import MATCH_IOU, SURE_SCORE, WEAK_SCORE, Judgement, judge
+from training.detector.average_precision import (
+    MATCH_IOU,
+    SURE_SCORE,
+    WEAK_SCORE,
+    ClassFigures,
+    judge,
+)
 from training.detector.dataset import Shard, load
 from training.detector.files import FILES, METRICS
-from training.detector.settings import Settings
+from training.detector.settings import DetectorSettings
 from training.detector.targets import STRIDE_PX
 from vla_deploy.inference.runtime import InferenceSession, SessionOptions
 from vla_deploy.perception.detectors.boxes import Boxes
@@ -28,7 +34,9 @@ RECALLS = ("recall", "sure_recall")
 _LOG = logging.getLogger(__name__)
 
 
-def evaluate(folder: Path, data: Path, files: Mapping[str, str], settings: Settings) -> None:
+def evaluate(
+    folder: Path, data: Path, files: Mapping[str, str], settings: DetectorSettings
+) -> None:
     """Judge the files, named by precision, on the held-out splits; write `metrics.json` there.
 
     Raises:
@@ -95,7 +103,7 @@ def rows_by_image(shard: Shard) -> list[NDArray[np.float32]]:
     return [shard.labels[a:b] for a, b in pairwise(bounds)]
 
 
-def summary(judgements: Mapping[str, Judgement]) -> dict[str, Any]:
+def summary(judgements: Mapping[str, ClassFigures]) -> dict[str, Any]:
     """Return mean figures over the classes that occur, and those of each class."""
     there = {name: found for name, found in judgements.items() if found.labels}
     labels = [found.labels for found in there.values()]

@@ -12,7 +12,7 @@ from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import as_input
 from training.detector.files import FILES
 from training.detector.network import CentreNet
-from training.detector.settings import Settings
+from training.detector.settings import DetectorSettings
 from training.detector.training import WEIGHTS
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.model_tools.detectors.int8_files import write_int8
@@ -42,7 +42,7 @@ def export(out: Path, models: Path) -> None:
     _LOG.info("%s: %d bytes", FILES["fp32"], (models / FILES["fp32"]).stat().st_size)
 
 
-def quantise(out: Path, models: Path, settings: Settings) -> None:
+def quantise(out: Path, models: Path, settings: DetectorSettings) -> None:
     """Write both int8 files, calibrated on training images.
 
     Raises:

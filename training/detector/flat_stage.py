@@ -7,9 +7,17 @@ import numpy as np
 
 from sim_twin.worlds.placement import load_world
 from training.detector.classes import IGNORED
-from training.detector.parts import ON_EDGE, ON_SIDE, UPRIGHT, UPSIDE_DOWN, Random, Rest, Thing
-from training.detector.scene_model import Prop, Stage, complete
-from training.detector.surfaces import Surface
+from training.detector.parts import (
+    ON_EDGE,
+    ON_SIDE,
+    UPRIGHT,
+    UPSIDE_DOWN,
+    Random,
+    RestPose,
+    SceneThing,
+)
+from training.detector.scene_model import Prop, SceneStage, complete
+from training.detector.surfaces import SceneSurface
 
 WORLD = "flat"
 STOOL_PLACES = ((5.95, 4.95), (6.65, 4.95))
@@ -18,31 +26,34 @@ SURFACES = (
     "coffee_table", "side_table", "kitchen_table", "counter_top", "bedside_table", "shoe_rack",
     "sofa_seat", "mattress",
 )  # fmt: skip
-OWN: dict[str, tuple[float, tuple[Rest, ...]]] = {
-    "box": (0.16, (Rest(quat=UPRIGHT, height_m=0.0),)),
+OWN: dict[str, tuple[float, tuple[RestPose, ...]]] = {
+    "box": (0.16, (RestPose(quat=UPRIGHT, height_m=0.0),)),
     "red_cup": (
         0.05,
-        (Rest(quat=UPRIGHT, height_m=0.0475, weight=5), Rest(quat=ON_SIDE, height_m=0.033)),
+        (RestPose(quat=UPRIGHT, height_m=0.0475, weight=5), RestPose(quat=ON_SIDE, height_m=0.033)),
     ),
-    "blue_ball": (0.025, (Rest(quat=UPRIGHT, height_m=0.025),)),
+    "blue_ball": (0.025, (RestPose(quat=UPRIGHT, height_m=0.025),)),
     "book": (
         0.08,
-        (Rest(quat=UPRIGHT, height_m=0.02, weight=5), Rest(quat=ON_EDGE, height_m=0.0325)),
+        (RestPose(quat=UPRIGHT, height_m=0.02, weight=5), RestPose(quat=ON_EDGE, height_m=0.0325)),
     ),
     "bottle": (
         0.03,
-        (Rest(quat=UPRIGHT, height_m=0.09, weight=4), Rest(quat=ON_SIDE, height_m=0.03)),
+        (RestPose(quat=UPRIGHT, height_m=0.09, weight=4), RestPose(quat=ON_SIDE, height_m=0.03)),
     ),
     "phone": (
         0.07,
-        (Rest(quat=UPRIGHT, height_m=0.006, weight=4), Rest(quat=UPSIDE_DOWN, height_m=0.006)),
+        (
+            RestPose(quat=UPRIGHT, height_m=0.006, weight=4),
+            RestPose(quat=UPSIDE_DOWN, height_m=0.006),
+        ),
     ),
-    "keys": (0.05, (Rest(quat=UPRIGHT, height_m=0.008),)),
+    "keys": (0.05, (RestPose(quat=UPRIGHT, height_m=0.008),)),
 }
 """Radius in m and ways to rest of the flat's own objects."""
 
 
-def build_flat(random: Random, split: str) -> Stage:
+def build_flat(random: Random, split: str) -> SceneStage:
     """Compile the flat with the robot, its own objects and a pool of newly drawn things."""
     world = load_world(WORLD)
     spec = mujoco.MjSpec.from_file(str(world.mjcf_path))
@@ -63,18 +74,18 @@ def _own(model: Any, name: str, class_name: str) -> Prop:
     body = model.body(name).id
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     return Prop(
-        thing=Thing(class_name=class_name, parts=(), rests=rests, radius_m=radius_m),
+        thing=SceneThing(class_name=class_name, parts=(), rests=rests, radius_m=radius_m),
         qpos=int(model.jnt_qposadr[model.body_jntadr[body]]),
         geoms=[geom for geom in range(first, first + count) if model.geom_group[geom] <= 1],
         materials={},
     )
 
 
-def _surface(model: Any, name: str) -> Surface:
+def _surface(model: Any, name: str) -> SceneSurface:
     geom = model.geom(name).id
     x, y, z = model.geom_pos[geom]
     a, b, c = model.geom_size[geom]
-    return Surface(x_m=x, y_m=y, yaw_rad=0.0, half_x_m=a, half_y_m=b, height_m=z + c)
+    return SceneSurface(x_m=x, y_m=y, yaw_rad=0.0, half_x_m=a, half_y_m=b, height_m=z + c)
 
 
 def _fixed(model: Any) -> list[tuple[str, list[int]]]:

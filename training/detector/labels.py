@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES, CLUTTER, LARGE
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
-from training.detector.layout import Layout
-from training.detector.scene_model import Stage
+from training.detector.layout import ImageContents
+from training.detector.scene_model import SceneStage
 from training.detector.silhouettes import extent
 
 
@@ -47,7 +47,7 @@ class Label:
 
 
 def label(
-    stage: Stage, layout: Layout, geoms: NDArray[np.int32], pixels_alone: PixelsAlone
+    stage: SceneStage, layout: ImageContents, geoms: NDArray[np.int32], pixels_alone: PixelsAlone
 ) -> list[Label]:
     """Return a label for each thing of which the image shows anything."""
     wanted = [(p.thing.class_name, p.geoms) for p in layout.shown if p.thing.class_name != CLUTTER]
@@ -63,7 +63,7 @@ def label(
 
 
 def _label(
-    stage: Stage,
+    stage: SceneStage,
     class_name: str,
     members: list[int],
     mask: NDArray[np.bool_],
@@ -87,7 +87,7 @@ def _label(
 
 
 def _is_clear(
-    stage: Stage, class_name: str, members: list[int], box: tuple[float, ...], pixels: int
+    stage: SceneStage, class_name: str, members: list[int], box: tuple[float, ...], pixels: int
 ) -> bool:
     """Tell whether the thing is large enough in the image, and enough of it inside."""
     wide, high = box[2] - box[0], box[3] - box[1]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from training.detector.classes import CLUTTER, LARGE, SMALL
-from training.detector.parts import Quaternion, Random, Rest, about_z, between, product
-from training.detector.scene_model import Prop, Stage
-from training.detector.surfaces import Surface, Viewpoint
+from training.detector.parts import Quaternion, Random, RestPose, about_z, between, product
+from training.detector.scene_model import Prop, SceneStage
+from training.detector.surfaces import CameraViewpoint, SceneSurface
 
 CAMERA_HEIGHT_M = 1.2
 FLAT_SIZE_M = (8.0, 6.0)
@@ -30,16 +30,16 @@ class Placed:
 
 
 @dataclass(slots=True, kw_only=True)
-class Layout:
+class ImageContents:
     """Collect what an image shows."""
 
-    view: Viewpoint
-    surfaces: tuple[Surface, ...]
+    view: CameraViewpoint
+    surfaces: tuple[SceneSurface, ...]
     shown: list[Prop] = field(default_factory=list)
     taken: list[Placed] = field(default_factory=list)
 
 
-def arrange(stage: Stage, random: Random) -> Layout:
+def arrange(stage: SceneStage, random: Random) -> ImageContents:
     """Show a random selection of things in front of the robot and return what is shown."""
     layout = _in_flat(stage, random) if stage.surfaces else _in_studio(stage, random)
     _put_large(stage, layout, random)
@@ -47,9 +47,9 @@ def arrange(stage: Stage, random: Random) -> Layout:
     return layout
 
 
-def _in_studio(stage: Stage, random: Random) -> Layout:
+def _in_studio(stage: SceneStage, random: Random) -> ImageContents:
     """Stand tables in front of the robot, which is at the origin, and walls behind them."""
-    surfaces: list[Surface] = []
+    surfaces: list[SceneSurface] = []
     far, around = 0.0, random.random() < ROOM_CHANCE
     for table in stage.tables[: int(random.integers(1, len(stage.tables) + 1))]:
         half_x, half_y = table.thing.extra["half_depth_m"], table.thing.extra["half_width_m"]
@@ -57,7 +57,7 @@ def _in_studio(stage: Stage, random: Random) -> Layout:
         near = far + between(random, 0.1, 0.8) if surfaces else first
         side = between(random, -0.35, 0.35) if not surfaces else between(random, -1.2, 1.2)
         yaw = between(random, -0.25, 0.25)
-        surface = Surface(
+        surface = SceneSurface(
             x_m=near + half_x, y_m=side, yaw_rad=yaw, half_x_m=half_x, half_y_m=half_y,
             height_m=between(random, 0.3, 0.92),
         )  # fmt: skip
@@ -73,14 +73,14 @@ def _in_studio(stage: Stage, random: Random) -> Layout:
     at = surfaces[0]
     height_m = between(random, 0.2, 1.2) if around else at.height_m
     target = (*at.point(random, 0.05), height_m)
-    view = Viewpoint(x_m=0.0, y_m=0.0, yaw_rad=between(random, -0.15, 0.15), target=target)
-    return Layout(view=view, surfaces=tuple(surfaces))
+    view = CameraViewpoint(x_m=0.0, y_m=0.0, yaw_rad=between(random, -0.15, 0.15), target=target)
+    return ImageContents(view=view, surfaces=tuple(surfaces))
 
 
-def _in_flat(stage: Stage, random: Random) -> Layout:
+def _in_flat(stage: SceneStage, random: Random) -> ImageContents:
     """Stand the robot at one side of a table of the flat, or anywhere in it, looking around."""
     if random.random() < 0.2:
-        return Layout(view=_anywhere(random), surfaces=stage.surfaces)
+        return ImageContents(view=_anywhere(random), surfaces=stage.surfaces)
     for _ in range(10 * TRIES):
         surface = stage.surfaces[int(random.integers(len(stage.surfaces)))]
         target = surface.point(random, 0.05)
@@ -93,26 +93,26 @@ def _in_flat(stage: Stage, random: Random) -> Layout:
         )
         if inside and not any(other.covers(x, y, 0.2) for other in stage.surfaces):
             yaw = angle + math.pi + between(random, -0.2, 0.2)
-            view = Viewpoint(x_m=x, y_m=y, yaw_rad=yaw, target=(*target, surface.height_m))
-            return Layout(view=view, surfaces=stage.surfaces)
-    return Layout(view=_anywhere(random), surfaces=stage.surfaces)
+            view = CameraViewpoint(x_m=x, y_m=y, yaw_rad=yaw, target=(*target, surface.height_m))
+            return ImageContents(view=view, surfaces=stage.surfaces)
+    return ImageContents(view=_anywhere(random), surfaces=stage.surfaces)
 
 
-def _anywhere(random: Random) -> Viewpoint:
+def _anywhere(random: Random) -> CameraViewpoint:
     x, y, yaw = between(random, 0.6, 7.0), between(random, 0.9, 5.4), between(random, -3.14, 3.14)
     far = between(random, 0.8, 3.0)
     target = (x + far * math.cos(yaw), y + far * math.sin(yaw), between(random, 0.0, 0.9))
-    return Viewpoint(x_m=x, y_m=y, yaw_rad=yaw, target=target)
+    return CameraViewpoint(x_m=x, y_m=y, yaw_rad=yaw, target=target)
 
 
-def _put_large(stage: Stage, layout: Layout, random: Random) -> None:
+def _put_large(stage: SceneStage, layout: ImageContents, random: Random) -> None:
     for name in LARGE:
         for prop in stage.props:
             if prop.thing.class_name == name and random.random() < LARGE_CHANCE[name] / 2:
                 _put_on_floor(stage, layout, prop, (0.75, 3.6), random)
 
 
-def _put_small(stage: Stage, layout: Layout, random: Random) -> None:
+def _put_small(stage: SceneStage, layout: ImageContents, random: Random) -> None:
     pool = [prop for prop in stage.props if prop.thing.class_name in SMALL]
     order = [pool[int(k)] for k in random.permutation(len(pool))]
     wanted = int(random.integers(3, 13))
@@ -128,7 +128,11 @@ def _put_small(stage: Stage, layout: Layout, random: Random) -> None:
 
 
 def _put_on_floor(
-    stage: Stage, layout: Layout, prop: Prop, reach_m: tuple[float, float], random: Random
+    stage: SceneStage,
+    layout: ImageContents,
+    prop: Prop,
+    reach_m: tuple[float, float],
+    random: Random,
 ) -> None:
     for _ in range(TRIES):
         forward = between(random, *reach_m)
@@ -142,7 +146,7 @@ def _put_on_floor(
 
 
 def _put_on_surface(
-    stage: Stage, layout: Layout, prop: Prop, others: list[Prop], random: Random
+    stage: SceneStage, layout: ImageContents, prop: Prop, others: list[Prop], random: Random
 ) -> None:
     surface = _surface_in_view(layout, random)
     for _ in range(TRIES):
@@ -157,7 +161,7 @@ def _put_on_surface(
             return
 
 
-def _surface_in_view(layout: Layout, random: Random) -> Surface:
+def _surface_in_view(layout: ImageContents, random: Random) -> SceneSurface:
     """Return mostly the surface that is looked at."""
     x, y = layout.view.target[:2]
     at = [s for s in layout.surfaces if s.covers(x, y, 0.0)] or list(layout.surfaces)
@@ -166,8 +170,8 @@ def _surface_in_view(layout: Layout, random: Random) -> Surface:
 
 
 def _add_content(
-    stage: Stage,
-    layout: Layout,
+    stage: SceneStage,
+    layout: ImageContents,
     holder: Prop,
     at: tuple[float, float, float],
     others: list[Prop],
@@ -189,7 +193,7 @@ def _add_content(
             return
 
 
-def _free(layout: Layout, prop: Prop, x: float, y: float, z: float) -> bool:
+def _free(layout: ImageContents, prop: Prop, x: float, y: float, z: float) -> bool:
     return all(
         abs(other.z_m - z) > 0.2
         or math.hypot(other.x_m - x, other.y_m - y) > 0.85 * (other.radius_m + prop.thing.radius_m)
@@ -197,18 +201,18 @@ def _free(layout: Layout, prop: Prop, x: float, y: float, z: float) -> bool:
     )
 
 
-def _draw_rest(prop: Prop, random: Random) -> Rest:
+def _draw_rest(prop: Prop, random: Random) -> RestPose:
     rests = prop.thing.rests
     weights = np.array([rest.weight for rest in rests])
     return rests[int(random.choice(len(rests), p=weights / weights.sum()))]
 
 
 def _show(
-    stage: Stage,
-    layout: Layout,
+    stage: SceneStage,
+    layout: ImageContents,
     prop: Prop,
     at: tuple[float, float, float],
-    rest: Rest,
+    rest: RestPose,
     random: Random,
 ) -> None:
     turn: Quaternion = product(about_z(between(random, -math.pi, math.pi)), rest.quat)

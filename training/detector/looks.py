@@ -13,7 +13,7 @@ Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RoleLook:
     """Bound a role's hue, saturation and value, and the chances of a texture and of glass."""
 
     hue: tuple[float, float]
@@ -24,24 +24,24 @@ class Look:
     shine: float = 0.4
 
 
-LOOKS: dict[str, Look] = {
-    "main": Look((0, 1), (0, 1), (0.03, 1), 0.22, 0.0, 0.6),
-    "accent": Look((0, 1), (0, 1), (0.05, 1), 0.1),
-    "label": Look((0, 1), (0, 0.8), (0.3, 1), 0.5),
-    "paper": Look((0.08, 0.16), (0, 0.25), (0.75, 1)),
-    "metal": Look((0.08, 0.16), (0, 0.6), (0.35, 0.95), 0.0, 0.0, 1.0),
-    "dark": Look((0, 1), (0, 0.5), (0, 0.25)),
-    "screen": Look((0.5, 0.75), (0, 0.7), (0.0, 0.25), 0.06, 0.0, 1.0),
-    "shell": Look((0, 1), (0, 0.6), (0, 0.9), 0.03),
-    "buttons": Look((0, 1), (0, 0.5), (0.2, 1)),
-    "skin": Look((0.02, 0.1), (0.2, 0.65), (0.25, 1), 0.0, 0.0, 0.1),
-    "hair": Look((0.02, 0.14), (0, 0.7), (0, 0.8), 0.1, 0.0, 0.1),
-    "trousers": Look((0, 1), (0, 0.8), (0, 0.8), 0.25, 0.0, 0.0),
-    "seat": Look((0, 1), (0, 0.9), (0.05, 1), 0.3, 0.0, 0.2),
-    "leaf": Look((0.2, 0.45), (0.2, 0.9), (0.15, 0.9), 0.1),
-    "wood": Look((0.04, 0.14), (0, 0.7), (0.2, 1), 0.4),
-    "wall": Look((0, 1), (0, 0.35), (0.35, 1), 0.35, 0.0, 0.0),
-    "floor": Look((0, 1), (0, 0.6), (0.2, 1), 0.7, 0.0, 0.2),
+LOOKS: dict[str, RoleLook] = {
+    "main": RoleLook((0, 1), (0, 1), (0.03, 1), 0.22, 0.0, 0.6),
+    "accent": RoleLook((0, 1), (0, 1), (0.05, 1), 0.1),
+    "label": RoleLook((0, 1), (0, 0.8), (0.3, 1), 0.5),
+    "paper": RoleLook((0.08, 0.16), (0, 0.25), (0.75, 1)),
+    "metal": RoleLook((0.08, 0.16), (0, 0.6), (0.35, 0.95), 0.0, 0.0, 1.0),
+    "dark": RoleLook((0, 1), (0, 0.5), (0, 0.25)),
+    "screen": RoleLook((0.5, 0.75), (0, 0.7), (0.0, 0.25), 0.06, 0.0, 1.0),
+    "shell": RoleLook((0, 1), (0, 0.6), (0, 0.9), 0.03),
+    "buttons": RoleLook((0, 1), (0, 0.5), (0.2, 1)),
+    "skin": RoleLook((0.02, 0.1), (0.2, 0.65), (0.25, 1), 0.0, 0.0, 0.1),
+    "hair": RoleLook((0.02, 0.14), (0, 0.7), (0, 0.8), 0.1, 0.0, 0.1),
+    "trousers": RoleLook((0, 1), (0, 0.8), (0, 0.8), 0.25, 0.0, 0.0),
+    "seat": RoleLook((0, 1), (0, 0.9), (0.05, 1), 0.3, 0.0, 0.2),
+    "leaf": RoleLook((0.2, 0.45), (0.2, 0.9), (0.15, 0.9), 0.1),
+    "wood": RoleLook((0.04, 0.14), (0, 0.7), (0.2, 1), 0.4),
+    "wall": RoleLook((0, 1), (0, 0.35), (0.35, 1), 0.35, 0.0, 0.0),
+    "floor": RoleLook((0, 1), (0, 0.6), (0.2, 1), 0.7, 0.0, 0.2),
 }
 NAMED_SHARE = 0.35
 """Share of parts that take one of the plain colours a person would name."""

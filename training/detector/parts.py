@@ -28,7 +28,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class SolidPart:
     """Place one solid in the frame of its thing; `size` as MuJoCo wants it for `kind`."""
 
     kind: str
@@ -40,7 +40,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rest:
+class RestPose:
     """Say how a thing may lie: its turn and its origin's height above the support."""
 
     quat: Quaternion
@@ -49,7 +49,7 @@ class Rest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Thing:
+class SceneThing:
     """Describe one thing: its solids, how it rests, how much room it takes.
 
     `inside` is the radius and height of a floor on which something smaller may lie; `top_m` the
@@ -57,8 +57,8 @@ class Thing:
     """
 
     class_name: str
-    parts: tuple[Part, ...]
-    rests: tuple[Rest, ...]
+    parts: tuple[SolidPart, ...]
+    rests: tuple[RestPose, ...]
     radius_m: float
     inside: tuple[float, float] | None = None
     top_m: float | None = None
@@ -97,7 +97,7 @@ def between(random: Random, low: float, high: float) -> float:
     return float(random.uniform(low, high))
 
 
-def rod(start: Vector, end: Vector, radius_m: float, role: str = "main") -> Part:
+def rod(start: Vector, end: Vector, radius_m: float, role: str = "main") -> SolidPart:
     """Return a capsule from one point to another."""
     a, b = np.array(start), np.array(end)
     along = b - a
@@ -106,7 +106,7 @@ def rod(start: Vector, end: Vector, radius_m: float, role: str = "main") -> Part
     turn = (1.0 + z, -y, x, 0.0) if z > -0.999 else (0.0, 1.0, 0.0, 0.0)
     norm = math.sqrt(sum(value * value for value in turn))
     middle = (a + b) / 2
-    return Part(
+    return SolidPart(
         kind="capsule",
         size=(radius_m, length / 2, 0.0),
         at=(float(middle[0]), float(middle[1]), float(middle[2])),

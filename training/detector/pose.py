@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 
 from training.detector.classes import SMALL
-from training.detector.layout import CAMERA_HEIGHT_M, Layout
+from training.detector.layout import CAMERA_HEIGHT_M, ImageContents
 from training.detector.parts import Random, between
-from training.detector.scene_model import ROBOT_PREFIX, Stage
+from training.detector.scene_model import ROBOT_PREFIX, SceneStage
 
 CAMERA = f"{ROBOT_PREFIX}head_camera"
 GRIPS = (f"{ROBOT_PREFIX}left_grip", f"{ROBOT_PREFIX}right_grip")
@@ -18,7 +18,7 @@ HELD_CHANCE = 0.08
 HEIGHT_SPREAD_M = (-0.3, 0.12)
 
 
-def pose_robot(stage: Stage, layout: Layout, random: Random) -> None:
+def pose_robot(stage: SceneStage, layout: ImageContents, random: Random) -> None:
     """Stand the robot at its viewpoint, look at the target roughly, move arms and camera a bit."""
     model, data, view = stage.model, stage.data, layout.view
     lift = between(random, *HEIGHT_SPREAD_M) if random.random() < 0.6 else 0.0
@@ -73,7 +73,7 @@ def _move_arms(model: Any, data: Any, random: Random) -> None:
                 _turn(model, data, name, rest + reach * 0.75 * (end - rest))
 
 
-def _hold(stage: Stage, layout: Layout, random: Random) -> None:
+def _hold(stage: SceneStage, layout: ImageContents, random: Random) -> None:
     pool = [p for p in stage.props if p.thing.class_name in SMALL and p not in layout.shown]
     small = [prop for prop in pool if prop.thing.radius_m < 0.06]
     if not small:

@@ -10,8 +10,17 @@ from numpy.typing import NDArray
 
 from sim_twin.compose import ROBOT_LOOKS_GROUP
 from training.detector import clutter, figures, things
-from training.detector.parts import UPRIGHT, Part, Quaternion, Random, Rest, Thing, Vector, between
-from training.detector.surfaces import Surface
+from training.detector.parts import (
+    UPRIGHT,
+    Quaternion,
+    Random,
+    RestPose,
+    SceneThing,
+    SolidPart,
+    Vector,
+    between,
+)
+from training.detector.surfaces import SceneSurface
 from training.detector.textures import SIZE_PX, draw_texture
 from vla_deploy.robots.loader import ROBOTS_DIR
 
@@ -42,7 +51,7 @@ _GEOM = {
 class Prop:
     """Hold a thing of the compiled model: a mocap body, or a free one at `qpos`."""
 
-    thing: Thing
+    thing: SceneThing
     geoms: list[int]
     materials: dict[str, int]
     mocap: int = -1
@@ -50,7 +59,7 @@ class Prop:
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Stage:
+class SceneStage:
     """Hold a compiled model and what can be shown in it.
 
     `fixed` are labelled parts of the building; `own_materials` those that the building came with.
@@ -64,7 +73,7 @@ class Stage:
     walls: Prop | None = None
     floor_material: int = -1
     fixed: list[tuple[str, list[int]]] = field(default_factory=list)
-    surfaces: tuple[Surface, ...] = ()
+    surfaces: tuple[SceneSurface, ...] = ()
     own_materials: list[int] = field(default_factory=list)
     first: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
@@ -93,7 +102,7 @@ class Stage:
             self.data.qpos[prop.qpos : prop.qpos + 7] = (*at, *quat)
 
 
-def build_studio(random: Random, split: str) -> Stage:
+def build_studio(random: Random, split: str) -> SceneStage:
     """Compile a bare room with tables and newly drawn things; the robot stands in its middle."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -105,7 +114,9 @@ def build_studio(random: Random, split: str) -> Stage:
     return stage
 
 
-def complete(spec: Any, random: Random, split: str, furniture: tuple[Thing, ...] = ()) -> Stage:
+def complete(
+    spec: Any, random: Random, split: str, furniture: tuple[SceneThing, ...] = ()
+) -> SceneStage:
     """Add textures, the robot, furniture (its last piece the walls) and a pool of things."""
     for number in range(TEXTURES):
         _texture(spec, f"texture{number}", draw_texture(random, split))
@@ -117,7 +128,7 @@ def complete(spec: Any, random: Random, split: str, furniture: tuple[Thing, ...]
     model = spec.compile()
     props = [_find(model, f"thing{number}", thing) for number, thing in enumerate(every)]
     fixtures = props[len(drawn) :]
-    return Stage(
+    return SceneStage(
         model=model,
         data=mujoco.MjData(model),
         split=split,
@@ -127,7 +138,7 @@ def complete(spec: Any, random: Random, split: str, furniture: tuple[Thing, ...]
     )
 
 
-def _draw_things(random: Random) -> list[Thing]:
+def _draw_things(random: Random) -> list[SceneThing]:
     drawn = [build(random) for build in things.BUILDERS.values() for _ in range(COPIES)]
     drawn += [build(random) for build in figures.BUILDERS.values() for _ in range(COPIES)]
     picks = random.integers(len(clutter.BUILDERS), size=CLUTTER_COUNT)
@@ -171,41 +182,43 @@ def _robot(spec: Any) -> None:
     spec.attach(robot, prefix=ROBOT_PREFIX, frame=spec.worldbody.add_frame())
 
 
-def _table(random: Random) -> Thing:
+def _table(random: Random) -> SceneThing:
     """Return a table, shelf board or counter; its top is at height zero."""
     a, b = between(random, 0.15, 0.45), between(random, 0.25, 0.8)
     thick, leg = between(random, 0.01, 0.03), between(random, 0.015, 0.035)
-    parts = [Part(kind="box", size=(a, b, thick), at=(0, 0, -thick), role="wood")]
+    parts = [SolidPart(kind="box", size=(a, b, thick), at=(0, 0, -thick), role="wood")]
     if random.random() < 0.35:
         parts.append(
-            Part(kind="box", size=(a * 0.97, b * 0.97, 0.5), at=(0, 0, -0.5 - thick), role="seat")
+            SolidPart(
+                kind="box", size=(a * 0.97, b * 0.97, 0.5), at=(0, 0, -0.5 - thick), role="seat"
+            )
         )
     else:
         for x in (-1, 1):
             for y in (-1, 1):
                 at = (x * (a - leg), y * (b - leg), -0.5 - thick)
-                parts.append(Part(kind="cylinder", size=(leg, 0.5, 0), at=at, role="seat"))
+                parts.append(SolidPart(kind="cylinder", size=(leg, 0.5, 0), at=at, role="seat"))
     extra = {"half_depth_m": a, "half_width_m": b}
-    return Thing(
+    return SceneThing(
         class_name="table",
         parts=tuple(parts),
-        rests=(Rest(quat=UPRIGHT, height_m=0.0),),
+        rests=(RestPose(quat=UPRIGHT, height_m=0.0),),
         radius_m=max(a, b),
         extra=extra,
     )
 
 
-def _walls() -> Thing:
+def _walls() -> SceneThing:
     parts = [
-        Part(kind="box", size=(0.05, 6, 1.3), at=(0, 0, 1.3), role="wall"),
-        Part(kind="box", size=(6, 0.05, 1.3), at=(-3, 3, 1.3), role="wall"),
-        Part(kind="box", size=(0.06, 6, 0.04), at=(-0.01, 0, 0.04), role="paper"),
-        Part(kind="box", size=(0.06, 0.45, 1.0), at=(-0.01, 1.0, 1.0), role="wood"),
+        SolidPart(kind="box", size=(0.05, 6, 1.3), at=(0, 0, 1.3), role="wall"),
+        SolidPart(kind="box", size=(6, 0.05, 1.3), at=(-3, 3, 1.3), role="wall"),
+        SolidPart(kind="box", size=(0.06, 6, 0.04), at=(-0.01, 0, 0.04), role="paper"),
+        SolidPart(kind="box", size=(0.06, 0.45, 1.0), at=(-0.01, 1.0, 1.0), role="wood"),
     ]
-    return Thing(class_name="walls", parts=tuple(parts), rests=(), radius_m=6)
+    return SceneThing(class_name="walls", parts=tuple(parts), rests=(), radius_m=6)
 
 
-def _add(spec: Any, name: str, thing: Thing) -> None:
+def _add(spec: Any, name: str, thing: SceneThing) -> None:
     body = spec.worldbody.add_body(name=name, mocap=True)
     for role in _roles(thing.parts):
         spec.add_material(name=f"{name}_{role}", texuniform=False)
@@ -229,11 +242,11 @@ def _add(spec: Any, name: str, thing: Thing) -> None:
         )
 
 
-def _roles(parts: Iterable[Part]) -> list[str]:
+def _roles(parts: Iterable[SolidPart]) -> list[str]:
     return sorted({part.role for part in parts})
 
 
-def _find(model: Any, name: str, thing: Thing) -> Prop:
+def _find(model: Any, name: str, thing: SceneThing) -> Prop:
     body = model.body(name).id
     first = int(model.body_geomadr[body])
     return Prop(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class DetectorSettings:
     """Hold what decides the result besides the code; shards per split hold 20 images each.
 
     First come `epochs` mostly on pieces of the images, which show a thing each for a quarter of
@@ -36,21 +36,21 @@ class Settings:
         return dict(self.shards)[split]
 
 
-FULL = Settings(
+FULL = DetectorSettings(
     name="full",
     shards=(("heldout", 50), ("flat", 20), ("train", 540)),
     epochs=10,
     settling_epochs=1,
 )
 """About an hour on two idle cores."""
-LONG = Settings(
+LONG = DetectorSettings(
     name="long",
     shards=(("heldout", 50), ("flat", 20), ("train", 4800)),
     epochs=48,
     settling_epochs=2,
 )
 """About seven hours on two idle cores."""
-MORE = Settings(
+MORE = DetectorSettings(
     name="more",
     shards=(("heldout", 50), ("flat", 20), ("train", 1800)),
     epochs=34,
@@ -60,14 +60,14 @@ MORE = Settings(
     learning_rate=0.01,
 )
 """Goes on from the shipped model, best with a seed that no training had yet: somewhat longer."""
-SHORT = Settings(
+SHORT = DetectorSettings(
     name="short",
     shards=(("heldout", 50), ("flat", 20), ("train", 200)),
     epochs=5,
     settling_epochs=1,
 )
 """About fifteen minutes on two idle cores."""
-TINY = Settings(
+TINY = DetectorSettings(
     name="tiny",
     shards=(("heldout", 1), ("flat", 1), ("train", 2)),
     epochs=1,

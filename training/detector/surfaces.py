@@ -7,7 +7,7 @@ from training.detector.parts import Random, between
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Surface:
+class SceneSurface:
     """Hold a level rectangle: centre, turn, half sizes and height, all in the world's frame."""
 
     x_m: float
@@ -33,7 +33,7 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Viewpoint:
+class CameraViewpoint:
     """Hold where the robot stands and the point at which its head looks."""
 
     x_m: float

@@ -18,11 +18,11 @@ from drivers.camera.protocol import Intrinsics
 from sim_twin.renderer import Renderer, fixed_camera
 from sim_twin.sensors.camera import DEPTH_SIGMA_PER_M, DEPTH_UNIT_M
 from training.detector.dress import dress
-from training.detector.layout import Layout
-from training.detector.parts import ON_EDGE, ON_SIDE, UPRIGHT, Random, Rest, about_z, product
+from training.detector.layout import ImageContents
+from training.detector.parts import ON_EDGE, ON_SIDE, UPRIGHT, Random, RestPose, about_z, product
 from training.detector.pose import CAMERA
-from training.detector.scene_model import ROBOT_PREFIX, Prop, Stage, build_studio
-from training.detector.surfaces import Surface, Viewpoint
+from training.detector.scene_model import ROBOT_PREFIX, Prop, SceneStage, build_studio
+from training.detector.surfaces import CameraViewpoint, SceneSurface
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel
 
@@ -112,8 +112,10 @@ class _Studio:
         table = self._table()
         pose = self._look_at(table)
         props = self._things(table, pose)
-        view = Viewpoint(x_m=0.0, y_m=0.0, yaw_rad=0.0, target=(table.x_m, table.y_m, 0.0))
-        dress(stage, Layout(view=view, surfaces=(), shown=[prop for prop, _ in props]), random)
+        view = CameraViewpoint(x_m=0.0, y_m=0.0, yaw_rad=0.0, target=(table.x_m, table.y_m, 0.0))
+        dress(
+            stage, ImageContents(view=view, surfaces=(), shown=[prop for prop, _ in props]), random
+        )
         mujoco.mj_kinematics(stage.model, stage.data)
         mujoco.mj_comPos(stage.model, stage.data)
         mujoco.mj_camlight(stage.model, stage.data)
@@ -129,10 +131,10 @@ class _Studio:
     def close(self) -> None:
         self._renderer.close()
 
-    def _table(self) -> Surface:
+    def _table(self) -> SceneSurface:
         random, table = self._random, self._stage.tables[0]
         half_x, half_y = table.thing.extra["half_depth_m"], table.thing.extra["half_width_m"]
-        surface = Surface(
+        surface = SceneSurface(
             x_m=float(random.uniform(*TABLE_X_M)) + half_x,
             y_m=float(random.uniform(-0.2, 0.2)),
             yaw_rad=float(random.uniform(-0.25, 0.25)),
@@ -145,7 +147,7 @@ class _Studio:
         )
         return surface
 
-    def _look_at(self, table: Surface) -> Array:
+    def _look_at(self, table: SceneSurface) -> Array:
         """Turn the head towards the table's nearer half; return the camera's pose."""
         random, limits = self._random, self._robot.limits
         x, y = table.point(random, 0.1)
@@ -166,10 +168,10 @@ class _Studio:
         positions = np.array([joints.get(name, 0.0) for name in self._robot.joint_names])
         return self._kinematics.camera_pose(positions)
 
-    def _things(self, table: Surface, pose: Array) -> list[tuple[Prop, Rest]]:
+    def _things(self, table: SceneSurface, pose: Array) -> list[tuple[Prop, RestPose]]:
         random, stage = self._random, self._stage
         pool = [prop for prop in stage.props if prop.thing.class_name in SHOWN]
-        placed: list[tuple[Prop, Rest]] = []
+        placed: list[tuple[Prop, RestPose]] = []
         taken: list[tuple[float, float, float]] = []
         for index in random.permutation(len(pool)):
             prop = pool[int(index)]
@@ -186,12 +188,16 @@ class _Studio:
                 break
         return placed
 
-    def _rest(self, prop: Prop) -> Rest:
+    def _rest(self, prop: Prop) -> RestPose:
         rests = [r for r in prop.thing.rests if r.quat in SHOWN[prop.thing.class_name]]
         return rests[int(self._random.integers(len(rests)))]
 
     def _free_place(
-        self, table: Surface, pose: Array, reach: float, taken: list[tuple[float, float, float]]
+        self,
+        table: SceneSurface,
+        pose: Array,
+        reach: float,
+        taken: list[tuple[float, float, float]],
     ) -> tuple[float, float] | None:
         """Return a place on the table, in range and in view, that nothing else takes."""
         for _ in range(_TRIES):
@@ -219,13 +225,13 @@ def with_noise(depth_m: NDArray[np.float32], random: Random) -> NDArray[np.float
     return (np.rint(noisy / DEPTH_UNIT_M) * DEPTH_UNIT_M).astype(np.float32)
 
 
-def _reach(stage: Stage, prop: Prop) -> float:
+def _reach(stage: SceneStage, prop: Prop) -> float:
     """Return the radius of the ball around the thing's origin that holds it."""
     points = _points(stage.model, prop, np.zeros(3), np.eye(3))
     return float(np.linalg.norm(points, axis=1).max())
 
 
-def _truth(stage: Stage, prop: Prop, rest: Rest, pose: Array) -> Truth:
+def _truth(stage: SceneStage, prop: Prop, rest: RestPose, pose: Array) -> Truth:
     body_at = stage.data.mocap_pos[prop.mocap]
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, stage.data.mocap_quat[prop.mocap])

@@ -9,10 +9,10 @@ from training.detector.parts import (
     ON_SIDE,
     UPRIGHT,
     UPSIDE_DOWN,
-    Part,
     Random,
-    Rest,
-    Thing,
+    RestPose,
+    SceneThing,
+    SolidPart,
     about_y,
     about_z,
     between,
@@ -22,7 +22,7 @@ from training.detector.parts import (
 )
 
 
-def cup(random: Random) -> Thing:
+def cup(random: Random) -> SceneThing:
     """Return a mug or tumbler, turned or made of staves as the flat's own."""
     height, rim = between(random, 0.07, 0.125), between(random, 0.03, 0.048)
     foot = rim * between(random, 0.7, 1.0)
@@ -35,24 +35,26 @@ def cup(random: Random) -> Thing:
     if handle:
         parts += _handle(rim, foot, height, between(random, 0.018, 0.032))
     rests = (
-        Rest(quat=UPRIGHT, height_m=height / 2, weight=6),
-        Rest(quat=ON_SIDE, height_m=rim),
-        Rest(quat=UPSIDE_DOWN, height_m=height / 2, weight=0.5),
+        RestPose(quat=UPRIGHT, height_m=height / 2, weight=6),
+        RestPose(quat=ON_SIDE, height_m=rim),
+        RestPose(quat=UPSIDE_DOWN, height_m=height / 2, weight=0.5),
     )
-    return Thing(class_name="cup", parts=tuple(parts), rests=rests, radius_m=rim + 0.02 * handle)
+    return SceneThing(
+        class_name="cup", parts=tuple(parts), rests=rests, radius_m=rim + 0.02 * handle
+    )
 
 
-def _turned(height: float, rim: float, foot: float) -> list[Part]:
+def _turned(height: float, rim: float, foot: float) -> list[SolidPart]:
     h, wall = height / 2, 0.004
     outline = [
         (0.0, -h), (foot, -h), (rim, h),
         (rim - wall, h), (foot - wall, -h + 0.006), (0.0, -h + 0.006),
     ]  # fmt: skip
     inside = _disc(foot - wall, 0.0008, -h + 0.008, "inner")
-    return [Part(kind="mesh", mesh=lathe(outline)), inside]
+    return [SolidPart(kind="mesh", mesh=lathe(outline)), inside]
 
 
-def _staves(height: float, rim: float, foot: float) -> list[Part]:
+def _staves(height: float, rim: float, foot: float) -> list[SolidPart]:
     count, h = 14, height / 2
     mean, lean = (rim + foot) / 2, math.atan2(rim - foot, height)
     half = math.pi * mean / count * 1.1
@@ -61,7 +63,7 @@ def _staves(height: float, rim: float, foot: float) -> list[Part]:
         angle = 2 * math.pi * k / count
         at = (mean * math.cos(angle), mean * math.sin(angle), 0.0)
         turn = product(about_z(angle), about_y(lean))
-        staves.append(Part(kind="box", size=(0.0025, half, h), at=at, quat=turn))
+        staves.append(SolidPart(kind="box", size=(0.0025, half, h), at=at, quat=turn))
     return [
         *staves,
         _disc(foot, 0.004, -h + 0.004),
@@ -69,7 +71,7 @@ def _staves(height: float, rim: float, foot: float) -> list[Part]:
     ]
 
 
-def _handle(rim: float, foot: float, height: float, out: float) -> list[Part]:
+def _handle(rim: float, foot: float, height: float, out: float) -> list[SolidPart]:
     x, far, up = (rim + foot) / 2, (rim + foot) / 2 + out, 0.26 * height
     corners = [
         (x - 0.002, 0.0, up),
@@ -80,47 +82,51 @@ def _handle(rim: float, foot: float, height: float, out: float) -> list[Part]:
     return [rod(a, b, 0.0045) for a, b in itertools.pairwise(corners)]
 
 
-def _disc(radius: float, half: float, z: float, role: str = "main") -> Part:
-    return Part(kind="cylinder", size=(radius, half, 0.0), at=(0.0, 0.0, z), role=role)
+def _disc(radius: float, half: float, z: float, role: str = "main") -> SolidPart:
+    return SolidPart(kind="cylinder", size=(radius, half, 0.0), at=(0.0, 0.0, z), role=role)
 
 
-def ball(random: Random) -> Thing:
+def ball(random: Random) -> SceneThing:
     """Return a ball from marble-run to football size."""
     radius = between(random, 0.02, 0.05) if random.random() < 0.7 else between(random, 0.05, 0.11)
-    parts = [Part(kind="sphere", size=(radius, 0.0, 0.0))]
+    parts = [SolidPart(kind="sphere", size=(radius, 0.0, 0.0))]
     if random.random() < 0.25:
         parts.append(_disc(radius * 1.004, radius * between(random, 0.06, 0.2), 0.0, "accent"))
-    rests = (Rest(quat=UPRIGHT, height_m=radius), Rest(quat=ON_SIDE, height_m=radius))
-    return Thing(class_name="ball", parts=tuple(parts), rests=rests, radius_m=radius)
+    rests = (RestPose(quat=UPRIGHT, height_m=radius), RestPose(quat=ON_SIDE, height_m=radius))
+    return SceneThing(class_name="ball", parts=tuple(parts), rests=rests, radius_m=radius)
 
 
-def book(random: Random) -> Thing:
+def book(random: Random) -> SceneThing:
     """Return a closed book with covers, back and leaves; it lies or stands."""
     length = between(random, 0.14, 0.29)
     width = length * between(random, 0.42, 0.8)
     thick = between(random, 0.012, 0.045)
     a, b, c, cover = length / 2, width / 2, thick / 2, 0.0025
     parts = [
-        Part(kind="box", size=(a, b, cover), at=(0, 0, c - cover)),
-        Part(kind="box", size=(a, b, cover), at=(0, 0, -c + cover)),
-        Part(kind="box", size=(a, cover, c), at=(0, -b + cover, 0)),
-        Part(kind="box", size=(a - 0.003, b - 0.003, c - cover), at=(0, 0.001, 0), role="paper"),
+        SolidPart(kind="box", size=(a, b, cover), at=(0, 0, c - cover)),
+        SolidPart(kind="box", size=(a, b, cover), at=(0, 0, -c + cover)),
+        SolidPart(kind="box", size=(a, cover, c), at=(0, -b + cover, 0)),
+        SolidPart(
+            kind="box", size=(a - 0.003, b - 0.003, c - cover), at=(0, 0.001, 0), role="paper"
+        ),
     ]
     if random.random() < 0.6:
         size = (a * between(random, 0.2, 0.7), b * between(random, 0.2, 0.8), 0.0006)
         at = (between(random, -0.2, 0.2) * a, between(random, -0.15, 0.15) * b, c)
-        parts.append(Part(kind="box", size=size, at=at, role="accent"))
+        parts.append(SolidPart(kind="box", size=size, at=at, role="accent"))
     rests = (
-        Rest(quat=UPRIGHT, height_m=c, weight=5),
-        Rest(quat=UPSIDE_DOWN, height_m=c, weight=2),
-        Rest(quat=ON_EDGE, height_m=b),
-        Rest(quat=ON_SIDE, height_m=a),
+        RestPose(quat=UPRIGHT, height_m=c, weight=5),
+        RestPose(quat=UPSIDE_DOWN, height_m=c, weight=2),
+        RestPose(quat=ON_EDGE, height_m=b),
+        RestPose(quat=ON_SIDE, height_m=a),
     )
     radius = 0.5 * math.hypot(a, b) + 0.25 * (a + b)
-    return Thing(class_name="book", parts=tuple(parts), rests=rests, radius_m=radius, top_m=thick)
+    return SceneThing(
+        class_name="book", parts=tuple(parts), rests=rests, radius_m=radius, top_m=thick
+    )
 
 
-def bottle(random: Random) -> Thing:
+def bottle(random: Random) -> SceneThing:
     """Return a bottle with neck, cap and label; it stands or lies."""
     radius, body = between(random, 0.026, 0.045), between(random, 0.1, 0.2)
     neck, long = radius * between(random, 0.3, 0.5), between(random, 0.03, 0.08)
@@ -133,11 +139,11 @@ def bottle(random: Random) -> Thing:
             (0.75 * radius, low + body + 0.6 * shoulder), (neck, low + body + shoulder),
             (neck, -low), (0, -low),
         ]  # fmt: skip
-        parts = [Part(kind="mesh", mesh=lathe(outline))]
+        parts = [SolidPart(kind="mesh", mesh=lathe(outline))]
     else:
         parts = [
             _disc(radius, body / 2, low + body / 2),
-            Part(kind="ellipsoid", size=(radius, radius, shoulder), at=(0, 0, low + body)),
+            SolidPart(kind="ellipsoid", size=(radius, radius, shoulder), at=(0, 0, low + body)),
             _disc(neck, (height - body) / 2, low + body + (height - body) / 2),
         ]
     cap = between(random, 0.006, 0.012)
@@ -146,13 +152,13 @@ def bottle(random: Random) -> Thing:
         half = body * between(random, 0.12, 0.35)
         parts.append(_disc(radius * 1.012, half, low + body * between(random, 0.4, 0.6), "label"))
     rests = (
-        Rest(quat=UPRIGHT, height_m=height / 2, weight=4),
-        Rest(quat=ON_SIDE, height_m=radius, weight=1.5),
+        RestPose(quat=UPRIGHT, height_m=height / 2, weight=4),
+        RestPose(quat=ON_SIDE, height_m=radius, weight=1.5),
     )
-    return Thing(class_name="bottle", parts=tuple(parts), rests=rests, radius_m=radius)
+    return SceneThing(class_name="bottle", parts=tuple(parts), rests=rests, radius_m=radius)
 
 
-def phone(random: Random) -> Thing:
+def phone(random: Random) -> SceneThing:
     """Return a telephone, its face up or down."""
     a, b, c = (
         between(random, 0.065, 0.083),
@@ -161,49 +167,51 @@ def phone(random: Random) -> Thing:
     )
     edge = between(random, 0.002, 0.005)
     parts = [
-        Part(kind="box", size=(a, b, c), role="shell"),
-        Part(kind="box", size=(a - edge, b - edge, 0.0005), at=(0, 0, c), role="screen"),
+        SolidPart(kind="box", size=(a, b, c), role="shell"),
+        SolidPart(kind="box", size=(a - edge, b - edge, 0.0005), at=(0, 0, c), role="screen"),
     ]
     if random.random() < 0.8:
         x, y = a - 0.018, b - 0.013
-        parts.append(Part(kind="box", size=(0.013, 0.009, 0.001), at=(x, y, -c), role="dark"))
-        parts.append(Part(kind="cylinder", size=(0.004, 0.0016, 0), at=(x, y, -c), role="metal"))
+        parts.append(SolidPart(kind="box", size=(0.013, 0.009, 0.001), at=(x, y, -c), role="dark"))
+        parts.append(
+            SolidPart(kind="cylinder", size=(0.004, 0.0016, 0), at=(x, y, -c), role="metal")
+        )
     rests = (
-        Rest(quat=UPRIGHT, height_m=c, weight=4),
-        Rest(quat=UPSIDE_DOWN, height_m=c, weight=2),
-        Rest(quat=product(about_y(-1.15), UPRIGHT), height_m=0.92 * a, weight=0.6),
+        RestPose(quat=UPRIGHT, height_m=c, weight=4),
+        RestPose(quat=UPSIDE_DOWN, height_m=c, weight=2),
+        RestPose(quat=product(about_y(-1.15), UPRIGHT), height_m=0.92 * a, weight=0.6),
     )
-    return Thing(class_name="phone", parts=tuple(parts), rests=rests, radius_m=a * 0.9)
+    return SceneThing(class_name="phone", parts=tuple(parts), rests=rests, radius_m=a * 0.9)
 
 
-def keys(random: Random) -> Thing:
+def keys(random: Random) -> SceneThing:
     """Return a bunch of keys: a ring, one to four keys, often a fob."""
     ring = between(random, 0.011, 0.018)
-    parts = [Part(kind="cylinder", size=(ring, 0.002, 0), at=(0, 0, -0.003), role="metal")]
+    parts = [SolidPart(kind="cylinder", size=(ring, 0.002, 0), at=(0, 0, -0.003), role="metal")]
     if random.random() < 0.75:
         long = between(random, 0.015, 0.03)
         kind = "box" if random.random() < 0.7 else "ellipsoid"
         size = (long, between(random, 0.009, 0.016), between(random, 0.004, 0.008))
-        parts.append(Part(kind=kind, size=size, at=(ring + long - 0.004, 0, 0.002)))
+        parts.append(SolidPart(kind=kind, size=size, at=(ring + long - 0.004, 0, 0.002)))
     start = between(random, 2.2, 3.2)
     for k in range(int(random.integers(1, 5))):
         parts += _key(
             start + 0.45 * k + between(random, -0.1, 0.1), ring, 0.0016 * k - 0.005, random
         )
     rests = (
-        Rest(quat=UPRIGHT, height_m=0.007, weight=3),
-        Rest(quat=UPSIDE_DOWN, height_m=0.007),
+        RestPose(quat=UPRIGHT, height_m=0.007, weight=3),
+        RestPose(quat=UPSIDE_DOWN, height_m=0.007),
     )
-    return Thing(class_name="keys", parts=tuple(parts), rests=rests, radius_m=0.045)
+    return SceneThing(class_name="keys", parts=tuple(parts), rests=rests, radius_m=0.045)
 
 
-def _key(angle: float, ring: float, z: float, random: Random) -> list[Part]:
+def _key(angle: float, ring: float, z: float, random: Random) -> list[SolidPart]:
     x, y, turn = math.cos(angle), math.sin(angle), about_z(angle)
     head, blade = between(random, 0.008, 0.012), between(random, 0.012, 0.02)
     bow, tip = ring + head * 0.6, ring + head * 1.4 + blade
     return [
-        Part(kind="cylinder", size=(head, 0.0013, 0), at=(bow * x, bow * y, z), role="metal"),
-        Part(
+        SolidPart(kind="cylinder", size=(head, 0.0013, 0), at=(bow * x, bow * y, z), role="metal"),
+        SolidPart(
             kind="box",
             size=(blade, 0.0038, 0.0012),
             at=(tip * x, tip * y, z),
@@ -213,32 +221,32 @@ def _key(angle: float, ring: float, z: float, random: Random) -> list[Part]:
     ]
 
 
-def box(random: Random) -> Thing:
+def box(random: Random) -> SceneThing:
     """Return an open storage box, or a closed one with tape."""
     a, b = between(random, 0.075, 0.19), between(random, 0.075, 0.16)
     half = between(random, 0.035, 0.11)
     if random.random() < 0.25:
         parts = [
-            Part(kind="box", size=(a, b, half)),
-            Part(kind="box", size=(a * 1.002, b * 0.12, half * 1.004), role="accent"),
+            SolidPart(kind="box", size=(a, b, half)),
+            SolidPart(kind="box", size=(a * 1.002, b * 0.12, half * 1.004), role="accent"),
         ]
         inside = None
     else:
         wall = between(random, 0.002, 0.006)
-        parts = [Part(kind="box", size=(a, b, 0.004), at=(0, 0, -half + 0.004), role="inner")]
+        parts = [SolidPart(kind="box", size=(a, b, 0.004), at=(0, 0, -half + 0.004), role="inner")]
         for sign in (-1, 1):
             side = (sign * (a - wall), 0.0, 0.0)
             end = (0.0, sign * (b - wall), 0.0)
-            parts.append(Part(kind="box", size=(wall, b, half), at=side))
-            parts.append(Part(kind="box", size=(a - 2 * wall, wall, half), at=end))
+            parts.append(SolidPart(kind="box", size=(wall, b, half), at=side))
+            parts.append(SolidPart(kind="box", size=(a - 2 * wall, wall, half), at=end))
         inside = (min(a, b) - wall, 0.008)
-    rests = (Rest(quat=UPRIGHT, height_m=half, weight=9), Rest(quat=ON_SIDE, height_m=a))
-    return Thing(
+    rests = (RestPose(quat=UPRIGHT, height_m=half, weight=9), RestPose(quat=ON_SIDE, height_m=a))
+    return SceneThing(
         class_name="box", parts=tuple(parts), rests=rests, radius_m=math.hypot(a, b), inside=inside
     )
 
 
-def bowl(random: Random) -> Thing:
+def bowl(random: Random) -> SceneThing:
     """Return a turned bowl, shallow or deep."""
     rim, height = between(random, 0.055, 0.13), between(random, 0.035, 0.075)
     height = min(height, rim)
@@ -248,18 +256,18 @@ def bowl(random: Random) -> Thing:
         (0, -h), (foot, -h), (foot, -h + 0.005), (rim * belly, -0.1 * h), (rim, h), (rim - wall, h),
         (rim * belly - wall, 0.0), (foot * 0.9, -h + 0.012), (0, -h + 0.011),
     ]  # fmt: skip
-    parts = [Part(kind="mesh", mesh=lathe(outline, sides=24))]
+    parts = [SolidPart(kind="mesh", mesh=lathe(outline, sides=24))]
     parts.append(_disc(foot * 0.88, 0.0008, -h + 0.0135, "inner"))
     rests = (
-        Rest(quat=UPRIGHT, height_m=h, weight=8),
-        Rest(quat=UPSIDE_DOWN, height_m=h),
+        RestPose(quat=UPRIGHT, height_m=h, weight=8),
+        RestPose(quat=UPSIDE_DOWN, height_m=h),
     )
-    return Thing(
+    return SceneThing(
         class_name="bowl", parts=tuple(parts), rests=rests, radius_m=rim, inside=(rim * 0.6, 0.014)
     )
 
 
-def can(random: Random) -> Thing:
+def can(random: Random) -> SceneThing:
     """Return a tin or a drinks can with metal ends; it stands or lies."""
     radius, half = between(random, 0.026, 0.042), between(random, 0.04, 0.068)
     end = between(random, 0.003, 0.007)
@@ -273,22 +281,22 @@ def can(random: Random) -> Thing:
         parts.append(_disc(radius * 1.006, half * between(random, 0.25, 0.6), z, "label"))
     if random.random() < 0.5:
         tab = (0.009, 0.005, 0.001)
-        parts.append(Part(kind="box", size=tab, at=(0.006, 0, half + 0.001), role="metal"))
+        parts.append(SolidPart(kind="box", size=tab, at=(0.006, 0, half + 0.001), role="metal"))
     rests = (
-        Rest(quat=UPRIGHT, height_m=half, weight=4),
-        Rest(quat=ON_SIDE, height_m=radius, weight=1.5),
+        RestPose(quat=UPRIGHT, height_m=half, weight=4),
+        RestPose(quat=ON_SIDE, height_m=radius, weight=1.5),
     )
-    return Thing(class_name="can", parts=tuple(parts), rests=rests, radius_m=radius)
+    return SceneThing(class_name="can", parts=tuple(parts), rests=rests, radius_m=radius)
 
 
-def remote(random: Random) -> Thing:
+def remote(random: Random) -> SceneThing:
     """Return a remote control: a slim bar with rows of buttons."""
     a, b, c = (
         between(random, 0.07, 0.11),
         between(random, 0.018, 0.027),
         between(random, 0.006, 0.012),
     )
-    parts = [Part(kind="box", size=(a, b, c), role="shell")]
+    parts = [SolidPart(kind="box", size=(a, b, c), role="shell")]
     columns, rows = int(random.integers(2, 4)), int(random.integers(4, 9))
     size = 0.28 * b if columns == 3 else 0.36 * b
     kind = "box" if random.random() < 0.5 else "cylinder"
@@ -298,15 +306,15 @@ def remote(random: Random) -> Thing:
             y = 0.62 * b * (2 * column / (columns - 1) - 1)
             role = "accent" if random.random() < 0.12 else "buttons"
             button = (size, size, 0.0012) if kind == "box" else (size, 0.0012, 0.0)
-            parts.append(Part(kind=kind, size=button, at=(x, y, c), role=role))
+            parts.append(SolidPart(kind=kind, size=button, at=(x, y, c), role=role))
     rests = (
-        Rest(quat=UPRIGHT, height_m=c, weight=6),
-        Rest(quat=UPSIDE_DOWN, height_m=c),
+        RestPose(quat=UPRIGHT, height_m=c, weight=6),
+        RestPose(quat=UPSIDE_DOWN, height_m=c),
     )
-    return Thing(class_name="remote", parts=tuple(parts), rests=rests, radius_m=a * 0.9)
+    return SceneThing(class_name="remote", parts=tuple(parts), rests=rests, radius_m=a * 0.9)
 
 
-BUILDERS: dict[str, Callable[[Random], Thing]] = {
+BUILDERS: dict[str, Callable[[Random], SceneThing]] = {
     "cup": cup,
     "ball": ball,
     "book": book,

@@ -15,7 +15,7 @@ from training.detector.classes import CLASSES
 from training.detector.dataset import Shard, load
 from training.detector.losses import losses
 from training.detector.network import CentreNet
-from training.detector.settings import Settings
+from training.detector.settings import DetectorSettings
 from training.warm_start import begin_from
 
 WEIGHTS = "centre_net.pt"
@@ -33,7 +33,7 @@ TYPICAL_SHARDS, TYPICAL_IMAGES = 40, 64
 _LOG = logging.getLogger(__name__)
 
 
-def train(out: Path, settings: Settings) -> None:
+def train(out: Path, settings: DetectorSettings) -> None:
     """Train on the data under `out`; write the averaged weights there after each epoch.
 
     A training that was broken off goes on after its last whole epoch, with the same result.
@@ -73,7 +73,7 @@ def _learn(run: "_Run", shard: Shard, random: np.random.Generator, epoch: int) -
     return told
 
 
-def _rate(settings: Settings, epochs: float) -> float:
+def _rate(settings: DetectorSettings, epochs: float) -> float:
     """Return the learning rate after so many epochs: steady at first, then falling to the end."""
     left = 1.0 - epochs / (settings.epochs + settings.settling_epochs)
     return settings.learning_rate * min(1.0, left / (1.0 - FALL_FROM))
@@ -88,7 +88,7 @@ def _write(values: dict[str, Any], path: Path) -> None:
 class _Run:
     """Hold what a training changes."""
 
-    def __init__(self, settings: Settings, device: torch.device) -> None:
+    def __init__(self, settings: DetectorSettings, device: torch.device) -> None:
         self._device = device
         self.settings = settings
         self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from training.planner.chatter import read_chatter
-from training.planner.settings import SIZES, Settings
+from training.planner.settings import SIZES, PlannerSettings
 
 _EXAMPLE: Final = (
     "example: nice python -m training.planner all --out /data/planner --chatter data_full.json"
@@ -15,7 +15,7 @@ _EXAMPLE: Final = (
 _JUDGED: Final = 400
 MODELS: Final = "models"
 _UNSEEN: Final = ("val", "oos_val", "oos_test", "test")
-Step = Callable[[argparse.Namespace, Settings], None]
+Step = Callable[[argparse.Namespace, PlannerSettings], None]
 
 
 def main() -> None:
@@ -49,7 +49,7 @@ def _talk(arguments: argparse.Namespace) -> tuple[str, ...]:
 
 
 # The steps below import torch and onnx only where they need them.
-def _train(arguments: argparse.Namespace, settings: Settings) -> None:
+def _train(arguments: argparse.Namespace, settings: PlannerSettings) -> None:
     import torch
 
     from training.planner.training import train
@@ -58,13 +58,13 @@ def _train(arguments: argparse.Namespace, settings: Settings) -> None:
     train(arguments.out, settings, _talk(arguments), arguments.start_from)
 
 
-def _export(arguments: argparse.Namespace, settings: Settings) -> None:
+def _export(arguments: argparse.Namespace, settings: PlannerSettings) -> None:
     from training.planner.export import export
 
     export(arguments.out, arguments.out / MODELS, settings.shape, _talk(arguments))
 
 
-def _evaluate(arguments: argparse.Namespace, _settings: Settings) -> None:
+def _evaluate(arguments: argparse.Namespace, _settings: PlannerSettings) -> None:
     from random import Random
 
     from training.planner.evaluation import evaluate
@@ -74,25 +74,25 @@ def _evaluate(arguments: argparse.Namespace, _settings: Settings) -> None:
     evaluate(arguments.out / MODELS, _JUDGED, unseen)
 
 
-def _card(arguments: argparse.Namespace, settings: Settings) -> None:
+def _card(arguments: argparse.Namespace, settings: PlannerSettings) -> None:
     from training.planner.card import describe
 
     describe(arguments.out / MODELS, settings, arguments.chatter is not None, arguments.start_from)
 
 
-def _ship(arguments: argparse.Namespace, _settings: Settings) -> None:
+def _ship(arguments: argparse.Namespace, _settings: PlannerSettings) -> None:
     from training.planner.shipping import ship
 
     ship(arguments.out / MODELS)
 
 
-def _mean(arguments: argparse.Namespace, _settings: Settings) -> None:
+def _mean(arguments: argparse.Namespace, _settings: PlannerSettings) -> None:
     from training.planner.going_on import mean
 
     mean(arguments.out, arguments.start_from, arguments.mean_into)
 
 
-def _unpack(arguments: argparse.Namespace, _settings: Settings) -> None:
+def _unpack(arguments: argparse.Namespace, _settings: PlannerSettings) -> None:
     from training.planner.going_on import unpack
 
     unpack(arguments.out)

@@ -8,10 +8,10 @@ from typing import Any, Final
 from training.planner.clause import load_groups
 from training.planner.evaluation import MOST_TOKENS
 from training.planner.files import CARD, GRAPH, MEAN_OF, METRICS, NAME, PARTS
-from training.planner.settings import Settings
+from training.planner.settings import PlannerSettings
 from training.planner.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from vla_deploy.inference.file_check import sha256_of
-from vla_deploy.inference.manifest import Certainty, Language, Manifest, ModelFile, Use
+from vla_deploy.inference.manifest import Certainty, Language, LanguageUse, Manifest, ModelFile
 from vla_deploy.inference.manifest_file import write_manifest
 
 TEMPLATE: Final = Path(__file__).with_name("card_template.md")
@@ -24,7 +24,7 @@ _TITLES: Final = {
 
 
 def describe(
-    models: Path, settings: Settings, has_chatter: bool, start_from: Path | None = None
+    models: Path, settings: PlannerSettings, has_chatter: bool, start_from: Path | None = None
 ) -> None:
     """Write `card.md` and `model.toml` beside the files that they describe.
 
@@ -47,7 +47,7 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
         card=CARD,
         parts=tuple(ModelFile(path=name, sha256=sha256_of(models / name)) for name in PARTS),
         language=Language(
-            use=Use.COMMAND_PARSER,
+            use=LanguageUse.COMMAND_PARSER,
             most_tokens=MOST_TOKENS,
             certainty=Certainty(**metrics["certainty"]),
         ),
@@ -57,7 +57,7 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
 def card(
     metrics: dict[str, Any],
     models: Path,
-    settings: Settings,
+    settings: PlannerSettings,
     has_chatter: bool,
     *,
     is_begun: bool = False,

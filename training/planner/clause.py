@@ -30,7 +30,7 @@ _FIELD_OF: Final[Mapping[str, str]] = {
 _PRONOUNS: Final = ("it", "it", "it", "it", "them", "that", "this")
 
 
-class Said(NamedTuple):
+class SaidWord(NamedTuple):
     """Hold a word, and the step's number and field that it belongs to, or None."""
 
     text: str
@@ -47,7 +47,7 @@ class Clause:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class PhraseGroup:
     """Hold phrases of one meaning; those kept for judging are not trained on."""
 
     fixed: Mapping[str, str]
@@ -56,13 +56,13 @@ class Group:
 
 
 @cache
-def load_groups(held_out: bool) -> dict[str, list[Group]]:
+def load_groups(held_out: bool) -> dict[str, list[PhraseGroup]]:
     """Return the groups of phrases by what they do: those to train on, or those to judge by."""
     prefix = "held_" if held_out else ""
-    groups: dict[str, list[Group]] = {}
+    groups: dict[str, list[PhraseGroup]] = {}
     for file in sorted(PHRASES.glob("*.toml")):
         for table in tomllib.loads(file.read_text(encoding="utf-8"))["group"]:
-            group = Group(
+            group = PhraseGroup(
                 fixed={"do": table["do"], **table.get("field", {})},
                 imperative=tuple(map(parse, table.get(prefix + "imperative", []))),
                 free=tuple(map(parse, table.get(prefix + "free", []))),
@@ -73,7 +73,10 @@ def load_groups(held_out: bool) -> dict[str, list[Group]]:
 
 
 def make_clause(
-    group: Group, random: Random, groups: Mapping[str, list[Group]], after_thing: bool = False
+    group: PhraseGroup,
+    random: Random,
+    groups: Mapping[str, list[PhraseGroup]],
+    after_thing: bool = False,
 ) -> Clause:
     """Return one clause of a group; `after_thing` makes "it" likely, as something was named."""
     count = len(group.imperative)
@@ -112,13 +115,13 @@ def _owned(words: list[Word], field: str | None) -> list[tuple[str, str | None]]
     return [(word, field if is_meant else None) for word, is_meant in words]
 
 
-def _other_clause(random: Random, groups: Mapping[str, list[Group]]) -> Clause:
+def _other_clause(random: Random, groups: Mapping[str, list[PhraseGroup]]) -> Clause:
     choices = [
         one for do in ("go", "pick", "put", "bring", "find", "move") for one in groups.get(do, [])
     ]
     commanding = [one for one in choices if one.imperative]
     group = random.choice(commanding)
-    return make_clause(Group(group.fixed, group.imperative, ()), random, groups)
+    return make_clause(PhraseGroup(group.fixed, group.imperative, ()), random, groups)
 
 
 def answer_text(steps: Iterable[Step]) -> str:

@@ -5,7 +5,14 @@ from dataclasses import dataclass
 from random import Random
 from typing import Final
 
-from training.planner.clause import Clause, Group, Said, answer_text, load_groups, make_clause
+from training.planner.clause import (
+    Clause,
+    PhraseGroup,
+    SaidWord,
+    answer_text,
+    load_groups,
+    make_clause,
+)
 from training.planner.grammar import Sequence, expand
 from training.planner.hearing import misheard
 from training.planner.manners import (
@@ -68,7 +75,7 @@ class Composer:
 
     def example(self, random: Random) -> Example:
         """Return one command with its answer."""
-        sentence: list[Said] = []
+        sentence: list[SaidWord] = []
         while not 0 < len(sentence) <= MOST_COMMAND_WORDS:
             clauses, sentence = self._drawn(random)
             sentence = _with_fillers(misheard(sentence, random), random)
@@ -78,20 +85,20 @@ class Composer:
         """Return one command as somebody says it, before anything mishears it."""
         return _text(_with_fillers(self._drawn(random)[1], random))
 
-    def _drawn(self, random: Random) -> tuple[list[Clause], list[Said]]:
+    def _drawn(self, random: Random) -> tuple[list[Clause], list[SaidWord]]:
         kind = random.choices(self._kinds, self._kind_weights)[0]
         if kind == "steps":
             return self._steps(random)
         return self._whole(random) if kind == "told" else self._alone(kind, random)
 
-    def _whole(self, random: Random) -> tuple[list[Clause], list[Said]]:
+    def _whole(self, random: Random) -> tuple[list[Clause], list[SaidWord]]:
         clauses, sentence = random.choice(self._told).drawn(random)
         # Whoever calls the robot speaks to nobody else.
         is_ours = clauses[0].step["do"] != "unknown"
         called = _words(CALLS, random) if is_ours and random.random() < 0.1 else []
         return clauses, self._remarked([*called, *sentence], clauses, random)
 
-    def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:
+    def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[SaidWord]]:
         if kind == "unknown" and self._before and random.random() < _ONLY_REMARKS:
             return [Clause((), {"do": "unknown"}, False)], self._remarks(random)
         if kind == "unknown" and self._chatter and random.random() < 0.6:
@@ -106,10 +113,10 @@ class Composer:
             random.shuffle(sentence)
         return [clause], sentence
 
-    def _steps(self, random: Random) -> tuple[list[Clause], list[Said]]:
+    def _steps(self, random: Random) -> tuple[list[Clause], list[SaidWord]]:
         count = random.choices((1, 2, 3, 4), (64, 28, 7, 1))[0]
         clauses: list[Clause] = []
-        sentence: list[Said] = []
+        sentence: list[SaidWord] = []
         for number in range(count):
             clause = self._clause(self._action(random, number), random, _names_thing(clauses))
             if number and not clause.is_imperative and random.random() < 0.8:
@@ -119,7 +126,7 @@ class Composer:
             clauses.append(clause)
         return clauses, self._remarked(self._surrounded(sentence, random), clauses, random)
 
-    def _surrounded(self, sentence: list[Said], random: Random) -> list[Said]:
+    def _surrounded(self, sentence: list[SaidWord], random: Random) -> list[SaidWord]:
         """Put a slip or a remark before a command, which change nothing."""
         chance = random.random()
         if chance < 0.03:
@@ -135,14 +142,16 @@ class Composer:
             return [*sentence, *_unowned(never), *_plain(dropped)]
         return [*sentence, *_words(REASONS, random)] if chance < 0.11 else sentence
 
-    def _remarked(self, sentence: list[Said], clauses: list[Clause], random: Random) -> list[Said]:
+    def _remarked(
+        self, sentence: list[SaidWord], clauses: list[Clause], random: Random
+    ) -> list[SaidWord]:
         """Put what people say beside a command around it; behind what is to be said nothing."""
         before = self._before if random.random() < _REMARKED else ()
         after = self._after if random.random() < _REMARKED else ()
         after = () if clauses[-1].step["do"] == "say" else after
         return [*_one_of(before, random), *sentence, *_one_of(after, random)]
 
-    def _remarks(self, random: Random) -> list[Said]:
+    def _remarks(self, random: Random) -> list[SaidWord]:
         kinds = random.choice(((self._before,), (self._after,), (self._before, self._after)))
         return [word for kind in kinds for word in _one_of(kind, random)]
 
@@ -162,16 +171,16 @@ class Composer:
             groups = self._groups[self._action(random, 1)]
             group = random.choice(groups)
             if group.imperative:
-                commanding = Group(group.fixed, group.imperative, ())
+                commanding = PhraseGroup(group.fixed, group.imperative, ())
                 return make_clause(commanding, random, self._every, after_thing)
 
-    def _polite(self, clause: Clause, number: int, random: Random, share: float) -> list[Said]:
-        words = [Said(text, (number, field) if field else None) for text, field in clause.words]
-        before: list[Said] = []
+    def _polite(self, clause: Clause, number: int, random: Random, share: float) -> list[SaidWord]:
+        words = [SaidWord(text, (number, field) if field else None) for text, field in clause.words]
+        before: list[SaidWord] = []
         if clause.is_imperative and random.random() < share:
             if random.random() < 0.12:
                 before += _words(GERUND_ASKING, random)
-                words = [Said(_gerund(words[0].text), words[0].owner), *words[1:]]
+                words = [SaidWord(_gerund(words[0].text), words[0].owner), *words[1:]]
             else:
                 before += _words(ASKING, random)
         if random.random() < 0.35 * share:
@@ -184,11 +193,11 @@ class Composer:
         return [*before, *words, *after]
 
 
-def _text(sentence: list[Said]) -> str:
+def _text(sentence: list[SaidWord]) -> str:
     return " ".join(word.text for word in sentence)
 
 
-def _answer(clauses: list[Clause], sentence: list[Said]) -> str:
+def _answer(clauses: list[Clause], sentence: list[SaidWord]) -> str:
     """Return the answer; copied words are taken from the sentence as it arrived."""
     steps = []
     for number, clause in enumerate(clauses):
@@ -200,12 +209,12 @@ def _answer(clauses: list[Clause], sentence: list[Said]) -> str:
     return answer_text(steps)
 
 
-def _with_fillers(sentence: list[Said], random: Random) -> list[Said]:
+def _with_fillers(sentence: list[SaidWord], random: Random) -> list[SaidWord]:
     if random.random() > 0.07:
         return sentence
     filled = list(sentence)
     for _ in range(random.choice((1, 1, 2))):
-        filled.insert(random.randrange(len(filled) + 1), Said(random.choice(FILLERS), None))
+        filled.insert(random.randrange(len(filled) + 1), SaidWord(random.choice(FILLERS), None))
     return filled
 
 
@@ -224,17 +233,17 @@ def _is_saying(clause: Clause) -> bool:
     return any(field in ("text", "name") for _, field in clause.words)
 
 
-def _words(sequence: Sequence, random: Random) -> list[Said]:
-    return [Said(str(word), None) for word in expand(sequence, random)]
+def _words(sequence: Sequence, random: Random) -> list[SaidWord]:
+    return [SaidWord(str(word), None) for word in expand(sequence, random)]
 
 
-def _one_of(remarks: tuple[tuple[str, ...], ...], random: Random) -> list[Said]:
-    return [Said(word, None) for word in random.choice(remarks)] if remarks else []
+def _one_of(remarks: tuple[tuple[str, ...], ...], random: Random) -> list[SaidWord]:
+    return [SaidWord(word, None) for word in random.choice(remarks)] if remarks else []
 
 
-def _plain(clause: Clause) -> list[Said]:
-    return [Said(text, None) for text, _ in clause.words]
+def _plain(clause: Clause) -> list[SaidWord]:
+    return [SaidWord(text, None) for text, _ in clause.words]
 
 
-def _unowned(text: str) -> list[Said]:
-    return [Said(word, None) for word in text.split()]
+def _unowned(text: str) -> list[SaidWord]:
+    return [SaidWord(word, None) for word in text.split()]

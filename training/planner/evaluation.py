@@ -16,7 +16,7 @@ from training.planner.certainty_fit import Judged, fit
 from training.planner.composing import Composer, Example
 from training.planner.files import METRICS
 from vla_deploy.inference.language_model import LanguageModel
-from vla_deploy.inference.manifest import Certainty, Language, Use
+from vla_deploy.inference.manifest import Certainty, Language, LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import confidence_of
@@ -32,7 +32,7 @@ _LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class ToldExample:
     """Hold what the model told of one example, and how long that took."""
 
     example: Example
@@ -83,7 +83,7 @@ def examples(seed: str, count: int, chatter: Sequence[str]) -> list[Example]:
     return [*learnt, *_of(Composer(held_out=True), 3 * count // 2, seed), *talk]
 
 
-def figures(told: Sequence[Told], weights: Certainty) -> dict[str, Any]:
+def figures(told: Sequence[ToldExample], weights: Certainty) -> dict[str, Any]:
     """Return how many answers were right, and what the doubt makes of them.
 
     `acted` are those that would be carried out, `read_back` those of them that ask first;
@@ -104,7 +104,7 @@ def figures(told: Sequence[Told], weights: Certainty) -> dict[str, Any]:
 
 
 def _parser(models: Path) -> CommandParser:
-    language = Language(use=Use.COMMAND_PARSER, most_tokens=MOST_TOKENS)
+    language = Language(use=LanguageUse.COMMAND_PARSER, most_tokens=MOST_TOKENS)
     return CommandParser(LanguageModel(models, language, PLAIN_CHOICE), known_words(models))
 
 
@@ -113,17 +113,17 @@ def _of(composer: Composer, count: int, seed: str) -> list[Example]:
     return [composer.example(random) for _ in range(count)]
 
 
-def _told(parser: CommandParser, given: Sequence[Example]) -> list[Told]:
+def _told(parser: CommandParser, given: Sequence[Example]) -> list[ToldExample]:
     return [_one(parser, example) for example in given]
 
 
-def _one(parser: CommandParser, example: Example) -> Told:
+def _one(parser: CommandParser, example: Example) -> ToldExample:
     clock = MonotonicClock()
     began_ns = clock.now_ns()
     parsed = parser.parse(example.command, Deadline.within(clock, _DEADLINE_S))
     took_s = (clock.now_ns() - began_ns) / NS_PER_S
     wanted = _steps(example.answer) if example.answer else ({"do": "unknown"},)
-    return Told(
+    return ToldExample(
         example=example,
         steps=parsed.steps,
         judged=Judged(parsed.features, is_same(parsed.steps, wanted)),
@@ -151,6 +151,6 @@ def _share(values: Any) -> float:
     return round(float(np.mean(values)), 4) if len(values) else 0.0
 
 
-def _percentile(told: dict[str, list[Told]], percent: int) -> float:
+def _percentile(told: dict[str, list[ToldExample]], percent: int) -> float:
     times = [one.took_s for every in told.values() for one in every]
     return round(float(np.percentile(times, percent)), 4)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from training.planner.composing import Composer
 from training.planner.files import CONFIG, GRAPH, KNOWN_WORDS, TOKENIZER, TOKENIZER_CONFIG
 from training.planner.graph import Sizes, decoder_graph, genai_config
-from training.planner.network import Decoder
-from training.planner.settings import Shape
+from training.planner.network import PlanDecoder
+from training.planner.settings import NetworkShape
 from training.planner.tokens import ANSWER, COMMAND, END, PAD, load_tokenizer
 from training.planner.training import STATE, WEIGHTS
 
@@ -29,7 +29,7 @@ _SEED: Final = 77
 _LEAST_SHOWN: Final = 4
 
 
-def export(out: Path, models: Path, shape: Shape, chatter: tuple[str, ...] = ()) -> None:
+def export(out: Path, models: Path, shape: NetworkShape, chatter: tuple[str, ...] = ()) -> None:
     """Write the folder.
 
     Raises:
@@ -69,7 +69,7 @@ def known_words(composer: Composer) -> list[str]:
     return sorted(word for word, count in counts.items() if count >= _LEAST_SHOWN)
 
 
-def sizes_of(shape: Shape) -> Sizes:
+def sizes_of(shape: NetworkShape) -> Sizes:
     """Return the sizes of the graph for a network."""
     return Sizes(
         vocabulary=shape.vocabulary,
@@ -84,7 +84,7 @@ def sizes_of(shape: Shape) -> Sizes:
     )
 
 
-def weights_of(network: Decoder) -> dict[str, NDArray[np.float32]]:
+def weights_of(network: PlanDecoder) -> dict[str, NDArray[np.float32]]:
     """Return a network's weights as the graph names them, matrices as inputs x outputs."""
     state = {name: values.detach().float().numpy() for name, values in network.state_dict().items()}
     weights = {"embedding": state["embedding.weight"], "norm": state["norm.weight"]}
@@ -96,9 +96,9 @@ def weights_of(network: Decoder) -> dict[str, NDArray[np.float32]]:
     return weights
 
 
-def _trained(out: Path, shape: Shape) -> Decoder:
+def _trained(out: Path, shape: NetworkShape) -> PlanDecoder:
     """Return the finished network, or where there is none yet the state of the training."""
-    network = Decoder(shape)
+    network = PlanDecoder(shape)
     if (out / WEIGHTS).exists():
         network.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
     else:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Final
 
-from training.planner.clause import Said
+from training.planner.clause import SaidWord
 from training.planner.lists import read_file
 
 _HEARING: Final = read_file("hearing")
@@ -12,25 +12,25 @@ MISHEARD: Final[Mapping[str, Sequence[str]]] = _HEARING["misheard"]
 _LOST: Final = frozenset(_HEARING["lost"])
 
 
-def misheard(sentence: list[Said], random: Random) -> list[Said]:
+def misheard(sentence: list[SaidWord], random: Random) -> list[SaidWord]:
     """Return the sentence as it may arrive; words of the plan are never lost."""
     strength = random.choice((0.0, 0.0, 0.0, 0.03, 0.06, 0.12))
     if not strength:
         return sentence
-    heard: list[Said] = []
+    heard: list[SaidWord] = []
     for word in sentence:
         heard += _one(word, strength, random)
     return heard or sentence
 
 
-def _one(word: Said, strength: float, random: Random) -> list[Said]:
+def _one(word: SaidWord, strength: float, random: Random) -> list[SaidWord]:
     chance = random.random()
     if chance < strength and word.owner is None and word.text in _LOST:
         return []
     if chance < strength and word.text in MISHEARD:
-        return [Said(random.choice(MISHEARD[word.text]), word.owner)]
+        return [SaidWord(random.choice(MISHEARD[word.text]), word.owner)]
     if chance < 0.35 * strength and len(word.text) > 3:
-        return [Said(_mistyped(word.text, random), word.owner)]
+        return [SaidWord(_mistyped(word.text, random), word.owner)]
     if chance > 1.0 - 0.15 * strength and word.owner is None:
         return [word, word]
     return [word]

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.planner.settings import Shape
+from training.planner.settings import NetworkShape
 
 
 class Norm(nn.Module):
@@ -24,7 +24,7 @@ class Norm(nn.Module):
 class Layer(nn.Module):
     """Attend to what came before, then think."""
 
-    def __init__(self, shape: Shape) -> None:
+    def __init__(self, shape: NetworkShape) -> None:
         super().__init__()
         self.shape = shape
         self.attention_norm = Norm(shape.width, shape.epsilon)
@@ -56,10 +56,10 @@ class Layer(nn.Module):
         return values + thought
 
 
-class Decoder(nn.Module):
+class PlanDecoder(nn.Module):
     """Tell the next token from those before."""
 
-    def __init__(self, shape: Shape) -> None:
+    def __init__(self, shape: NetworkShape) -> None:
         super().__init__()
         self.shape = shape
         self.embedding = nn.Embedding(shape.vocabulary, shape.width)
@@ -86,7 +86,7 @@ class Decoder(nn.Module):
         return functional.linear(values, self.embedding.weight)
 
 
-def angles(shape: Shape, tokens: int) -> tuple[Tensor, Tensor]:
+def angles(shape: NetworkShape, tokens: int) -> tuple[Tensor, Tensor]:
     """Return cosines and sines of each position: tokens x half a head's width."""
     half = shape.head_width // 2
     rates = shape.rope_theta ** (-torch.arange(half, dtype=torch.float32) / half)

@@ -6,7 +6,7 @@ from typing import Final
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
+class NetworkShape:
     """Hold the sizes of the network."""
 
     vocabulary: int = 2048
@@ -24,7 +24,7 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class PlannerSettings:
     """Hold how long to train on how much; `budget_s` is wall-clock time, over all sittings.
 
     `rate` is the largest step of AdamW, which the embedding and the norms take; `matrix_rate` that
@@ -33,7 +33,7 @@ class Settings:
 
     name: str
     budget_s: float
-    shape: Shape = field(default_factory=Shape)
+    shape: NetworkShape = field(default_factory=NetworkShape)
     seed: int = 6
     batch: int = 64
     pool: int = 8192
@@ -45,19 +45,19 @@ class Settings:
     save_every_s: float = 120.0
 
 
-SIZES: Final[Mapping[str, Settings]] = {
-    "tiny": Settings(
+SIZES: Final[Mapping[str, PlannerSettings]] = {
+    "tiny": PlannerSettings(
         name="tiny",
         budget_s=4.0,
-        shape=Shape(width=32, layers=2, heads=2, inner=64),
+        shape=NetworkShape(width=32, layers=2, heads=2, inner=64),
         batch=32,
         pool=256,
         judged=20,
     ),
-    "trial": Settings(name="trial", budget_s=180.0),
-    "full": Settings(name="full", budget_s=3600.0),
+    "trial": PlannerSettings(name="trial", budget_s=180.0),
+    "full": PlannerSettings(name="full", budget_s=3600.0),
     # Of the same shape: it can go on from where the other one ended.
-    "long": Settings(name="long", budget_s=14_400.0),
+    "long": PlannerSettings(name="long", budget_s=14_400.0),
     # For going on from a training that is finished: smaller steps.
-    "more": Settings(name="more", budget_s=4500.0, rate=1.2e-3, matrix_rate=0.009, seed=7),
+    "more": PlannerSettings(name="more", budget_s=4500.0, rate=1.2e-3, matrix_rate=0.009, seed=7),
 }

@@ -14,7 +14,7 @@ from random import Random
 from typing import Final
 from zlib import crc32
 
-from training.planner.clause import Clause, Said, answer_text, filled
+from training.planner.clause import Clause, SaidWord, answer_text, filled
 from training.planner.grammar import PatternInvalid, Slot
 from training.planner.lists import PHRASES
 from training.planner.referring import SOURCES
@@ -44,31 +44,31 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SentenceFrame:
     """Hold a sentence, its words and marks, and its steps without what the marks fill."""
 
     steps: tuple[Mapping[str, str], ...]
     parts: tuple[str | Mark, ...]
 
-    def drawn(self, random: Random) -> tuple[list[Clause], list[Said]]:
+    def drawn(self, random: Random) -> tuple[list[Clause], list[SaidWord]]:
         """Return the steps and the sentence with its marks filled by chance."""
-        sentence: list[Said] = []
+        sentence: list[SaidWord] = []
         things: set[int] = set()
         for part in self.parts:
             if isinstance(part, str):
-                sentence.append(Said(part, None))
+                sentence.append(SaidWord(part, None))
                 continue
             # Of what the first step has named, the next may say "it".
             is_later = part.slot.source == "what" and any(step < part.step for step in things)
             for word, field in filled(part.slot, random, is_later):
-                sentence.append(Said(word, (part.step, field) if field else None))
+                sentence.append(SaidWord(word, (part.step, field) if field else None))
             if part.slot.field == "what":
                 things.add(part.step)
         return [Clause((), step, False) for step in self.steps], sentence
 
 
 @cache
-def load_told(held_out: bool) -> tuple[Frame, ...]:
+def load_told(held_out: bool) -> tuple[SentenceFrame, ...]:
     """Return the frames to train on, or those to judge by.
 
     Raises:
@@ -87,7 +87,7 @@ def load_remarks(where: str, held_out: bool) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(plain_words(line)) for line in _lines(REMARKS, where, held_out))
 
 
-def read_frame(line: str) -> Frame:
+def read_frame(line: str) -> SentenceFrame:
     """Read one line.
 
     Raises:
@@ -97,7 +97,7 @@ def read_frame(line: str) -> Frame:
     if not bar:
         raise PatternInvalid(f"{line!r}: expected STEPS | SENTENCE")
     steps = tuple(_step(part.strip(), line) for part in head.split(";"))
-    frame = Frame(steps, tuple(_parts(text)))
+    frame = SentenceFrame(steps, tuple(_parts(text)))
     filled_in = [dict(step) for step in steps]
     for part in frame.parts:
         if isinstance(part, Mark):

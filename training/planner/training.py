@@ -17,8 +17,8 @@ from torch.nn import functional
 
 from training.planner.composing import Composer, Example
 from training.planner.files import TOKENIZER
-from training.planner.network import Decoder
-from training.planner.settings import Settings
+from training.planner.network import PlanDecoder
+from training.planner.settings import PlannerSettings
 from training.planner.tokens import END, PAD, load_tokenizer, prompt_of, train_tokenizer
 
 # Longer ones are rare, and would make a batch of their own.
@@ -26,7 +26,7 @@ MOST_TOKENS = 112
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class TokenBatch:
     """Hold token numbers, batch x tokens, and which of them the model has to tell."""
 
     tokens: Tensor
@@ -35,7 +35,7 @@ class Batch:
 
 def batches(
     composer: Composer, tokenizer: Tokenizer, random: Random, size: int, pool: int
-) -> Iterator[Batch]:
+) -> Iterator[TokenBatch]:
     """Yield batches without end."""
     while True:
         examples = [composer.example(random) for _ in range(pool)]
@@ -44,7 +44,7 @@ def batches(
 
 def pool_batches(
     examples: list[Example], tokenizer: Tokenizer, random: Random, size: int
-) -> Iterator[Batch]:
+) -> Iterator[TokenBatch]:
     """Yield the examples once, in batches of like lengths, by chance one after the other."""
     prompts = tokenizer.encode_batch([prompt_of(one.command) for one in examples])
     answers = tokenizer.encode_batch([one.answer + END for one in examples])
@@ -58,7 +58,7 @@ def pool_batches(
         yield padded(pairs[start : start + size], pad)
 
 
-def padded(pairs: list[tuple[list[int], list[int]]], pad: int) -> Batch:
+def padded(pairs: list[tuple[list[int], list[int]]], pad: int) -> TokenBatch:
     """Return a batch of prompts and answers, each padded behind."""
     longest = max(len(prompt) + len(answer) for prompt, answer in pairs)
     tokens = torch.full((len(pairs), longest), pad)
@@ -67,7 +67,7 @@ def padded(pairs: list[tuple[list[int], list[int]]], pad: int) -> Batch:
         end = len(prompt) + len(answer)
         tokens[row, :end] = torch.tensor(prompt + answer)
         is_answer[row, len(prompt) : end] = True
-    return Batch(tokens, is_answer)
+    return TokenBatch(tokens, is_answer)
 
 
 STATE: Final = "state.pt"
@@ -80,9 +80,9 @@ _JUDGE_SEED: Final = 999
 class Course:
     """Hold a training under way."""
 
-    network: Decoder
+    network: PlanDecoder
     optimizers: tuple[torch.optim.Optimizer, ...]
-    settings: Settings
+    settings: PlannerSettings
     spent_s: float = 0.0
     steps: int = 0
 
@@ -109,8 +109,11 @@ class Course:
 
 
 def train(
-    out: Path, settings: Settings, chatter: tuple[str, ...] = (), start_from: Path | None = None
-) -> Decoder:
+    out: Path,
+    settings: PlannerSettings,
+    chatter: tuple[str, ...] = (),
+    start_from: Path | None = None,
+) -> PlanDecoder:
     """Train until the time is spent, and write the weights; return the network.
 
     `start_from` is the folder of a finished training of the same shape, whose weights and tokens
@@ -118,7 +121,7 @@ def train(
     """
     out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(settings.seed)
-    network = Decoder(settings.shape)
+    network = PlanDecoder(settings.shape)
     if start_from is not None:
         network.load_state_dict(torch.load(start_from / WEIGHTS, weights_only=True))
         shutil.copyfile(start_from / TOKENIZER, out / TOKENIZER)
@@ -140,7 +143,9 @@ def tokenizer_in(out: Path, chatter: tuple[str, ...]) -> Tokenizer:
     return load_tokenizer(file)
 
 
-def optimizers_of(network: Decoder, settings: Settings) -> tuple[torch.optim.Optimizer, ...]:
+def optimizers_of(
+    network: PlanDecoder, settings: PlannerSettings
+) -> tuple[torch.optim.Optimizer, ...]:
     """Return Muon for the matrices of the layers, and AdamW for the rest."""
     matrices = [one for one in network.layers.parameters() if one.dim() == 2]
     chosen = {id(one) for one in matrices}
@@ -181,7 +186,7 @@ def _factor(course: Course) -> float:
     return max(0.01, 0.5 + 0.5 * math.cos(math.pi * (course.progress - warm_up) / (1.0 - warm_up)))
 
 
-def _step(course: Course, batch: Batch) -> float:
+def _step(course: Course, batch: TokenBatch) -> float:
     loss = loss_of(course.network, batch)
     for optimizer in course.optimizers:
         optimizer.zero_grad(set_to_none=True)
@@ -192,13 +197,13 @@ def _step(course: Course, batch: Batch) -> float:
     return float(loss.detach())
 
 
-def loss_of(network: Decoder, batch: Batch) -> Tensor:
+def loss_of(network: PlanDecoder, batch: TokenBatch) -> Tensor:
     """Return the mean loss over the tokens of the answers."""
     scores, wanted = _answer_scores(network, batch)
     return functional.cross_entropy(scores, wanted)
 
 
-def _answer_scores(network: Decoder, batch: Batch) -> tuple[Tensor, Tensor]:
+def _answer_scores(network: PlanDecoder, batch: TokenBatch) -> tuple[Tensor, Tensor]:
     """Return scores where an answer's token comes next, and these tokens."""
     with torch.autocast("cpu", torch.bfloat16):
         values = network(batch.tokens[:, :-1])
@@ -208,7 +213,9 @@ def _answer_scores(network: Decoder, batch: Batch) -> tuple[Tensor, Tensor]:
 
 
 @torch.no_grad()
-def exact_ratio(network: Decoder, tokenizer: Tokenizer, composer: Composer, count: int) -> float:
+def exact_ratio(
+    network: PlanDecoder, tokenizer: Tokenizer, composer: Composer, count: int
+) -> float:
     """Return the share of examples whose every token would be told right."""
     random = Random(_JUDGE_SEED)
     examples = [composer.example(random) for _ in range(count)]

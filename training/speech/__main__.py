@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from training.speech.sizes import SIZES, Size
+from training.speech.sizes import SIZES, TrainingSize
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +18,7 @@ class Job:
     """Hold what a step is told."""
 
     out: Path
-    size: Size
+    size: TrainingSize
     budget_s: float
     start_from: Path | None = None
 

@@ -28,7 +28,7 @@ Random = np.random.Generator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Batch:
+class SpeechBatch:
     """Hold what one step learns from; targets that are IGNORED count for nothing."""
 
     frames: Tensor
@@ -38,7 +38,7 @@ class Batch:
     duration_s: float
 
 
-class Clips:
+class ClipPool:
     """Hold the clips that are there; more may come while a training runs."""
 
     def __init__(self, folder: Path) -> None:
@@ -71,7 +71,7 @@ class Maker:
         self._coder = coder
         self._spoiler = spoiler
 
-    def make(self, clips: Sequence[StoredClip], random: Random) -> Batch:
+    def make(self, clips: Sequence[StoredClip], random: Random) -> SpeechBatch:
         """Return the batch; the same clips come out differently each time."""
         wide = random.random() < _WIDE_SHARE
         clips = clips[:_WIDE_CLIPS] if wide else clips
@@ -92,7 +92,7 @@ class Maker:
             inside = (len(waves[row]) + 160) // hop
             sounds[row, :inside] = 0 if bare else _sounds(clip, float(lead_s), hop, inside)
         tokens, targets = self._texts(clips, empty, random)
-        return Batch(
+        return SpeechBatch(
             frames=made,
             tokens=tokens,
             targets=targets,

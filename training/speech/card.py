@@ -5,7 +5,7 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
-from training.speech.sizes import Size
+from training.speech.sizes import TrainingSize
 from training.voices.cast import (
     ACCENTS,
     HELD_OUT_ACCENT,
@@ -42,7 +42,7 @@ def verdict(metrics: dict[str, Any]) -> str:
     return f"**It does not reach its aims: {figures}.** Train it longer."
 
 
-def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
+def card(metrics: dict[str, Any], model: Path, size: TrainingSize) -> str:
     """Return the model card."""
     training = metrics["training"]
     values = {

@@ -11,7 +11,7 @@ import numpy as np
 from training.speech.pausing import as_read, with_pauses
 from training.speech.sentences import draw_sentence
 from training.voices.cast import draw_of_all, draw_style, say
-from training.voices.clip import Clip
+from training.voices.clip import SpokenClip
 from training.voices.clip_store import write_shard
 from training.voices.errors import SynthesisFailed
 
@@ -30,7 +30,7 @@ def generate(folder: Path, shards: int, seed: int, clips: int = CLIPS_PER_SHARD)
         _LOG.info("shard %d of %d", number + 1, shards)
 
 
-def _clips(number: int, seed: int, count: int) -> Iterator[Clip]:
+def _clips(number: int, seed: int, count: int) -> Iterator[SpokenClip]:
     random = np.random.default_rng([seed, number])
     spoken = 0
     while spoken < count:

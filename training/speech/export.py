@@ -11,7 +11,7 @@ from transformers import WhisperConfig, WhisperForConditionalGeneration
 
 from training.speech.features import HOP, N_FFT
 from training.speech.network import LARGEST_FRAMES, MELS, TEXT_POSITIONS
-from training.speech.sizes import Size
+from training.speech.sizes import TrainingSize
 from training.speech.tokens import TOKENIZER, Coder, settings
 
 PREPROCESSOR: Final = "preprocessor_config.json"
@@ -19,7 +19,7 @@ _HEAD: Final = "sounds."
 _FIXED: Final = "encoder.embed_positions.weight"
 
 
-def export(weights: Path, tokenizer: Path, size: Size, target: Path) -> None:
+def export(weights: Path, tokenizer: Path, size: TrainingSize, target: Path) -> None:
     """Convert weights into the folder `target`; what was there is replaced.
 
     Raises:
@@ -55,7 +55,7 @@ def _preprocessor() -> str:
     return json.dumps(kind, indent=1)
 
 
-def _model(coder: Coder, size: Size) -> WhisperForConditionalGeneration:
+def _model(coder: Coder, size: TrainingSize) -> WhisperForConditionalGeneration:
     config = WhisperConfig(
         vocab_size=coder.count,
         num_mel_bins=MELS,

@@ -17,7 +17,7 @@ from training.speech.trials import (
     noises_alone,
     sentences,
 )
-from training.voices.clip import Clip
+from training.voices.clip import SpokenClip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.transcript import Transcript, confidence
@@ -29,7 +29,7 @@ NOISY_DB: Final = 10.0
 class Read:
     """Hold what was said, and what was read of it."""
 
-    clip: Clip
+    clip: SpokenClip
     reading: Transcript
     cpu_s: float
 
@@ -39,12 +39,12 @@ class Read:
         return count([(self.clip.text, self.reading.text)]).exact == 1
 
 
-def read_all(recogniser: Recogniser, clips: Sequence[Clip]) -> list[Read]:
+def read_all(recogniser: Recogniser, clips: Sequence[SpokenClip]) -> list[Read]:
     """Read clips one by one."""
     return [_read(recogniser, clip) for clip in clips]
 
 
-def _read(recogniser: Recogniser, clip: Clip) -> Read:
+def _read(recogniser: Recogniser, clip: SpokenClip) -> Read:
     began_s = time.process_time()
     reading = recogniser.read(clip.samples)
     return Read(clip=clip, reading=reading, cpu_s=time.process_time() - began_s)
@@ -80,7 +80,7 @@ def word_errors(recogniser: Recogniser, most: int, seed: int) -> tuple[dict[str,
     return figures, reads
 
 
-_SETS: Final[dict[str, Callable[[Sequence[str], np.random.Generator], list[Clip]]]] = {
+_SETS: Final[dict[str, Callable[[Sequence[str], np.random.Generator], list[SpokenClip]]]] = {
     "known_voices": lambda texts, random: by_known_voices(texts, random, 0.0),
     "known_flite": lambda texts, random: by_known_voices(texts, random, 1.0),
     "held_out_voices": by_held_out_voices,

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.speech.sizes import Size
+from training.speech.sizes import TrainingSize
 from training.voices.phones import PHONES
 
 MELS: Final = 80
@@ -87,10 +87,10 @@ class DecoderLayer(EncoderLayer):
         return out
 
 
-class Encoder(nn.Module):
+class SpeechEncoder(nn.Module):
     """Turn frames into states, two frames each."""
 
-    def __init__(self, size: Size) -> None:
+    def __init__(self, size: TrainingSize) -> None:
         super().__init__()
         self.conv1 = nn.Conv1d(MELS, size.width, kernel_size=3, padding=1)
         self.conv2 = nn.Conv1d(size.width, size.width, kernel_size=3, stride=2, padding=1)
@@ -114,10 +114,10 @@ class Encoder(nn.Module):
         return out
 
 
-class Decoder(nn.Module):
+class SpeechDecoder(nn.Module):
     """Write the text that the states hold, token by token."""
 
-    def __init__(self, size: Size, tokens: int) -> None:
+    def __init__(self, size: TrainingSize, tokens: int) -> None:
         super().__init__()
         self.embed_tokens = nn.Embedding(tokens, size.width)
         self.embed_positions = nn.Embedding(TEXT_POSITIONS, size.width)
@@ -136,13 +136,13 @@ class Decoder(nn.Module):
         return functional.linear(self.layer_norm(x), self.embed_tokens.weight)
 
 
-class Recogniser(nn.Module):
+class RecogniserNetwork(nn.Module):
     """Hold encoder and decoder, and the head that names sounds."""
 
-    def __init__(self, size: Size, tokens: int) -> None:
+    def __init__(self, size: TrainingSize, tokens: int) -> None:
         super().__init__()
-        self.encoder = Encoder(size)
-        self.decoder = Decoder(size, tokens)
+        self.encoder = SpeechEncoder(size)
+        self.decoder = SpeechDecoder(size, tokens)
         self.sounds = nn.Linear(size.width, FRAMES_PER_STATE * len(PHONES))
 
     def forward(self, frames: Tensor, tokens: Tensor) -> tuple[Tensor, Tensor]:

@@ -11,12 +11,12 @@ from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.speech import calibration, judging
 from training.speech.card import METRICS, card, read_metrics
-from training.speech.sizes import Size
+from training.speech.sizes import TrainingSize
 from training.speech.trials import sentences
 from training.voices.clip_store import shards
-from vla_deploy.inference.manifest import Context, Manifest, Whisper
+from vla_deploy.inference.manifest import EncoderContext, Manifest, Whisper
 from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.whispers import PLAIN_CHOICE, WhisperSource, describe
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
@@ -31,7 +31,7 @@ _OTHER_SOUNDS: Final = 66
 _LOG = logging.getLogger(__name__)
 
 
-def judge(out: Path, size: Size) -> None:
+def judge(out: Path, size: TrainingSize) -> None:
     """Calibrate and judge the model under `out`; write manifest, figures and card beside it.
 
     Raises:
@@ -39,7 +39,7 @@ def judge(out: Path, size: Size) -> None:
         EngineMissing: eSpeak NG or flite is not installed.
     """
     folder = out / MODEL
-    plain = Whisper(languages=("en",), context=Context.TRIMMED)
+    plain = Whisper(languages=("en",), context=EncoderContext.TRIMMED)
     draft = _open(_manifest(folder, plain), folder)
     fitted = calibration.fit(calibration.readings(draft, _CALIBRATION_CLIPS, size.seed))
     draft.close()
@@ -52,7 +52,7 @@ def judge(out: Path, size: Size) -> None:
     write_manifest(folder, manifest)
 
 
-def _measure(recogniser: Recogniser, out: Path, size: Size) -> dict[str, Any]:
+def _measure(recogniser: Recogniser, out: Path, size: TrainingSize) -> dict[str, Any]:
     seed = size.seed + 1
     figures, reads = judging.word_errors(recogniser, 1000, seed)
     others = judging.other_sounds(recogniser, LEAST_CONFIDENCE, _OTHER_SOUNDS, seed)
@@ -68,7 +68,7 @@ def _measure(recogniser: Recogniser, out: Path, size: Size) -> dict[str, Any]:
 
 
 def _open(manifest: Manifest, folder: Path) -> Recogniser:
-    model = Model(manifest=manifest, folder=folder, is_embedded=False)
+    model = StoredModel(manifest=manifest, folder=folder, is_embedded=False)
     return open_recogniser(model, PLAIN_CHOICE, beam=BEAM, clock=MonotonicClock())
 
 

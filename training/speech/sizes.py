@@ -5,7 +5,7 @@ from typing import Final
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Size:
+class TrainingSize:
     """Hold the sizes of a training; `batch_s` is sound per step, padding counted."""
 
     name: str
@@ -24,10 +24,10 @@ class Size:
 SIZES: Final = {
     size.name: size
     for size in (
-        Size(
+        TrainingSize(
             name="full", width=256, heads=8, encoder_layers=4, decoder_layers=2, shards=40
         ),
-        Size(
+        TrainingSize(
             name="smoke", width=32, heads=2, encoder_layers=1, decoder_layers=1, shards=1,
             clips_per_shard=24, text_tokens=300, texts_for_tokens=300,
             batch_s=20.0,

@@ -17,12 +17,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.speech.batches import Batch, Clips, Maker
+from training.speech.batches import ClipPool, Maker, SpeechBatch
 from training.speech.card import METRICS, read_metrics
 from training.speech.framing import IGNORED
-from training.speech.network import Recogniser
+from training.speech.network import RecogniserNetwork
 from training.speech.sentences import draw_sentence
-from training.speech.sizes import Size
+from training.speech.sizes import TrainingSize
 from training.speech.spoiling import Spoiler
 from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
 from training.speech.warm_start import NotReadable, weights_of, widened
@@ -49,7 +49,7 @@ _WORDS: Final = "decoder.embed_tokens.weight"
 _LOG = logging.getLogger(__name__)
 
 
-def train(out: Path, size: Size, budget_s: float, start_from: Path | None = None) -> None:
+def train(out: Path, size: TrainingSize, budget_s: float, start_from: Path | None = None) -> None:
     """Train on the clips under `out` for that long in all; go on where it was broken off.
 
     With `start_from`, the folder of a shipped recogniser, it begins with that one's weights.
@@ -60,7 +60,7 @@ def train(out: Path, size: Size, budget_s: float, start_from: Path | None = None
     """
     torch.manual_seed(size.seed)
     torch.set_num_threads(1)
-    clips = Clips(out / "clips")
+    clips = ClipPool(out / "clips")
     if not clips.refresh():
         raise FileNotFoundError(f"{out / 'clips'}: no clips; make them by the step data")
     random = np.random.default_rng([size.seed, time.time_ns()])
@@ -86,7 +86,7 @@ def train(out: Path, size: Size, budget_s: float, start_from: Path | None = None
     run.finish()
 
 
-def _coder(path: Path, size: Size) -> Coder:
+def _coder(path: Path, size: TrainingSize) -> Coder:
     if not path.exists():
         random = np.random.default_rng(size.seed)
         texts = [draw_sentence(random) for _ in range(size.texts_for_tokens)]
@@ -109,12 +109,12 @@ class _Stopping:
 class _Run:
     """Hold what a training changes, and its clock."""
 
-    def __init__(self, out: Path, size: Size, tokens: int, budget_s: float) -> None:
+    def __init__(self, out: Path, size: TrainingSize, tokens: int, budget_s: float) -> None:
         self._out = out
         self._budget_s = budget_s
         self._seed = size.seed
         self._heard_before_s = 0.0
-        self.model = Recogniser(size, tokens)
+        self.model = RecogniserNetwork(size, tokens)
         self.average = copy.deepcopy(self.model)
         self._optimisers = _optimisers(self.model)
         self._steps, self._spent_s, self._heard_s, self._fell = 0, 0.0, 0.0, False
@@ -180,7 +180,7 @@ class _Run:
         }
         _write(state, self._out / name)
 
-    def step(self, batch: Batch) -> None:
+    def step(self, batch: SpeechBatch) -> None:
         """Learn from one batch."""
         if self.progress() >= FALL_FROM and not self._fell:
             self.save(BEFORE_FALL)
@@ -241,7 +241,7 @@ def _heard_by(folder: Path) -> float:
     return float(training.get("heard_s", 0.0) + training.get("heard_before_s", 0.0))
 
 
-def _losses(model: Recogniser, batch: Batch) -> tuple[Tensor, Tensor, float]:
+def _losses(model: RecogniserNetwork, batch: SpeechBatch) -> tuple[Tensor, Tensor, float]:
     """Return the losses of text and sounds, and the share of tokens that are right."""
     with torch.autocast("cpu", torch.bfloat16):
         tokens, sounds = model(batch.frames, batch.tokens)

@@ -15,7 +15,7 @@ from training.voices.cast import (
     draw_style,
     say,
 )
-from training.voices.clip import RATE_HZ, Clip
+from training.voices.clip import RATE_HZ, SpokenClip
 from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 
@@ -32,17 +32,17 @@ def sentences(name: str) -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def by_held_out_voices(texts: Sequence[str], random: Random) -> list[Clip]:
+def by_held_out_voices(texts: Sequence[str], random: Random) -> list[SpokenClip]:
     """Speak texts by eSpeak's voices that training never heard."""
     return [say(text, draw_held_out(random), draw_style(random)) for text in texts]
 
 
-def by_known_voices(texts: Sequence[str], random: Random, flite_share: float) -> list[Clip]:
+def by_known_voices(texts: Sequence[str], random: Random, flite_share: float) -> list[SpokenClip]:
     """Speak texts by voices of training; a share of one speaks flite alone."""
     return [say(text, draw_speaker(random, flite_share), draw_style(random)) for text in texts]
 
 
-def by_unseen_engine(texts: Sequence[str], random: Random) -> list[Clip]:
+def by_unseen_engine(texts: Sequence[str], random: Random) -> list[SpokenClip]:
     """Speak texts by festival's voices in turn; training never heard that engine.
 
     Raises:
@@ -57,7 +57,7 @@ def by_unseen_engine(texts: Sequence[str], random: Random) -> list[Clip]:
     )
 
 
-def by_foreigners(count: int, random: Random) -> list[Clip]:
+def by_foreigners(count: int, random: Random) -> list[SpokenClip]:
     """Speak in other languages, to see that no command is heard in them."""
     words = _FOREIGN_TALK.split()
     clips = []
@@ -68,7 +68,7 @@ def by_foreigners(count: int, random: Random) -> list[Clip]:
     return clips
 
 
-def heard(clip: Clip, random: Random, snr_db: float | None = None) -> Clip:
+def heard(clip: SpokenClip, random: Random, snr_db: float | None = None) -> SpokenClip:
     """Return a clip as a microphone takes it: silence around it, a level, noise at a ratio."""
     padding = (int(_LEAD_S * RATE_HZ), int(_TAIL_S * RATE_HZ))
     wave = np.pad(clip.samples, padding)
@@ -79,11 +79,11 @@ def heard(clip: Clip, random: Random, snr_db: float | None = None) -> Clip:
     return replace(clip, samples=at_level(wave, _SPEECH_LEVEL_DB) + floor, sounds=())
 
 
-def noises_alone(count: int, random: Random) -> list[Clip]:
+def noises_alone(count: int, random: Random) -> list[SpokenClip]:
     """Return noise of each kind in turn, two seconds each."""
     kinds = list(KINDS)
     return [
-        Clip(
+        SpokenClip(
             text="",
             engine="noise",
             voice=kinds[number % len(kinds)],

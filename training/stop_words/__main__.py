@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from training.stop_words.corpus import speak
-from training.stop_words.settings import SIZES, Settings
+from training.stop_words.settings import SIZES, StopWordSettings
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
         steps[name](arguments.out, _settings_of(arguments))
 
 
-def _settings_of(arguments: argparse.Namespace) -> Settings:
+def _settings_of(arguments: argparse.Namespace) -> StopWordSettings:
     size = SIZES[arguments.size]
     return replace(
         size,
@@ -40,49 +40,49 @@ def _settings_of(arguments: argparse.Namespace) -> Settings:
     )
 
 
-def _speak(out: Path, settings: Settings) -> None:
+def _speak(out: Path, settings: StopWordSettings) -> None:
     speak(out / "clips", settings.seed, settings.scale)
 
 
 # The steps below import torch, which the first does not need.
-def _train(out: Path, settings: Settings) -> None:
+def _train(out: Path, settings: StopWordSettings) -> None:
     from training.stop_words.training import train
 
     train(out, settings)
 
 
-def _export(out: Path, _settings: Settings) -> None:
+def _export(out: Path, _settings: StopWordSettings) -> None:
     from training.stop_words.export import export
 
     export(out, out / MODELS)
 
 
-def _evaluate(out: Path, settings: Settings) -> None:
+def _evaluate(out: Path, settings: StopWordSettings) -> None:
     from training.stop_words.evaluation import evaluate
 
     evaluate(out, out / MODELS, settings)
 
 
-def _judge(out: Path, settings: Settings) -> None:
+def _judge(out: Path, settings: StopWordSettings) -> None:
     from training.stop_words.evaluation import judge
 
     judge(out, out / MODELS, settings)
 
 
-def _card(out: Path, settings: Settings) -> None:
+def _card(out: Path, settings: StopWordSettings) -> None:
     from training.stop_words.card import describe
 
     describe(out, out / MODELS, settings)
 
 
-def _ship(out: Path, settings: Settings) -> None:
+def _ship(out: Path, settings: StopWordSettings) -> None:
     from training.stop_words.shipping import ship
 
     ship(out, out / MODELS, settings)
 
 
 MODELS = "models"
-STEPS: dict[str, Callable[[Path, Settings], None]] = {
+STEPS: dict[str, Callable[[Path, StopWordSettings], None]] = {
     "speak": _speak,
     "train": _train,
     "export": _export,

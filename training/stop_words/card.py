@@ -24,7 +24,7 @@ from training.stop_words.evaluation import (
 )
 from training.stop_words.export import FILE, FRAMES, INPUT, MOMENTS, OUTPUT
 from training.stop_words.network import REACH, StopNet
-from training.stop_words.settings import Settings
+from training.stop_words.settings import StopWordSettings
 from training.stop_words.texts import WORDS
 from training.voices import kokoro
 from vla_deploy.inference.file_check import sha256_of
@@ -52,7 +52,7 @@ COSTS: Final = ("missed clean", "missed at 10 dB", "alarms per hour")
 _RUNS: Final = 200
 
 
-def describe(out: Path, models: Path, settings: Settings) -> None:
+def describe(out: Path, models: Path, settings: StopWordSettings) -> None:
     """Write `card.md` and `model.toml` beside the file that they describe.
 
     Raises:
@@ -77,7 +77,7 @@ def card(
     metrics: dict[str, Any],
     clips: Mapping[str, Mapping[str, int]],
     models: Path,
-    settings: Settings,
+    settings: StopWordSettings,
 ) -> str:
     """Return the model card; `clips` counts those of each engine, with a stop word and without."""
     stops, others = clips["stops"], clips["others"]

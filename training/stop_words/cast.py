@@ -14,17 +14,17 @@ from training.voices.cast import (
     ROBOTIC_VARIANTS,
     VARIANTS,
 )
-from training.voices.clip import Clip, Style
+from training.voices.clip import SpokenClip, Style
 
-Speak = Callable[[str, str, Style], Clip]
+Speak = Callable[[str, str, Style], SpokenClip]
 
 
-def _festival(text: str, voice: str, style: Style) -> Clip:
+def _festival(text: str, voice: str, style: Style) -> SpokenClip:
     return festival.speak_all([(text, voice, style)])[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class CastPart:
     """Say how many clips one engine speaks, with stop words and without, to train and to judge.
 
     `share` is how often a clip of it is learnt from, against those of the others; `held` voices
@@ -48,7 +48,7 @@ class Part:
 
 
 PARTS: Final = (
-    Part(
+    CastPart(
         engine=kokoro.ENGINE,
         speak=kokoro.speak,
         tells_times=True,
@@ -63,7 +63,7 @@ PARTS: Final = (
         judged_stops=200,
         judged_others=400,
     ),
-    Part(
+    CastPart(
         engine=espeak.ENGINE,
         speak=espeak.speak,
         tells_times=True,
@@ -78,7 +78,7 @@ PARTS: Final = (
         held_stops=400,
         held_others=900,
     ),
-    Part(
+    CastPart(
         engine=flite.ENGINE,
         speak=flite.speak,
         tells_times=True,
@@ -87,7 +87,7 @@ PARTS: Final = (
         stops=4000,
         others=7000,
     ),
-    Part(
+    CastPart(
         engine=pico.ENGINE,
         speak=pico.speak,
         tells_times=False,
@@ -99,7 +99,7 @@ PARTS: Final = (
         held_stops=120,
         held_others=300,
     ),
-    Part(
+    CastPart(
         engine=rhvoice.ENGINE,
         speak=rhvoice.speak,
         tells_times=False,
@@ -111,7 +111,7 @@ PARTS: Final = (
         held_stops=120,
         held_others=300,
     ),
-    Part(
+    CastPart(
         engine=hibari.ENGINE,
         speak=hibari.speak,
         tells_times=False,
@@ -120,7 +120,7 @@ PARTS: Final = (
         stops=2000,
         others=7000,
     ),
-    Part(
+    CastPart(
         engine=piper.ENGINE,
         speak=piper.speak,
         tells_times=False,
@@ -129,7 +129,7 @@ PARTS: Final = (
         stops=1600,
         others=2500,
     ),
-    Part(
+    CastPart(
         engine=festival.ENGINE,
         speak=_festival,
         tells_times=True,

@@ -12,13 +12,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from training.stop_words.cast import PARTS, Part, draw_style
+from training.stop_words.cast import PARTS, CastPart, draw_style
 from training.stop_words.examples import Examples
 from training.stop_words.picking import pick
 from training.stop_words.stop_texts import stop_texts
 from training.stop_words.texts import WORDS, other_talk
 from training.stop_words.timing import sounding, word_times
-from training.voices.clip import RATE_HZ, Clip, Wave
+from training.voices.clip import RATE_HZ, SpokenClip, Wave
 from training.voices.errors import SynthesisFailed
 from training.voices.phones import NUMBERS
 
@@ -112,7 +112,7 @@ def speak(folder: Path, seed: int, scale: float = 1.0) -> None:
 
 
 def _clips(
-    part: Part, split: str, kind: str, count: int, random: np.random.Generator
+    part: CastPart, split: str, kind: str, count: int, random: np.random.Generator
 ) -> list[Said]:
     voices = {TRAIN: part.voices, HELD: part.held_voices, JUDGED: part.judged_voices}[split]
     talk = other_talk(count, random, _lexicon(), _examples().draw)
@@ -149,7 +149,7 @@ def _lexicon() -> list[str]:
     return [word for word in words if word.isalpha() and word.islower() and 2 < len(word) < 11]
 
 
-def trimmed(clip: Clip, word: str, *, is_last: bool) -> Said | None:
+def trimmed(clip: SpokenClip, word: str, *, is_last: bool) -> Said | None:
     """Cut the silence at both ends; None where nobody knows when the word was said."""
     first, last = sounding(clip.samples)
     low, high = max(0, first - _MARGIN), min(len(clip.samples), last + _MARGIN)

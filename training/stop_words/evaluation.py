@@ -21,7 +21,7 @@ from training.stop_words.corpus import HELD, JUDGED, Clips, Said
 from training.stop_words.export import FILE, INPUT
 from training.stop_words.network import REACH
 from training.stop_words.rooms import NoiseBank, Sound
-from training.stop_words.settings import Settings
+from training.stop_words.settings import StopWordSettings
 from training.voices import kokoro
 from training.voices.clip import RATE_HZ
 from vla_deploy.inference.runtime import InferenceSession, SessionOptions
@@ -51,7 +51,7 @@ ByKind = dict[str, dict[str, _T]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trial:
+class WordTrial:
     """Hold a phrase in noise: scores of each moment near the word, and their times after it."""
 
     engine: str
@@ -75,7 +75,7 @@ class Talk:
 class Heard:
     """Hold all that the network heard of some voices."""
 
-    trials: Sequence[Trial]
+    trials: Sequence[WordTrial]
     talk: Sequence[Talk]
 
     @property
@@ -88,7 +88,7 @@ class Heard:
         return hours
 
 
-def evaluate(out: Path, models: Path, settings: Settings) -> None:
+def evaluate(out: Path, models: Path, settings: StopWordSettings) -> None:
     """Choose by the held voices, and write what they tell beside the model.
 
     Raises:
@@ -107,7 +107,7 @@ def chosen(heard: Heard) -> dict[str, Any]:
     return min(quick or choices, key=lambda one: float(one["at"]["low"]["missed_mean"]))
 
 
-def judge(out: Path, models: Path, settings: Settings) -> None:
+def judge(out: Path, models: Path, settings: StopWordSettings) -> None:
     """Add what the judged voices tell of a model whose thresholds are chosen.
 
     Raises:
@@ -125,7 +125,7 @@ def _write(models: Path, metrics: dict[str, Any]) -> None:
     (models / METRICS).write_text(text + "\n", encoding="utf-8")
 
 
-def heard_by(file: Path, out: Path, split: str, settings: Settings) -> Heard:
+def heard_by(file: Path, out: Path, split: str, settings: StopWordSettings) -> Heard:
     """Let an exported network hear phrases and other talk of the voices of one split.
 
     Raises:
@@ -177,9 +177,9 @@ def _trials(
     net: InferenceSession,
     stops: Clips,
     bank: NoiseBank,
-    settings: Settings,
+    settings: StopWordSettings,
     random: np.random.Generator,
-) -> Sequence[Trial]:
+) -> Sequence[WordTrial]:
     trials = []
     offset_s = _BEFORE_S + REACH * HOP / RATE_HZ
     for number in random.permutation(len(stops))[: settings.judged_stops]:
@@ -189,7 +189,7 @@ def _trials(
             times_s, scores = scores_of(net, in_noise(said, snr_db, bank, random))
             inside = (times_s > offset_s + start_s) & (times_s < offset_s + end_s + LATE_S)
             trials.append(
-                Trial(
+                WordTrial(
                     engine=_engine(said),
                     word=int(word),
                     snr=snr,
@@ -204,7 +204,7 @@ def _talk(
     net: InferenceSession,
     others: Clips,
     bank: NoiseBank,
-    settings: Settings,
+    settings: StopWordSettings,
     random: np.random.Generator,
 ) -> list[Talk]:
     """Return the scores of clips of other talk, each clip in each noise."""

@@ -26,7 +26,7 @@ def _convolution(channels: int, taps: int, **how: int) -> nn.Conv2d:
     return nn.Conv2d(channels, CHANNELS, (1, taps), bias=False, **across)
 
 
-class Block(nn.Module):
+class ResidualBlock(nn.Module):
     """Mix over time and channels, and add it to what came in."""
 
     def __init__(self, dilation: int) -> None:
@@ -54,7 +54,7 @@ class StopNet(nn.Module):
             nn.BatchNorm2d(CHANNELS),
             nn.ReLU(),
         )
-        self.blocks = nn.Sequential(*(Block(dilation) for dilation in DILATIONS))
+        self.blocks = nn.Sequential(*(ResidualBlock(dilation) for dilation in DILATIONS))
         self.last = nn.Conv2d(CHANNELS, 1 + words, 1)
         self.phones = nn.Conv2d(CHANNELS, len(PHONES), 1)
 

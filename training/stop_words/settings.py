@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class StopWordSettings:
     """Hold what decides the result besides the code.
 
     `scale` is the share of the clips that are spoken, `cpu_minutes` how long is learnt on one core.
@@ -31,9 +31,9 @@ class Settings:
         return self.learning_rate if self.start_from is None else self.learning_rate / 3.0
 
 
-FULL = Settings(name="full")
+FULL = StopWordSettings(name="full")
 """What the shipped model was made by."""
-TINY = Settings(
+TINY = StopWordSettings(
     name="tiny", scale=0.01, cpu_minutes=0.2, fresh=2, seen=2, judged_hours=0.02, judged_stops=8
 )
 SIZES = {settings.name: settings for settings in (FULL, TINY)}

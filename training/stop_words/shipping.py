@@ -9,14 +9,14 @@ from typing import Final
 from training.stop_words.corpus import HELD
 from training.stop_words.evaluation import METRICS, chosen, heard_by
 from training.stop_words.export import FILE
-from training.stop_words.settings import Settings
+from training.stop_words.settings import StopWordSettings
 
 SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "stop_words"
 NAMES: Final = (FILE, METRICS, "card.md", "model.toml")
 _LOG = logging.getLogger(__name__)
 
 
-def ship(out: Path, models: Path, settings: Settings, place: Path = SHIPPED) -> bool:
+def ship(out: Path, models: Path, settings: StopWordSettings, place: Path = SHIPPED) -> bool:
     """Copy the files of a model; return whether it was done.
 
     The one that is there hears the clips that chose the new one's thresholds, and gets those that

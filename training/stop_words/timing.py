@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices.clip import RATE_HZ, Clip, Wave
+from training.voices.clip import RATE_HZ, SpokenClip, Wave
 
 _SOUNDS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
     "stop": (("s", "t", "aa", "p"), ("s", "t", "ao", "p")),
@@ -18,7 +18,7 @@ _FIRST_WORD_S: Final = 0.35
 """What comes next cuts it short."""
 
 
-def word_times(clip: Clip, word: str, *, is_last: bool) -> list[tuple[float, float]]:
+def word_times(clip: SpokenClip, word: str, *, is_last: bool) -> list[tuple[float, float]]:
     """Return start and end of each time that a word was said, in seconds; empty if unknown.
 
     Where the engine tells no sounds, a word that comes once begins or ends with the clip's sound.
@@ -59,7 +59,7 @@ def _heard_until(samples: Wave, start_s: float, end_s: float) -> float:
     return min(end_s, heard_s)
 
 
-def _by_sounds(clip: Clip, word: str) -> Iterator[tuple[float, float]]:
+def _by_sounds(clip: SpokenClip, word: str) -> Iterator[tuple[float, float]]:
     phones = [sound.phone for sound in clip.sounds]
     began_s = [*(sound.began_s for sound in clip.sounds), clip.duration_s]
     for spelling in _SOUNDS[word]:

@@ -16,7 +16,7 @@ from training.stop_words.corpus import TRAIN, Clips
 from training.stop_words.mixing import IGNORED, Mixer, Stretch, varied
 from training.stop_words.network import StopNet
 from training.stop_words.rooms import NoiseBank, NoiseFrames
-from training.stop_words.settings import Settings
+from training.stop_words.settings import StopWordSettings
 from training.stop_words.texts import WORDS
 from training.warm_start import begin_from
 
@@ -42,7 +42,7 @@ So many are mixed before the first step, and so many are held."""
 _LOG = logging.getLogger(__name__)
 
 
-def train(out: Path, settings: Settings) -> None:
+def train(out: Path, settings: StopWordSettings) -> None:
     """Train on the clips under `out`; write averaged weights and all that resuming needs there.
 
     Raises:
@@ -87,7 +87,7 @@ def _write(values: dict[str, Any], path: Path) -> None:
 class _Run:
     """Hold what a training changes."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: StopWordSettings) -> None:
         self._settings = settings
         self.model = StopNet(len(WORDS)).to(memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.model).eval()

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from training.voices import espeak, flite, hibari, pico, piper, rhvoice
-from training.voices.clip import Clip, Style
+from training.voices.clip import SpokenClip, Style
 
 ACCENTS: Final = (
     "en", "en-us", "en-us-nyc", "en-029", "en-gb-scotland", "en-gb-x-gbclan", "en-gb-x-gbcwmd",
@@ -39,7 +39,7 @@ class Speaker:
     voice: str
 
 
-_ENGINES: Final[Mapping[str, Callable[[str, str, Style], Clip]]] = {
+_ENGINES: Final[Mapping[str, Callable[[str, str, Style], SpokenClip]]] = {
     espeak.ENGINE: espeak.speak,
     flite.ENGINE: flite.speak,
     pico.ENGINE: pico.speak,
@@ -49,7 +49,7 @@ _ENGINES: Final[Mapping[str, Callable[[str, str, Style], Clip]]] = {
 }
 
 
-def say(text: str, speaker: Speaker, style: Style) -> Clip:
+def say(text: str, speaker: Speaker, style: Style) -> SpokenClip:
     """Speak a text by one of the engines that run in this process.
 
     Raises:

@@ -33,7 +33,7 @@ class Sound:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Clip:
+class SpokenClip:
     """Hold a spoken text; `sounds` is empty where the engine does not tell them."""
 
     text: str

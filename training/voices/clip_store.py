@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from training.voices.clip import Clip, Sound, Wave
+from training.voices.clip import Sound, SpokenClip, Wave
 
 _SAMPLES: Final = "samples.i16"
 _INDEX: Final = "index.jsonl"
@@ -32,7 +32,7 @@ class StoredClip:
         return self.data.astype(np.float32) / np.float32(_FULL_SCALE)
 
 
-def write_shard(folder: Path, clips: Iterable[Clip]) -> None:
+def write_shard(folder: Path, clips: Iterable[SpokenClip]) -> None:
     """Write clips as a shard; a shard that is already there is left as it is."""
     if folder.exists():
         return

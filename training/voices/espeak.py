@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Sound, Style, resample
+from training.voices.clip import Sound, SpokenClip, Style, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.phones import from_espeak
 
@@ -75,7 +75,7 @@ class _Speaker:
                 self._sounds.append(Sound(phone=phone, began_s=event.sample / self._rate_hz))
         return 0
 
-    def speak(self, text: str, voice: str, style: Style) -> Clip:
+    def speak(self, text: str, voice: str, style: Style) -> SpokenClip:
         """Speak one text."""
         self._pieces.clear()
         self._sounds.clear()
@@ -94,7 +94,7 @@ class _Speaker:
         if not self._pieces:
             raise SynthesisFailed(ENGINE, voice, text, "no sound")
         samples = np.concatenate(self._pieces).astype(np.float32) / np.float32(32_768)
-        return Clip(
+        return SpokenClip(
             text=text,
             engine=ENGINE,
             voice=voice,
@@ -108,7 +108,7 @@ def _speaker() -> _Speaker:
     return _Speaker()
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text by a voice such as "en-us+f3": an accent, and how the speaker sounds.
 
     Raises:

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Sound, Style, resample
+from training.voices.clip import Sound, SpokenClip, Style, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.phones import SILENCE, from_dictionary
 
@@ -25,7 +25,7 @@ _TIMEOUT_S_PER_TEXT: Final = 10.0
 _FOLDERS: Final = ("/usr/share/festival/voices/english", "/usr/share/festival/voices/us")
 
 
-def speak_all(wishes: Sequence[tuple[str, str, Style]]) -> list[Clip]:
+def speak_all(wishes: Sequence[tuple[str, str, Style]]) -> list[SpokenClip]:
     """Speak texts, each by one of VOICES in a style, and return them in order.
 
     Raises:
@@ -65,14 +65,14 @@ def _lines(folder: Path, wishes: Sequence[tuple[str, str, Style]]) -> list[str]:
     return lines
 
 
-def _read(folder: Path, number: int, text: str, voice: str, _style: Style, told: str) -> Clip:
+def _read(folder: Path, number: int, text: str, voice: str, _style: Style, told: str) -> SpokenClip:
     path = folder / f"{number}.wav"
     if not path.exists():
         raise SynthesisFailed(ENGINE, voice, text, f"no sound ({told[-200:]})")
     with wave.open(io.BytesIO(path.read_bytes())) as file:
         rate_hz = file.getframerate()
         samples = np.frombuffer(file.readframes(file.getnframes()), np.int16)
-    return Clip(
+    return SpokenClip(
         text=text,
         engine=ENGINE,
         voice=voice,

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Sound, Style, resample
+from training.voices.clip import Sound, SpokenClip, Style, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.phones import SILENCE, from_dictionary
 
@@ -77,7 +77,7 @@ def _voice(name: str) -> Any:
     return register(None)
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text by one of the voices in PITCH_HZ.
 
     Raises:
@@ -103,7 +103,7 @@ def speak(text: str, voice: str, style: Style) -> Clip:
         if wave.count <= 0:
             raise SynthesisFailed(ENGINE, voice, text, "no sound")
         samples = np.ctypeslib.as_array(wave.samples, (wave.count,)).astype(np.float32)
-        return Clip(
+        return SpokenClip(
             text=text,
             engine=ENGINE,
             voice=voice,

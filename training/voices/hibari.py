@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 import vla_deploy.inference.runtime  # noqa: F401 (switches telemetry off before hibari loads it)
-from training.voices.clip import Clip, Style, resample
+from training.voices.clip import SpokenClip, Style, resample
 from training.voices.errors import SynthesisFailed
 from training.voices.packaged import packaged
 
@@ -22,7 +22,7 @@ def _speaker() -> Any:
         return import_module("hibari").Hibari(voice=VOICES[0], threads=1)
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text; it tells no times and keeps its own pitch.
 
     Raises:
@@ -34,4 +34,4 @@ def speak(text: str, voice: str, style: Style) -> Clip:
     if not samples.any():
         raise SynthesisFailed(ENGINE, voice, text, "no sound")
     samples = resample(np.clip(samples, -1.0, 1.0), _RATE_HZ)
-    return Clip(text=text, engine=ENGINE, voice=voice, samples=samples)
+    return SpokenClip(text=text, engine=ENGINE, voice=voice, samples=samples)

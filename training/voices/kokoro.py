@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from training.voices.clip import Clip, Sound, Style, Wave, resample
+from training.voices.clip import Sound, SpokenClip, Style, Wave, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.packaged import packaged
 from training.voices.phones import SILENCE
@@ -89,7 +89,7 @@ _PHONES: Final = {
 }  # fmt: skip
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text by a style, or by two together; it keeps its own pitch and liveliness.
 
     Raises:
@@ -104,7 +104,7 @@ def speak(text: str, voice: str, style: Style) -> Clip:
         style_vector(voice, len(letters)),
         style.rate_ratio,
     )
-    return Clip(
+    return SpokenClip(
         text=text,
         engine=ENGINE,
         voice=voice,

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Style, resample
+from training.voices.clip import SpokenClip, Style, resample
 from training.voices.errors import SynthesisFailed
 from training.voices.packaged import packaged
 
@@ -21,7 +21,7 @@ def _speaker() -> Any:
         return import_module("py_nanotts").NanoTTS()
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text by one of VOICES; it tells no times and knows no liveliness.
 
     Raises:
@@ -32,4 +32,4 @@ def speak(text: str, voice: str, style: Style) -> Clip:
     samples = np.frombuffer(told, "<i2").astype(np.float32) / np.float32(32_768)
     if not samples.any():
         raise SynthesisFailed(ENGINE, voice, text, "no sound")
-    return Clip(text=text, engine=ENGINE, voice=voice, samples=resample(samples, _RATE_HZ))
+    return SpokenClip(text=text, engine=ENGINE, voice=voice, samples=resample(samples, _RATE_HZ))

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Style, resample
+from training.voices.clip import SpokenClip, Style, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.packaged import packaged
 from vla_deploy.inference.runtime import InferenceSession, SessionOptions
@@ -42,7 +42,7 @@ def _speaker() -> _Speaker:
     )
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text; melody and rhythm are by chance, the livelier the more. It tells no times.
 
     Raises:
@@ -64,7 +64,7 @@ def speak(text: str, voice: str, style: Style) -> Clip:
     if not samples.any():
         raise SynthesisFailed(ENGINE, voice, text, "no sound")
     samples = resample(np.clip(samples, -1.0, 1.0), speaker.rate_hz)
-    return Clip(text=text, engine=ENGINE, voice=voice, samples=samples)
+    return SpokenClip(text=text, engine=ENGINE, voice=voice, samples=samples)
 
 
 def _phonemes(text: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from training.voices.clip import Clip, Style, resample
+from training.voices.clip import SpokenClip, Style, resample
 from training.voices.errors import EngineMissing, SynthesisFailed
 
 ENGINE: Final = "rhvoice"
@@ -119,7 +119,7 @@ def _speaker() -> _Speaker:
     return _Speaker(loaded, data, config)
 
 
-def speak(text: str, voice: str, style: Style) -> Clip:
+def speak(text: str, voice: str, style: Style) -> SpokenClip:
     """Speak a text by one of VOICES or HELD_OUT; it tells no times and knows no liveliness.
 
     Raises:
@@ -138,4 +138,4 @@ def speak(text: str, voice: str, style: Style) -> Clip:
     if not samples.any():
         raise SynthesisFailed(ENGINE, voice, text, f"no sound; there are {(*VOICES, HELD_OUT)}")
     samples = resample(samples / np.float32(32_768), speaker.rate_hz)
-    return Clip(text=text, engine=ENGINE, voice=voice, samples=samples)
+    return SpokenClip(text=text, engine=ENGINE, voice=voice, samples=samples)

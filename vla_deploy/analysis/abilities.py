@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from vla_deploy.manipulation.errors import Unreachable
+from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.base_paths import base_planner
@@ -45,7 +45,7 @@ class Arms:
         for yaw_rad in _YAWS_RAD:
             try:
                 self._arms[hand].solve(hand_down(point_m, yaw_rad), self._seed, restarts=2)
-            except Unreachable:
+            except PostureUnreachable:
                 continue
             return True
         return False

@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from vla_deploy.analysis.document import Distance, Ratio, Side, Size
+from vla_deploy.analysis.document import Distance, Ratio, Side, SizeClass
 
 MOST_OBJECTS: Final = 60
 MOST_RELATIONS: Final = 120
@@ -42,7 +42,7 @@ class ClaimedObject(_Claim):
     colour: Name
     side: Side
     distance: Distance
-    size: Size
+    size: SizeClass
     confidence: Ratio
 
 

@@ -12,10 +12,10 @@ from vla_deploy.analysis.document import (
     AnalysedObject,
     AnalysedRelation,
     Distance,
+    EvidenceSource,
     Feasible,
     SceneAnalysis,
     Side,
-    Source,
     Task,
 )
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES, SYNONYMS
@@ -92,11 +92,11 @@ def _named(thing: AnalysedObject, claim: ClaimedObject | None) -> AnalysedObject
         return thing
     if thing.name == ANY_CLASS:
         sure = min(thing.confidence, claim.confidence)
-        changes = {"name": claim.name, "confidence": sure, "source": Source.BOTH}
+        changes = {"name": claim.name, "confidence": sure, "source": EvidenceSource.BOTH}
         return thing.model_copy(update=changes)
     kinds = _kinds(claim.name)
     if not kinds or thing.name in kinds:
-        return thing.model_copy(update={"source": Source.BOTH})
+        return thing.model_copy(update={"source": EvidenceSource.BOTH})
     doubted = round(thing.confidence * DOUBT, _DIGITS)
     return thing.model_copy(update={"confidence": doubted})
 
@@ -112,7 +112,7 @@ def _unmeasured(claim: ClaimedObject) -> AnalysedObject:
         graspable=False,
         accessible=False,
         confidence=min(claim.confidence, MOST_UNMEASURED),
-        source=Source.MODEL,
+        source=EvidenceSource.MODEL,
     )
 
 
@@ -127,7 +127,10 @@ def _relations(
         pair = frozenset({one.subject, one.other})
         if len(pair) == 2 and pair <= known and pair not in settled:
             yield AnalysedRelation(
-                subject=one.subject, relation=one.relation, other=one.other, source=Source.MODEL
+                subject=one.subject,
+                relation=one.relation,
+                other=one.other,
+                source=EvidenceSource.MODEL,
             )
 
 

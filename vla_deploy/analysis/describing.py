@@ -8,9 +8,9 @@ from vla_deploy.analysis.document import (
     AnalysedObject,
     AnalysedRelation,
     Distance,
+    EvidenceSource,
     Side,
-    Size,
-    Source,
+    SizeClass,
 )
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Body, Snapshot, Thing, Viewpoint, access_to, relations_of
@@ -32,11 +32,11 @@ def objects_of(world: Snapshot, body: Body) -> Iterator[AnalysedObject]:
             colour=thing.colour,
             side=side_of(thing, world.robot),
             distance=distance_of(thing, world.robot),
-            size=Size(size_word(thing)),
+            size=SizeClass(size_word(thing)),
             graspable=thing.kind in GRASPABLE_CLASSES and access.is_graspable,
             accessible=access.is_accessible,
             confidence=round(still_there(thing, world.unseen_s(thing)), _DIGITS),
-            source=Source.GEOMETRY,
+            source=EvidenceSource.GEOMETRY,
         )
 
 

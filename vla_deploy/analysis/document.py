@@ -24,7 +24,7 @@ class Distance(StrEnum):
     FAR = "far"
 
 
-class Size(StrEnum):
+class SizeClass(StrEnum):
     """Say how large a thing is, by its longest side."""
 
     TINY = "tiny"
@@ -33,7 +33,7 @@ class Size(StrEnum):
     LARGE = "large"
 
 
-class Source(StrEnum):
+class EvidenceSource(StrEnum):
     """Say who vouches: the robot's own measurement, a model that was asked, or both."""
 
     GEOMETRY = "geometry"
@@ -62,11 +62,11 @@ class AnalysedObject(_Value):
     colour: str
     side: Side | None
     distance: Distance | None
-    size: Size | None
+    size: SizeClass | None
     graspable: bool
     accessible: bool
     confidence: Ratio
-    source: Source
+    source: EvidenceSource
 
 
 class AnalysedRelation(_Value):
@@ -75,7 +75,7 @@ class AnalysedRelation(_Value):
     subject: str
     relation: str
     other: str
-    source: Source = Source.GEOMETRY
+    source: EvidenceSource = EvidenceSource.GEOMETRY
 
 
 class Task(_Value):

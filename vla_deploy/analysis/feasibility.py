@@ -6,19 +6,19 @@ from typing import Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import Feasible, Task
 from vla_deploy.analysis.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
-from vla_deploy.analysis.question import Question
+from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.analysis.steps import judge_step
 from vla_deploy.planning.plan import Action
 
 _DIGITS: Final = 3
 
 
-def judge_action(action: Action, question: Question, abilities: Abilities) -> Task:
+def judge_action(action: Action, question: SceneQuestion, abilities: Abilities) -> Task:
     """Return the verdict on one action of a plan."""
     return judge_actions((action,), question, outlook_of(question, abilities))
 
 
-def judge_actions(actions: Sequence[Action], question: Question, outlook: Outlook) -> Task:
+def judge_actions(actions: Sequence[Action], question: SceneQuestion, outlook: Outlook) -> Task:
     """Return the verdict on actions that follow each other."""
     try:
         for action in actions:
@@ -28,7 +28,7 @@ def judge_actions(actions: Sequence[Action], question: Question, outlook: Outloo
     return _summed_up(question, outlook, len(actions))
 
 
-def _summed_up(question: Question, outlook: Outlook, steps: int) -> Task:
+def _summed_up(question: SceneQuestion, outlook: Outlook, steps: int) -> Task:
     if outlook.unseen:
         unseen = " and ".join(f"the {one}" for one in outlook.unseen)
         reason = f"{unseen} must be found first; what comes after cannot be judged"
@@ -40,7 +40,7 @@ def _summed_up(question: Question, outlook: Outlook, steps: int) -> Task:
     return task_of(question, outlook, Feasible.YES, outlook.belief, reason)
 
 
-def outlook_of(question: Question, abilities: Abilities) -> Outlook:
+def outlook_of(question: SceneQuestion, abilities: Abilities) -> Outlook:
     """Return what is known before the first step."""
     robot = question.world.robot
     held = next((thing for thing in question.world.things if thing.held_by), None)
@@ -58,7 +58,7 @@ def outlook_of(question: Question, abilities: Abilities) -> Outlook:
 
 
 def task_of(
-    question: Question, outlook: Outlook, feasible: Feasible, belief: float, reason: str
+    question: SceneQuestion, outlook: Outlook, feasible: Feasible, belief: float, reason: str
 ) -> Task:
     """Return the verdict with what the steps have found."""
     alternatives = tuple(dict.fromkeys(outlook.alternatives))[:MOST_ALTERNATIVES]

@@ -6,7 +6,7 @@ from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.describing import objects_of, relations_between
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.goal_feasibility import judge_goal
-from vla_deploy.analysis.question import Question
+from vla_deploy.analysis.question import SceneQuestion
 
 GEOMETRIC: Final = "geometric"
 NO_POSE: Final = "the robot's pose is not known: no sides, no distances, no ways"
@@ -18,7 +18,7 @@ class GeometricAnalyser:
     def __init__(self, abilities: Abilities) -> None:
         self._abilities = abilities
 
-    def analyse(self, question: Question) -> SceneAnalysis:
+    def analyse(self, question: SceneQuestion) -> SceneAnalysis:
         """Return the analysis; the image is not looked at."""
         world = question.world
         return SceneAnalysis(

@@ -4,14 +4,14 @@ from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import Feasible, Task
 from vla_deploy.analysis.feasibility import judge_actions, outlook_of, task_of
 from vla_deploy.analysis.outlook import Outlook
-from vla_deploy.analysis.question import Question
+from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.planning.errors import NotUnderstood, PlanningError
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.backend import plan_command
 from vla_deploy.planning.plan import Plan
 
 
-def judge_goal(question: Question, abilities: Abilities) -> Task:
+def judge_goal(question: SceneQuestion, abilities: Abilities) -> Task:
     """Return the verdict on the question's goal."""
     outlook = outlook_of(question, abilities)
     try:
@@ -23,7 +23,7 @@ def judge_goal(question: Question, abilities: Abilities) -> Task:
     return judge_actions(plan.actions, question, outlook)
 
 
-def _plan(question: Question, abilities: Abilities, outlook: Outlook) -> Plan:
+def _plan(question: SceneQuestion, abilities: Abilities, outlook: Outlook) -> Plan:
     robot = question.world.robot
     here = None if robot is None else (robot.x_m, robot.y_m, robot.yaw_rad)
     world = World(places=abilities.spoken, poses=abilities.poses, holding=outlook.holding)

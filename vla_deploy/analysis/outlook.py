@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.question import Question
+from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.navigation.errors import NoPath
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Query, Thing, access_to, find
@@ -38,7 +38,7 @@ class Outlook:
     that nobody has seen yet, of which nothing can be said.
     """
 
-    question: Question
+    question: SceneQuestion
     abilities: Abilities
     holding: dict[str, str | None]
     at: Point | None

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.question import Question
-from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.analysis.question import SceneQuestion
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 
 TEMPLATE: Final = Path(__file__).parent / "prompts" / "scene_analysis.md"
 MOST_THINGS: Final = 40
@@ -19,10 +19,10 @@ _DIGITS: Final = 2
 _ESCAPES: Final = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026"}
 
 
-def chat_about(question: Question, measured: SceneAnalysis, jpeg: bytes | None) -> Chat:
+def chat_about(question: SceneQuestion, measured: SceneAnalysis, jpeg: bytes | None) -> Chat:
     """Return the chat; the nearest things and their relations, as many as a prompt should hold."""
     data = json.dumps(_scene(question, measured), separators=(",", ":")).translate(_ESCAPES)
-    message = Message(text=f"<scene>\n{data}\n</scene>", images=() if jpeg is None else (jpeg,))
+    message = ChatMessage(text=f"<scene>\n{data}\n</scene>", images=() if jpeg is None else (jpeg,))
     return Chat(system=_template(), messages=(message,), schema_name="scene")
 
 
@@ -31,7 +31,7 @@ def _template() -> str:
     return TEMPLATE.read_text(encoding="utf-8")
 
 
-def _scene(question: Question, measured: SceneAnalysis) -> dict[str, Any]:
+def _scene(question: SceneQuestion, measured: SceneAnalysis) -> dict[str, Any]:
     world = question.world
     robot = world.robot
     here = (0.0, 0.0) if robot is None else (robot.x_m, robot.y_m)

@@ -15,7 +15,7 @@ Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bystander:
+class FloorPlanBystander:
     """Place a person or a chair on the floor plan; `width_m` is what is seen of it."""
 
     kind: str
@@ -25,14 +25,14 @@ class Bystander:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Question:
+class SceneQuestion:
     """Hold the world as it is known, an image (rows, columns, RGB) or none, and a goal or none.
 
     `holding` tells which kind of thing each hand holds.
     """
 
     world: Snapshot
-    bystanders: tuple[Bystander, ...] = ()
+    bystanders: tuple[FloorPlanBystander, ...] = ()
     holding: Mapping[str, str | None] = field(default_factory=dict)
     image: Image | None = None
     goal: str = ""
@@ -41,7 +41,7 @@ class Question:
 class Analyser(Protocol):
     """Make an analysis of a question; it always gives one, and notes what it lacked."""
 
-    def analyse(self, question: Question) -> SceneAnalysis:
+    def analyse(self, question: SceneQuestion) -> SceneAnalysis:
         """Return the analysis."""
         ...
 
@@ -54,7 +54,7 @@ def question_of(
     holding: Mapping[str, str | None] | None = None,
     image: Image | None = None,
     goal: str = "",
-) -> Question:
+) -> SceneQuestion:
     """Return the question about a scene topic's document; `robot` is where it stands.
 
     Raises:
@@ -67,7 +67,7 @@ def question_of(
         else replace(thing, rests=rest_of(thing, world.things, world.surfaces))
         for thing in world.things
     ]  # fmt: skip
-    return Question(
+    return SceneQuestion(
         world=replace(world, things=tuple(rested)),
         bystanders=tuple(_bystander(one) for one in scene.get("bystanders", ())),
         holding=holding or {},
@@ -76,6 +76,8 @@ def question_of(
     )
 
 
-def _bystander(told: Mapping[str, Any]) -> Bystander:
+def _bystander(told: Mapping[str, Any]) -> FloorPlanBystander:
     x_m, y_m = (float(value) for value in told["position_m"][:2])
-    return Bystander(kind=str(told["class"]), x_m=x_m, y_m=y_m, width_m=float(told["width_m"]))
+    return FloorPlanBystander(
+        kind=str(told["class"]), x_m=x_m, y_m=y_m, width_m=float(told["width_m"])
+    )

@@ -7,7 +7,7 @@ from vla_deploy.analysis.claims import SceneClaims
 from vla_deploy.analysis.cross_check import weighed
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.prompt import chat_about
-from vla_deploy.analysis.question import Analyser, Question
+from vla_deploy.analysis.question import Analyser, SceneQuestion
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.picture import small_jpeg
@@ -39,7 +39,7 @@ class ServedAnalyser:
         self._within_s = within_s
         self._asker = StructuredAsker(server, SceneClaims)
 
-    def analyse(self, question: Question) -> SceneAnalysis:
+    def analyse(self, question: SceneQuestion) -> SceneAnalysis:
         """Return the analysis; `notes` say why where it is the measured one alone."""
         measured = self._measuring.analyse(question)
         picture = _picture_for(self._server.settings, question)
@@ -53,7 +53,7 @@ class ServedAnalyser:
         return _with_notes(analysis, picture.note)
 
 
-def _picture_for(settings: ServerSettings, question: Question) -> _Picture:
+def _picture_for(settings: ServerSettings, question: SceneQuestion) -> _Picture:
     if question.image is None:
         return _Picture(None, "no image to show")
     if not settings.vision:

@@ -12,7 +12,7 @@ from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.world import Query, Thing, UnknownWord, access_to, parse_query
-from vla_deploy.world.access import Access, Bar, Obstacle
+from vla_deploy.world.access import Bar, GraspAccess, Obstacle
 from vla_deploy.world.memory import still_there
 from vla_deploy.world.reach import stands_around
 from vla_deploy.world.relations import NEXT_TO
@@ -148,7 +148,7 @@ def _take(thing: Thing, hand: str, outlook: Outlook) -> None:
 
 
 def _clear(
-    obstacle: Obstacle, thing: Thing, access: Access, outlook: Outlook, belief: float
+    obstacle: Obstacle, thing: Thing, access: GraspAccess, outlook: Outlook, belief: float
 ) -> None:
     remedy = REMEDIES.get(obstacle.bar)
     outlook.obstacles.append(obstacle.why)

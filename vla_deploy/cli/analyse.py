@@ -9,7 +9,7 @@ from typing import Any, Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Analyser, Question
+from vla_deploy.analysis.question import Analyser, SceneQuestion
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.known_world import FRESH_S, running_robot, told_scene
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def ask(session: Session, goal: str) -> Question:
+def ask(session: Session, goal: str) -> SceneQuestion:
     """Return the question about what the robot tells of itself now.
 
     Raises:

@@ -13,7 +13,7 @@ from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tools.bench_link import THREE_TRIES
 from drivers.dynamixel.tools.travel import (
     JointRange,
-    Mounting,
+    ServoMounting,
     TravelLog,
     held_position,
     judge_reach,
@@ -48,7 +48,7 @@ class GuidedJoint:
     servo: ServoSpec
     range: JointRange
     limits: JointLimits
-    present: Mounting
+    present: ServoMounting
 
     @property
     def name(self) -> str:
@@ -75,7 +75,7 @@ class CalibrationGuide:
         self._clock = clock
         self._accept_sign = accept_sign
 
-    def by_ends(self, joint: GuidedJoint) -> Mounting:
+    def by_ends(self, joint: GuidedJoint) -> ServoMounting:
         """Measure a joint that the person moves from its lower to its upper end.
 
         Raises:
@@ -96,7 +96,7 @@ class CalibrationGuide:
         judge_sweep(expected, travel, names, accept_sign=self._accept_sign)
         return _reaching(joint, mounting_of_sweep(expected, first, travel))
 
-    def by_mark(self, joint: GuidedJoint, value: float) -> Mounting:
+    def by_mark(self, joint: GuidedJoint, value: float) -> ServoMounting:
         """Measure a joint that the person moves to a mark whose value is known.
 
         Raises:
@@ -106,7 +106,7 @@ class CalibrationGuide:
         self._person.wait(f"{joint.name}: move it to its mark for {value:g}, hold it", _nothing)
         return self.as_it_stands({joint: value})[joint.name]
 
-    def as_it_stands(self, values: Mapping[GuidedJoint, float]) -> dict[str, Mounting]:
+    def as_it_stands(self, values: Mapping[GuidedJoint, float]) -> dict[str, ServoMounting]:
         """Measure joints that stand at known values, all at once.
 
         Raises:
@@ -143,7 +143,7 @@ def _of(samples: Sequence[Mapping[int, int]], servo_id: int) -> list[int]:
     return [sample[servo_id] for sample in samples if servo_id in sample]
 
 
-def _reaching(joint: GuidedJoint, mounting: Mounting) -> Mounting:
+def _reaching(joint: GuidedJoint, mounting: ServoMounting) -> ServoMounting:
     judge_reach(joint.range, mounting, joint.limits.min, joint.limits.max)
     return mounting
 
@@ -152,7 +152,7 @@ def _nothing() -> None:
     return
 
 
-def in_words(joint: GuidedJoint, after: Mounting) -> str:
+def in_words(joint: GuidedJoint, after: ServoMounting) -> str:
     """Return what a calibration changes."""
     before = joint.present
     change = after.offset - before.offset

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tools.travel import JointRange, Mounting
+from drivers.dynamixel.tools.travel import JointRange, ServoMounting
 from vla_deploy.cli.calibration_guide import GuidedJoint
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.robots import RobotDescription
@@ -88,7 +88,7 @@ def guided_joints(robot: RobotDescription, names: Sequence[str]) -> list[GuidedJ
                     travel_per_rad=servo.travel_per_rad,
                 ),
                 limits=limits,
-                present=Mounting(sign=servo.sign, offset=servo.offset),
+                present=ServoMounting(sign=servo.sign, offset=servo.offset),
             )
         )
     return joints

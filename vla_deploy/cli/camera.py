@@ -22,11 +22,11 @@ from vla_deploy.cli.camera_images import (
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_command, add_top_command
-from vla_deploy.perception.camera_tools.board import View, write_board
+from vla_deploy.perception.camera_tools.board import BoardView, write_board
 from vla_deploy.perception.camera_tools.board_pose import board_pose, depth_ratio
 from vla_deploy.perception.camera_tools.hand_eye import HandEye, HeadView, fit_hand_eye
 from vla_deploy.perception.camera_tools.lens_fit import MODELS, LensFit, fit_lens
-from vla_deploy.perception.camera_tools.selecting import Selection, select
+from vla_deploy.perception.camera_tools.selecting import ViewSelection, select
 from vla_deploy.perception.rotation import angle_rad
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.camera_calibration import (
@@ -36,7 +36,7 @@ from vla_deploy.robots.camera_calibration import (
     write_lens,
     write_mounting,
 )
-from vla_deploy.robots.description import LensCalibration, Mounting
+from vla_deploy.robots.description import CameraMounting, LensCalibration
 from vla_deploy.robots.model import RobotModel
 
 TOOL: Final = "vla-deploy camera calibrate"
@@ -198,7 +198,7 @@ def _check_text(
 
 def _chosen(
     arguments: argparse.Namespace, robot: RobotDescription
-) -> tuple[dict[str, Shot], Selection]:
+) -> tuple[dict[str, Shot], ViewSelection]:
     """Return the images taken, by name, and the views that are of use."""
     shots: dict[str, Shot] = {}
 
@@ -208,14 +208,14 @@ def _chosen(
             shots[shot.name] = shot
             yield shot.name, shot.rgb
 
-    def tell(view: View) -> None:
+    def tell(view: BoardView) -> None:
         print(f"{view.name}: {len(view.pixels)} corners", file=sys.stderr)
 
     return shots, select(images(), board_of(arguments), enough=arguments.views, tell=tell)
 
 
 def _head_views(
-    robot: RobotDescription, shots: dict[str, Shot], views: tuple[View, ...]
+    robot: RobotDescription, shots: dict[str, Shot], views: tuple[BoardView, ...]
 ) -> list[HeadView]:
     model, found = RobotModel(robot), []
     for view in views:
@@ -241,9 +241,9 @@ def _as_lens(fit: LensFit) -> LensCalibration:
     )
 
 
-def _as_mounting(found: HandEye, robot: RobotDescription) -> Mounting:
+def _as_mounting(found: HandEye, robot: RobotDescription) -> CameraMounting:
     x, y, z = (round(float(value), 6) for value in found.site_from_camera[:3, 3])
-    return Mounting(
+    return CameraMounting(
         site=robot.camera.site,
         model=robot.camera.model,
         focal_px=robot.camera.intrinsics.fx,

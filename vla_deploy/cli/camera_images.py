@@ -15,10 +15,10 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.model_tools.detectors.images import image_paths, read_image
-from vla_deploy.perception.camera_tools.board import Board, Image
+from vla_deploy.perception.camera_tools.board import CalibrationBoard, Image
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.description import Camera
+from vla_deploy.robots.description import CameraDescription
 from vla_deploy.robots.model import full_positions
 from vla_deploy.robots.schema import is_number
 
@@ -55,7 +55,7 @@ def add_image_arguments(act: argparse.ArgumentParser) -> None:
 
 def add_board_arguments(act: argparse.ArgumentParser) -> None:
     """Add what describes the board."""
-    plain = Board()
+    plain = CalibrationBoard()
     act.add_argument("--columns", type=int, default=plain.columns, help="squares across")
     act.add_argument("--rows", type=int, default=plain.rows, help="squares down")
     act.add_argument(
@@ -66,21 +66,21 @@ def add_board_arguments(act: argparse.ArgumentParser) -> None:
     )
 
 
-def board_of(arguments: argparse.Namespace) -> Board:
+def board_of(arguments: argparse.Namespace) -> CalibrationBoard:
     """Return the board that the arguments describe.
 
     Raises:
         UsageError: there is no such board.
     """
     try:
-        return Board(
+        return CalibrationBoard(
             columns=arguments.columns, rows=arguments.rows, square_m=arguments.square_mm / 1000
         )
     except ValueError as error:
         raise UsageError(str(error)) from error
 
 
-def require_size(shot: Shot, camera: Camera) -> None:
+def require_size(shot: Shot, camera: CameraDescription) -> None:
     """Accept an image of the camera's size.
 
     Raises:

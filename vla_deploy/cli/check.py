@@ -12,7 +12,7 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
 from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.planning.dialects import parse_plan
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.planner import checked
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"robot {robot.name}: {len(robot.joint_names)} servos, {len(robot.places)} places: ok")
     print(f"profile {profile.name}: ok")
     if arguments.plan:
-        request = Request(command_id="", text="", world=world_of(robot, {}))
+        request = PlanRequest(command_id="", text="", world=world_of(robot, {}))
         plan = checked(parse_plan(read_plan(arguments.plan)), request)
         print(f"plan {arguments.plan}: {len(plan.actions)} actions: ok")
     return 0

@@ -14,10 +14,10 @@ from platforms import load_profile
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.install import (
-    Change,
+    ChangeKind,
     Credential,
-    Kind,
-    Layout,
+    FileChange,
+    InstallLayout,
     ServiceChoice,
     install_changes,
     system_files,
@@ -86,7 +86,7 @@ def add_layout_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print what is done as JSON")
 
 
-def layout_of(arguments: argparse.Namespace) -> Layout:
+def layout_of(arguments: argparse.Namespace) -> InstallLayout:
     """Return the layout that the arguments ask for.
 
     Raises:
@@ -94,7 +94,7 @@ def layout_of(arguments: argparse.Namespace) -> Layout:
     """
     if not arguments.prefix.is_absolute():
         raise UsageError(f"--prefix {arguments.prefix}: expected an absolute path")
-    layout = Layout(root=arguments.root.absolute(), prefix=arguments.prefix)
+    layout = InstallLayout(root=arguments.root.absolute(), prefix=arguments.prefix)
     if layout.is_this_computer and not arguments.dry_run and os.geteuid() != 0:
         raise UsageError(
             f"{arguments.command} changes this computer, which only root may: use sudo; "
@@ -152,7 +152,7 @@ def run_uninstall(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _refuse_strange_prefix(layout: Layout) -> None:
+def _refuse_strange_prefix(layout: InstallLayout) -> None:
     """Purge no folder that a mistyped prefix may name.
 
     Raises:
@@ -193,7 +193,7 @@ def _run(commands: Iterable[Command]) -> None:
 
 
 def _report(
-    arguments: argparse.Namespace, changes: tuple[Change, ...], commands: tuple[Command, ...]
+    arguments: argparse.Namespace, changes: tuple[FileChange, ...], commands: tuple[Command, ...]
 ) -> None:
     if arguments.json:
         files = [{"path": str(change.path), "change": change.kind.value} for change in changes]
@@ -201,7 +201,11 @@ def _report(
         return
     for change in changes:
         print(f"{change.kind.value}: {change.path}")
-        if arguments.dry_run and change.kind not in (Kind.SAME, Kind.FORGET, Kind.KEEP):
+        if arguments.dry_run and change.kind not in (
+            ChangeKind.SAME,
+            ChangeKind.FORGET,
+            ChangeKind.KEEP,
+        ):
             print("".join(_diff(change)), end="")
     for command in commands:
         print(f"run: {shlex.join(command)}")
@@ -209,7 +213,7 @@ def _report(
         print("nothing was changed: this was a dry run")
 
 
-def _diff(change: Change) -> Iterable[str]:
+def _diff(change: FileChange) -> Iterable[str]:
     return difflib.unified_diff(
         (change.before or "").splitlines(keepends=True),
         (change.after or "").splitlines(keepends=True),

@@ -22,15 +22,15 @@ from vla_deploy.inference.manifest import Fit, ModelFile
 from vla_deploy.inference.manifest_file import document_of
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.adding import DetectorSource, add_model
-from vla_deploy.model_tools.detectors.benching import Bench, bench
+from vla_deploy.model_tools.detectors.benching import ModelFigures, bench
 from vla_deploy.model_tools.detectors.images import read_image, spread_paths
 from vla_deploy.model_tools.detectors.labelled import read_labelled
 from vla_deploy.model_tools.detectors.quantising import quantise
 from vla_deploy.model_tools.detectors.trial import empty_images
 from vla_deploy.model_tools.published import WHISPERS
-from vla_deploy.model_tools.verifying import Finding, verify
+from vla_deploy.model_tools.verifying import ModelFinding, verify
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.runtime import default_base
 
@@ -191,7 +191,7 @@ def verify_models(arguments: argparse.Namespace) -> int:
     """Check models; return 1 when a check failed."""
     shelf = _shelf(arguments)
     profile = _profile(arguments)
-    findings: list[Finding] = []
+    findings: list[ModelFinding] = []
     for name in arguments.names or shelf.store.names():
         findings += verify(shelf, name, profile if _concerns(shelf, name, profile) else None)
     lines = [
@@ -229,7 +229,7 @@ def _profile(arguments: argparse.Namespace) -> Profile:
     return load_profile(arguments.profile or start_profile(arguments.runtime_base).name)
 
 
-def _choice(model: Model, profile: Profile) -> ModelChoice:
+def _choice(model: StoredModel, profile: Profile) -> ModelChoice:
     """Return what a profile says of the model's role; one that says nothing gets the CPU."""
     return profile.models.get(model.manifest.role, PLAIN_CHOICE)
 
@@ -295,7 +295,7 @@ def _row(shelf: ModelShelf, name: str, used_by: list[str]) -> dict[str, Any]:
     }
 
 
-def _weights(model: Model) -> tuple[ModelFile, ...]:
+def _weights(model: StoredModel) -> tuple[ModelFile, ...]:
     """Return the part of a model of several that its size is in."""
     endings = (".bin", ".onnx", ".data", "_data")
     return tuple(part for part in model.manifest.parts if part.path.endswith(endings))
@@ -323,7 +323,7 @@ def _short(used_by: list[str], most: int = 3) -> list[str]:
     return [*shown, f"{len(used_by) - most} more"] if len(used_by) > most else shown
 
 
-def _bench_text(figures: Bench) -> str:
+def _bench_text(figures: ModelFigures) -> str:
     head = (
         f"{'file':<10} {'provider':<26} {'run':>9} {'p95':>9} {'frame':>9} {'p95':>9} {'memory':>9}"
     )

@@ -12,7 +12,7 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.inference.language_schema import PLANNER
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.keeping import require_free
 from vla_deploy.model_tools.language_models import LanguageModelSource, add_language_model, bench
 from vla_deploy.model_tools.published import LANGUAGE_MODELS, PublishedModel
@@ -94,7 +94,7 @@ def _kept(
 
 
 def measure(
-    arguments: argparse.Namespace, shelf: ModelShelf, model: Model, profile: Profile
+    arguments: argparse.Namespace, shelf: ModelShelf, model: StoredModel, profile: Profile
 ) -> Told:
     """Measure what a language model costs."""
     choice: ModelChoice = profile.models.get(model.manifest.role, PLAIN_CHOICE)

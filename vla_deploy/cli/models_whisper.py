@@ -10,9 +10,9 @@ from typing import Any
 
 from platforms import ModelChoice, Profile
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.inference.manifest import Context, Whisper
+from vla_deploy.inference.manifest import EncoderContext, Whisper
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.published import WHISPERS, fetch
 from vla_deploy.model_tools.whisper_calibration import calibrate, keep, known_recordings
 from vla_deploy.model_tools.whispers import (
@@ -35,7 +35,7 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
         folder=arguments.whisper,
         whisper=Whisper(
             languages=tuple(arguments.languages.split(",")),
-            context=Context.TRIMMED if arguments.trimmed else Context.PADDED,
+            context=EncoderContext.TRIMMED if arguments.trimmed else EncoderContext.PADDED,
         ),
         summary=arguments.summary or "a recogniser that was added",
         licence=arguments.licence,
@@ -54,7 +54,7 @@ def fetch_whisper(
         source = WhisperSource(
             name=arguments.name,
             folder=folder,
-            whisper=Whisper(languages=("en",), context=Context.PADDED),
+            whisper=Whisper(languages=("en",), context=EncoderContext.PADDED),
             summary=published.summary,
             licence=licence,
         )
@@ -64,7 +64,7 @@ def fetch_whisper(
 
 
 def measure(
-    arguments: argparse.Namespace, shelf: ModelShelf, model: Model, profile: Profile
+    arguments: argparse.Namespace, shelf: ModelShelf, model: StoredModel, profile: Profile
 ) -> Told:
     """Measure what a Whisper costs."""
     choice: ModelChoice = profile.models.get(model.manifest.role, PLAIN_CHOICE)
@@ -98,7 +98,7 @@ def calibrate_whisper(arguments: argparse.Namespace, shelf: ModelShelf, profile:
     return dataclasses.asdict(done), text
 
 
-def _told(model: Model, silence: Transcript) -> Told:
+def _told(model: StoredModel, silence: Transcript) -> Told:
     name = model.manifest.name
     document: dict[str, object] = {
         "name": name,

@@ -19,7 +19,7 @@ from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.confirmation import confirmation_of
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
@@ -120,11 +120,11 @@ def _session(arguments: argparse.Namespace) -> Session | None:
         return None
 
 
-def _request(arguments: argparse.Namespace, robot: RobotDescription) -> Request:
+def _request(arguments: argparse.Namespace, robot: RobotDescription) -> PlanRequest:
     command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
     session = _session(arguments)
     if session is None:
-        request = Request(command_id="plan", text=command.text, world=world_of(robot, {}))
+        request = PlanRequest(command_id="plan", text=command.text, world=world_of(robot, {}))
     else:
         situation = Situation(session.space, session.clock, robot)
         request = situation.request(command, Conversation())

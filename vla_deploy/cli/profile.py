@@ -11,14 +11,14 @@ from drivers.clock import NS_PER_S
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
 from platforms.profile import PROFILES, profile_from, profile_names
-from platforms.profile_source import Source, flat, read_source
+from platforms.profile_source import ProfileSource, flat, read_source
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
+from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
 from vla_deploy.install.service_profile import slice_too_small
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profile_change import Outcome, Phase
+from vla_deploy.supervisor.profile_change import ChangeOutcome, ChangePhase
 from vla_deploy.supervisor.profile_choice import choice_of, detect, start_profile
 from vla_deploy.supervisor.runtime import default_base, running
 
@@ -176,7 +176,7 @@ def use_profile(arguments: argparse.Namespace) -> int:
         outcome = _request(session, name, arguments)
     finally:
         session.close()
-    if outcome["outcome"] not in (Outcome.KEPT, Outcome.WOULD_WORK):
+    if outcome["outcome"] not in (ChangeOutcome.KEPT, ChangeOutcome.WOULD_WORK):
         if arguments.json:
             sys.stdout.write(json.dumps(outcome, indent=2) + "\n")
         raise CommandFailed(f"profile {name} {outcome['outcome']}: {outcome['reason']}")
@@ -187,7 +187,7 @@ def use_profile(arguments: argparse.Namespace) -> int:
 def _warn_of_small_slice(arguments: argparse.Namespace, profile: Profile) -> None:
     """Say so where the service's control group was sized for a smaller profile."""
     is_service = (arguments.runtime_base or default_base()) == SERVICE_RUNTIME
-    warning = slice_too_small(profile, Layout()) if is_service else ""
+    warning = slice_too_small(profile, InstallLayout()) if is_service else ""
     if warning:
         sys.stderr.write(f"vla-deploy: {warning}\n")
 
@@ -197,7 +197,7 @@ def _choose(arguments: argparse.Namespace, name: str) -> int:
     PowerSwitch().check(load_profile(name).power_mode)
     if not arguments.dry_run:
         choice_of(arguments.runtime_base).save(name)
-    outcome = Outcome.WOULD_WORK if arguments.dry_run else Outcome.KEPT
+    outcome = ChangeOutcome.WOULD_WORK if arguments.dry_run else ChangeOutcome.KEPT
     document = {"profile": name, "outcome": outcome.value, "reason": "no robot runs"}
     return _tell(
         arguments, document, f"profile {name}: {outcome} for the next start; no robot runs"
@@ -237,12 +237,12 @@ def _request(session: Session, name: str, arguments: argparse.Namespace) -> dict
 
 
 _WORDS = {
-    Phase.PREPARE: "every process prepares",
-    Phase.SET_POWER: "setting the power mode",
-    Phase.COMMIT: "switching over",
-    Phase.WATCH: "watching rates, late ticks and memory",
-    Phase.VALIDATE: "judging",
-    Phase.ROLLBACK: "going back",
+    ChangePhase.PREPARE: "every process prepares",
+    ChangePhase.SET_POWER: "setting the power mode",
+    ChangePhase.COMMIT: "switching over",
+    ChangePhase.WATCH: "watching rates, late ticks and memory",
+    ChangePhase.VALIDATE: "judging",
+    ChangePhase.ROLLBACK: "going back",
 }
 
 
@@ -251,7 +251,7 @@ def _absolute(name: str) -> str:
     return str(Path(name).resolve()) if name.endswith(".toml") else name
 
 
-def _file(source: Source, key: str) -> str:
+def _file(source: ProfileSource, key: str) -> str:
     path = source.file_of(key)
     return path.name if path.is_relative_to(PROFILES) else str(path)
 

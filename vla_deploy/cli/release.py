@@ -16,9 +16,9 @@ from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.install import add_layout_arguments, layout_of
-from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
+from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
 from vla_deploy.install.manifest import installed_choice
-from vla_deploy.install.release_build import Source, add_release, version_of
+from vla_deploy.install.release_build import ReleaseSource, add_release, version_of
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import SystemdService
 from vla_deploy.install.switch import End, Switch, SwitchPlan, SwitchReport, recover
@@ -89,7 +89,7 @@ def _add(arguments: argparse.Namespace, store: ReleaseStore) -> int:
     checksum = hashlib.sha256(wheel.read_bytes()).hexdigest()[:_ID_DIGITS]
     release_id = arguments.id or f"{version}-{checksum}"
     if not arguments.dry_run:
-        source = Source(
+        source = ReleaseSource(
             wheel=wheel,
             wheelhouse=arguments.wheelhouse,
             system_packages=arguments.system_packages,
@@ -120,7 +120,9 @@ def _remove(arguments: argparse.Namespace, store: ReleaseStore) -> int:
 
 
 def _switch_to(release_id: str, arguments: argparse.Namespace, store: ReleaseStore) -> int:
-    choice = installed_choice(Layout(root=arguments.root.absolute(), prefix=arguments.prefix))
+    choice = installed_choice(
+        InstallLayout(root=arguments.root.absolute(), prefix=arguments.prefix)
+    )
     profile = arguments.profile or choice.profile or start_profile(SERVICE_RUNTIME).name
     plan = SwitchPlan(
         to=release_id,

@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.example import add_command, add_top_command
-from vla_deploy.model_servers.checking import Check, check_server
+from vla_deploy.model_servers.checking import ServerCheck, check_server
 from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import CredentialMissing
 from vla_deploy.model_servers.settings import ServerSettings
@@ -81,11 +81,11 @@ def _shelf(arguments: argparse.Namespace) -> ServerShelf:
     return ServerShelf.of_base(base, MonotonicClock())
 
 
-def _check(shelf: ServerShelf, name: str, ask: bool) -> Check:
+def _check(shelf: ServerShelf, name: str, ask: bool) -> ServerCheck:
     try:
         return check_server(shelf.open(name), ask)
     except CredentialMissing as error:
-        return Check(server=name, is_reachable=False, detail=str(error))
+        return ServerCheck(server=name, is_reachable=False, detail=str(error))
 
 
 def _row(shelf: ServerShelf, name: str, settings: ServerSettings) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def _key(shelf: ServerShelf, settings: ServerSettings) -> str:
     return "found"
 
 
-def _line(check: Check) -> str:
+def _line(check: ServerCheck) -> str:
     if not check.is_reachable:
         return f"FAIL {check.server}: {check.detail}"
     facts = {

@@ -11,7 +11,7 @@ from drivers.dynamixel.control_table import PULSES_PER_REV
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tools import BenchLink
 from drivers.dynamixel.tools.bench_link import ONE_TRY
-from drivers.dynamixel.tools.travel import Mounting, TravelRefused
+from drivers.dynamixel.tools.travel import ServoMounting, TravelRefused
 from drivers.errors import NoReply
 from vla_deploy.cli.calibration_guide import (
     CalibrationGuide,
@@ -166,7 +166,7 @@ class _Results:
         self._changes: list[dict[str, Any]] = []
 
     def keep(
-        self, joints: Sequence[GuidedJoint], found: Mapping[str, Mounting], method: str
+        self, joints: Sequence[GuidedJoint], found: Mapping[str, ServoMounting], method: str
     ) -> None:
         """Write what was found of some joints, and tell what it changes."""
         made_at = datetime.now(UTC).isoformat(timespec="seconds")
@@ -190,7 +190,7 @@ class _Results:
         return {"file": str(self._file), "joints": self._changes, "failed": list(failures)}
 
 
-def _change(joint: GuidedJoint, after: Mounting) -> dict[str, Any]:
+def _change(joint: GuidedJoint, after: ServoMounting) -> dict[str, Any]:
     return {
         "joint": joint.name,
         "servo_id": joint.servo.id,

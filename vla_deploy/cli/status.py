@@ -10,7 +10,7 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
-from vla_deploy.supervisor.profile_change import Outcome
+from vla_deploy.supervisor.profile_change import ChangeOutcome
 
 KEEPS_UP: Final = 0.95
 """Of real time: a twin that is slower is held by somebody."""
@@ -98,7 +98,7 @@ def _profile(status: dict[str, Any]) -> str:
         return "profile: unknown"
     change = f", on its way to {profile['target']}: {profile['phase']}" if profile["phase"] else ""
     last = profile["last"]
-    failed = last.get("outcome") in (Outcome.REFUSED, Outcome.ROLLED_BACK)
+    failed = last.get("outcome") in (ChangeOutcome.REFUSED, ChangeOutcome.ROLLED_BACK)
     refused = f" ({last['profile']} {last['outcome']}: {last['reason']})" if failed else ""
     fault = profile.get("fault") and f"\n  alarm: {profile['fault']}"
     return f"profile: {profile['profile']}{change}{refused}{fault or ''}"

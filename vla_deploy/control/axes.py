@@ -48,16 +48,16 @@ class AxisLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AxisState:
+class AxesState:
     """Carry each axis' position, velocity and acceleration at one time."""
 
     position: Floats
     velocity: Floats
     acceleration: Floats
 
-    def of(self, axes: Axes) -> "AxisState":
+    def of(self, axes: Axes) -> "AxesState":
         """Return the state of some axes."""
-        return AxisState(
+        return AxesState(
             position=self.position[axes],
             velocity=self.velocity[axes],
             acceleration=self.acceleration[axes],
@@ -65,7 +65,7 @@ class AxisState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Phase:
+class JerkSegments:
     """Carry the three constant-jerk segments of each velocity change, and what they cover."""
 
     durations: tuple[Floats, Floats, Floats]
@@ -74,7 +74,7 @@ class Phase:
     covered: Floats
 
 
-def velocity_phase(v0: Floats, a0: Floats, v1: Floats, limits: AxisLimits) -> Phase:
+def velocity_phase(v0: Floats, a0: Floats, v1: Floats, limits: AxisLimits) -> JerkSegments:
     """Return the fastest change from velocity v0 with acceleration a0 to v1 with none."""
     jerk = limits.jerk
     sign = np.where(v1 >= v0 + a0 * np.abs(a0) / (2.0 * jerk), 1.0, -1.0)
@@ -93,7 +93,7 @@ def velocity_phase(v0: Floats, a0: Floats, v1: Floats, limits: AxisLimits) -> Ph
         + t2 * 0.5 * (mid_v + late_v)
         + t3 * (late_v + peak_a * t3 / 3.0)
     )
-    return Phase(
+    return JerkSegments(
         durations=(t1, t2, t3),
         jerks=(j1, np.zeros_like(j1), j3),
         total_s=t1 + t2 + t3,

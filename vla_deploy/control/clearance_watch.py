@@ -9,7 +9,7 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.safety.clearance import (
     JointBounds,
     JointMotion,
-    Stopping,
+    StoppingMotion,
     beyond_box,
     least_distances,
     nearest_pair,
@@ -36,7 +36,7 @@ class ClearanceWatch:
         self._box_low = np.array([box.min_m for box in boxes.values()]).reshape(-1, 3)
         self._box_high = np.array([box.max_m for box in boxes.values()]).reshape(-1, 3)
         self._bounds = joint_bounds(robot)
-        self._ahead: tuple[Stopping, Survey] | None = None
+        self._ahead: tuple[StoppingMotion, Survey] | None = None
         self._compared: tuple[int, int, float, bool] | None = None
         self._surveys: tuple[Survey, Survey] | None = None
         self._self_m = robot.protection.clearance.self_m

@@ -14,7 +14,7 @@ class CommandRefused(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
+class JointGoal:
     """Ask joints to go to values, arriving together."""
 
     motion_id: int
@@ -47,7 +47,7 @@ class Cancel:
     motion_id: int
 
 
-Command = Goal | Waypoints | Cancel
+Command = JointGoal | Waypoints | Cancel
 
 
 def motion_id_of(payload: Mapping[str, Any]) -> int | None:
@@ -76,14 +76,14 @@ def parse_command(payload: Mapping[str, Any], joint_index: Mapping[str, int]) ->
             raise CommandRefused(f"kind: expected goal, trajectory or cancel, got {other!r}")
 
 
-def _goal(motion_id: int, payload: Mapping[str, Any], joint_index: Mapping[str, int]) -> Goal:
+def _goal(motion_id: int, payload: Mapping[str, Any], joint_index: Mapping[str, int]) -> JointGoal:
     targets = _table(payload, "targets")
     if not targets:
         raise CommandRefused("targets: expected at least one joint, got none")
     efforts = _table(payload, "effort_ratio") if "effort_ratio" in payload else {}
     axes = _axes(targets, joint_index)
     effort_axes = _axes(efforts, joint_index)
-    return Goal(
+    return JointGoal(
         motion_id=motion_id,
         axes=axes,
         target=np.array([_number(targets, joint) for joint in targets]),

@@ -9,7 +9,7 @@ from vla_deploy.control.axes import AxisLimits
 from vla_deploy.control.commands import (
     Cancel,
     CommandRefused,
-    Goal,
+    JointGoal,
     Waypoints,
     motion_id_of,
     parse_command,
@@ -63,11 +63,11 @@ class Dispatcher:
             return self._motions.cancel(command.motion_id)
         if refusal:
             raise CommandRefused(refusal)
-        if isinstance(command, Goal):
+        if isinstance(command, JointGoal):
             return self._start_goal(command)
         return self._start_waypoints(command)
 
-    def _start_goal(self, goal: Goal) -> list[MotionResult]:
+    def _start_goal(self, goal: JointGoal) -> list[MotionResult]:
         self._check_range(goal)
         efforts = {int(axis): goal.effort_ratio.get(int(axis), 1.0) for axis in goal.axes}
         if not self._servos.limit_effort(efforts):
@@ -95,7 +95,7 @@ class Dispatcher:
         most_nm = command.contact_ratio * self._contact_nm[command.axes]
         return TouchGuard(command.joints, most_nm)
 
-    def _check_range(self, goal: Goal) -> None:
+    def _check_range(self, goal: JointGoal) -> None:
         lower, upper = self._lower[goal.axes], self._upper[goal.axes]
         outside = (goal.target < lower - _ROUNDING) | (goal.target > upper + _ROUNDING)
         if outside.any():

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import can
 
-from drivers.canopen import EDS_PATH, DriveSpec, OperatingMode, WheelDriveBus
+from drivers.canopen import EDS_PATH, DriveMode, DriveSpec, WheelDriveBus
 from drivers.clock import Clock
 from drivers.drive_bus import DriveBus
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
@@ -20,7 +20,7 @@ def _cia402(wiring: CanBus, profile: Profile, bus: can.BusABC, clock: Clock) -> 
             sign=drive.sign,
             counts_per_rev=drive.counts_per_rev,
             gear_ratio=drive.gear_ratio,
-            mode=OperatingMode[drive.mode.upper()],
+            mode=DriveMode[drive.mode.upper()],
         )
         for drive in wiring.drives
     ]

@@ -8,7 +8,7 @@ from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.surroundings import SurroundingsWatch
 from vla_deploy.control.thresholds import safety_limits
 from vla_deploy.control.tick_recorder import TickRecorder
-from vla_deploy.control.watch import Watch
+from vla_deploy.control.watch import InputCollector
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
@@ -32,7 +32,7 @@ class Judging:
         self.verdict: Verdict = CLEAR
         self.tick = 0
         self.external_torque_nm: Floats | None = None
-        self.watch = Watch(space, servos, wheels, clock)
+        self.watch = InputCollector(space, servos, wheels, clock)
         self._servos = servos
         self._wheels = wheels
         self._surroundings = SurroundingsWatch(space, robot)

@@ -2,7 +2,7 @@
 
 from vla_deploy.control.arming import Arming
 from vla_deploy.control.motions import MotionResult, MotionSet
-from vla_deploy.control.operator_desk import Act
+from vla_deploy.control.operator_desk import OperatorAct
 from vla_deploy.control.refusal import refusal_in
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode
 from vla_deploy.control.stopping import Stopping
@@ -23,19 +23,25 @@ class Modes:
         self._motions = motions
 
     def step(
-        self, act: Act | None, verdict: Verdict, tick: int, *, at_rest: bool, estop_latched: bool
+        self,
+        act: OperatorAct | None,
+        verdict: Verdict,
+        tick: int,
+        *,
+        at_rest: bool,
+        estop_latched: bool,
     ) -> list[MotionResult]:
         """Do one tick's share, and return the motions that it ends."""
         before = self.mode
-        if act in (Act.ARM, Act.DISARM):
+        if act in (OperatorAct.ARM, OperatorAct.DISARM):
             self.notice = ""
         self.mode = next_mode(
             before,
             ModeInputs(
                 reaction=verdict.reaction,
                 latched=verdict.latched,
-                arm=act is Act.ARM,
-                disarm=act is Act.DISARM,
+                arm=act is OperatorAct.ARM,
+                disarm=act is OperatorAct.DISARM,
                 armed=self._arming.step() if before is Mode.ARMING else None,
                 at_rest=at_rest,
             ),
@@ -43,9 +49,9 @@ class Modes:
         ended: list[MotionResult] = []
         if self.mode is not before:
             ended = self._enter(before, verdict)
-        elif act is Act.ARM and self.mode is not Mode.ARMED:
+        elif act is OperatorAct.ARM and self.mode is not Mode.ARMED:
             self.notice = f"arm refused: {self.refusal(verdict, estop_latched=estop_latched)}"
-        elif act is Act.DISARM and before in AT_REST_MODES:
+        elif act is OperatorAct.DISARM and before in AT_REST_MODES:
             self._remove_power()
         return ended + self._attend_stop(verdict, tick)
 

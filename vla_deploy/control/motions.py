@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vla_deploy.control.axes import Axes, AxisLimits, AxisState, Flags, Floats
+from vla_deploy.control.axes import Axes, AxesState, AxisLimits, Flags, Floats
 from vla_deploy.control.profile_motion import plan_stop
 from vla_deploy.control.touch_guard import TouchGuard
 
@@ -21,7 +21,7 @@ class Curve(Protocol):
 
     duration_s: float
 
-    def sample(self, elapsed_s: float) -> AxisState:
+    def sample(self, elapsed_s: float) -> AxesState:
         """Return the state `elapsed_s` after the start."""
         ...
 
@@ -63,7 +63,7 @@ class MotionSet:
         count = len(limits.velocity)
         self._limits = limits
         self._motions: list[_Motion] = []
-        self.state = AxisState(
+        self.state = AxesState(
             position=np.zeros(count), velocity=np.zeros(count), acceleration=np.zeros(count)
         )
 

@@ -12,7 +12,7 @@ from vla_deploy.ipc import BY_NAME, CellReader, SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
 from vla_deploy.robots.protection import ZoneSource
-from vla_deploy.safety.zones import Motion, Points, moved
+from vla_deploy.safety.zones import BaseMotion, Points, moved
 
 # A lidar's ranges are off by a centimetre or two, and joints move while it turns.
 MASK_MARGIN_M = 0.03
@@ -48,7 +48,7 @@ class Nearby:
         self.due_s = 0.0
         self.fresh = False
 
-    def points(self, now_ns: int, position: Floats, motion: Motion) -> Points:
+    def points(self, now_ns: int, position: Floats, motion: BaseMotion) -> Points:
         """Return the newest points as seen from where the base is now; none once they are stale.
 
         `fresh` tells whether they came since the last call, `due_s` the age beyond which the next

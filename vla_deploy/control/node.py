@@ -17,10 +17,10 @@ from vla_deploy.control.judging import Judging
 from vla_deploy.control.lowering import LOWERING_S
 from vla_deploy.control.modes import AT_REST_MODES, Modes
 from vla_deploy.control.motions import MotionSet
-from vla_deploy.control.operator_desk import Act, OperatorDesk
+from vla_deploy.control.operator_desk import OperatorAct, OperatorDesk
 from vla_deploy.control.payload import Payload
 from vla_deploy.control.resetting import Resetting
-from vla_deploy.control.rest import Rest
+from vla_deploy.control.rest import Standstill
 from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode
@@ -59,7 +59,7 @@ class ControlNode:
         self._robot, self._profile, self._run_dir = robot, profile, context.run_dir
         self._tuning = tuning_of(profile)
         self._ticks = TickClock(self.period_s)
-        self._act: Act | None = None
+        self._act: OperatorAct | None = None
 
         space = SharedSpace(context.run_dir / "ipc", clock)
         self._payload = Payload(robot, space.cell_reader("executor_status"))
@@ -69,7 +69,7 @@ class ControlNode:
         self._joints = JointOutput(robot, self._motions, servos, self._payload)
         self._base = BaseOutput(robot, wheels)
         self._dispatcher = Dispatcher(robot, self._motions, servos)
-        self._rest = Rest()
+        self._rest = Standstill()
         self._resetting = Resetting(servos, wheels)
 
         self._button = EstopButton(robot, devices, clock)
@@ -190,7 +190,7 @@ class ControlNode:
 
     def _judge(self, now_ns: int) -> None:
         self._act = None if self._resetting.under_way else self._desk.next_act()
-        if self._act is Act.RESET:
+        if self._act is OperatorAct.RESET:
             self._modes.notice = self._resetting.begin(
                 now_ns,
                 stopping=self._modes.mode is Mode.STOPPING,

@@ -12,7 +12,7 @@ LATCHED_BEFORE = "latched before control was restarted"
 MOST_WAITING = 8
 
 
-class Act(Enum):
+class OperatorAct(Enum):
     """Name what a person may ask of control."""
 
     ESTOP = "estop"
@@ -38,7 +38,7 @@ class OperatorDesk:
         self._ring = ring
         self._button = button
         self._was_pressed = False
-        self._waiting: deque[Act] = deque()
+        self._waiting: deque[OperatorAct] = deque()
         self.estop_source: str | None = None
         self.complaint = ""
         self._recalled = self._recall(last_status)
@@ -57,7 +57,7 @@ class OperatorDesk:
             self._stop(LOST)
         self._look_at_button()
 
-    def next_act(self) -> Act | None:
+    def next_act(self) -> OperatorAct | None:
         """Return the next act other than an emergency stop."""
         return self._waiting.popleft() if self._waiting else None
 
@@ -66,7 +66,7 @@ class OperatorDesk:
         told_ns = -1 if last_status is None else last_status.stamp_ns
         held = self._ring.drain()
         since = [event for event in held if event.stamp_ns > told_ns]
-        pressed = [event for event in since if event.payload.get("act") == Act.ESTOP.value]
+        pressed = [event for event in since if event.payload.get("act") == OperatorAct.ESTOP.value]
         if pressed:
             return str(pressed[-1].payload.get("source", UNKNOWN))
         if self._ring.lost and since and since[0] is held[0]:
@@ -76,12 +76,12 @@ class OperatorDesk:
 
     def _take(self, name: object, source: str) -> None:
         try:
-            act = Act(name)
+            act = OperatorAct(name)
         except ValueError:
-            allowed = ", ".join(a.value for a in Act)
+            allowed = ", ".join(a.value for a in OperatorAct)
             self.complaint = f"operator act {name!r} from {source}: expected one of {allowed}"
             return
-        if act is Act.ESTOP:
+        if act is OperatorAct.ESTOP:
             self._stop(source)
         elif len(self._waiting) < MOST_WAITING:
             self._waiting.append(act)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.control.axes import (
+    AxesState,
     AxisLimits,
-    AxisState,
     Floats,
     stopping,
     velocity_phase,
@@ -38,7 +38,7 @@ def peak_from_rest(distance: Floats, limits: AxisLimits) -> tuple[Floats, Floats
     return np.copysign(speed, distance), 2.0 * phase_s + cruise_s
 
 
-def fastest_peak(start: AxisState, distance: Floats, limits: AxisLimits) -> tuple[Floats, Floats]:
+def fastest_peak(start: AxesState, distance: Floats, limits: AxisLimits) -> tuple[Floats, Floats]:
     """Return each axis' peak velocity and total time: the fastest of a cruise and of every root."""
 
     def missing(peak: Floats) -> tuple[Floats, Floats]:
@@ -58,7 +58,7 @@ def fastest_peak(start: AxisState, distance: Floats, limits: AxisLimits) -> tupl
 
 
 def slower_peak(
-    start: AxisState, distance: Floats, limits: AxisLimits, arrival_s: float
+    start: AxesState, distance: Floats, limits: AxisLimits, arrival_s: float
 ) -> tuple[Floats, Flags]:
     """Return the gentlest peak velocity that arrives at `arrival_s`, and where there is one."""
 
@@ -79,7 +79,7 @@ def cruise_s(left: Floats, peak: Floats) -> Floats:
     return np.where(still, np.inf, left / np.where(still, 1.0, peak))
 
 
-def _two_phases(start: AxisState, peak: Floats, limits: AxisLimits) -> tuple[Floats, Floats]:
+def _two_phases(start: AxesState, peak: Floats, limits: AxisLimits) -> tuple[Floats, Floats]:
     """Return distance and time from the start to `peak` and from there to rest."""
     speed_up = velocity_phase(start.velocity, start.acceleration, peak, limits)
     stop_s, stop_length = stopping(peak, limits)

@@ -11,7 +11,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from vla_deploy.control.axes import AxisLimits, AxisState, Flags, Floats, velocity_phase
+from vla_deploy.control.axes import AxesState, AxisLimits, Flags, Floats, velocity_phase
 from vla_deploy.control.peak_search import cruise_s, fastest_peak, peak_from_rest, slower_peak
 
 SEGMENTS = 7
@@ -21,7 +21,7 @@ _TINY = 1e-9
 class MotionProfile:
     """Hold piecewise constant-jerk motion of n axes that ends at rest on `target`."""
 
-    def __init__(self, start: AxisState, durations: Floats, jerks: Floats, target: Floats) -> None:
+    def __init__(self, start: AxesState, durations: Floats, jerks: Floats, target: Floats) -> None:
         """Integrate the segments, given as arrays of axis by segment, from `start`."""
         self.target = target
         self._ends = np.cumsum(durations, axis=1)
@@ -35,11 +35,11 @@ class MotionProfile:
         self._between = bisect_right(self._changes_s, 0.0)
         self._look_up(0.0)
 
-    def sample(self, elapsed_s: float) -> AxisState:
+    def sample(self, elapsed_s: float) -> AxesState:
         """Return the state `elapsed_s` after the start; the target at rest once it is over."""
         if elapsed_s >= self.duration_s:
             rest = np.zeros_like(self.target)
-            return AxisState(position=self.target, velocity=rest, acceleration=rest)
+            return AxesState(position=self.target, velocity=rest, acceleration=rest)
         between = bisect_right(self._changes_s, elapsed_s)
         if between != self._between:
             self._between = between
@@ -49,7 +49,7 @@ class MotionProfile:
         t = elapsed_s - begin
         half_jerk_t = 0.5 * jerk * t
         position = p + t * (v + t * (0.5 * a + half_jerk_t / 3.0))
-        return AxisState(
+        return AxesState(
             position=np.where(moving, position, self.target),
             velocity=(v + t * (a + half_jerk_t)) * moving,
             acceleration=(a + 2.0 * half_jerk_t) * moving,
@@ -62,7 +62,7 @@ class MotionProfile:
         self._moving: Flags = elapsed_s < self._axis_ends
 
 
-def plan_motion(start: AxisState, target: Floats, limits: AxisLimits) -> MotionProfile:
+def plan_motion(start: AxesState, target: Floats, limits: AxisLimits) -> MotionProfile:
     """Return the fastest motion to rest on `target` in which all moving axes arrive together.
 
     The limits hold throughout when the start can keep them; a start beyond them is brought back
@@ -85,7 +85,7 @@ def plan_motion(start: AxisState, target: Floats, limits: AxisLimits) -> MotionP
     return MotionProfile(start, durations * stretch[:, None], jerks / stretch[:, None] ** 3, target)
 
 
-def plan_stop(start: AxisState, limits: AxisLimits) -> MotionProfile:
+def plan_stop(start: AxesState, limits: AxisLimits) -> MotionProfile:
     """Return the fastest jerk-limited motion to rest, wherever that ends."""
     rest = np.zeros_like(start.velocity)
     phase = velocity_phase(start.velocity, start.acceleration, rest, limits)
@@ -95,7 +95,7 @@ def plan_stop(start: AxisState, limits: AxisLimits) -> MotionProfile:
 
 
 def _segments(
-    start: AxisState, peak: Floats, distance: Floats, limits: AxisLimits
+    start: AxesState, peak: Floats, distance: Floats, limits: AxisLimits
 ) -> tuple[Floats, Floats]:
     """Return durations and jerks as arrays of axis by segment."""
     rest = np.zeros_like(peak)
@@ -107,7 +107,7 @@ def _segments(
     return durations, np.stack([*speed_up.jerks, rest, *slow_down.jerks], axis=1)
 
 
-def _integrate(start: AxisState, durations: Floats, jerks: Floats) -> Floats:
+def _integrate(start: AxesState, durations: Floats, jerks: Floats) -> Floats:
     """Return position, velocity and acceleration at the start of each segment."""
     states = np.empty((3, *durations.shape))
     p, v, a = start.position, start.velocity, start.acceleration

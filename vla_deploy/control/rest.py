@@ -7,7 +7,7 @@ from drivers.clock import NS_PER_S
 TURN_ON_NS: Final = 2 * NS_PER_S  # longer than any wheel brakes after its setpoint rests
 
 
-class Rest:
+class Standstill:
     """Follow how long nothing has been told to move.
 
     Wheels that still turn two seconds later do not keep a stop from ending: from then on their

@@ -23,7 +23,7 @@ from vla_deploy.robots.model import RobotModel
 from vla_deploy.safety.balance import tip_margin_ratio
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings
-from vla_deploy.safety.zones import Footprint, Motion, braking_m
+from vla_deploy.safety.zones import BaseMotion, Footprint, braking_m
 
 BASE_REACTION_S = 0.1
 # Of each new sample, 10 times a second: a low-pass of 0.1 s.
@@ -38,7 +38,7 @@ class _Body:
     position: Floats
     velocity: Floats
     setpoint: Floats
-    motion: Motion
+    motion: BaseMotion
 
 
 @dataclass(slots=True)
@@ -104,7 +104,7 @@ class SurroundingsWatch:
         if now_ns >= part.due_ns and _is_known(position) and _is_known(velocity):
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
             deceleration = self._robot.base.max_acceleration_m_s2
-            motion = Motion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
+            motion = BaseMotion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
             part.work(_Body(now_ns, position, velocity, setpoint, motion))
         return self._known
 
@@ -155,7 +155,7 @@ class SurroundingsWatch:
             keep_out = judge_keep_out(areas, self._footprint, body.motion, BASE_REACTION_S)
         self._known = replace(self._known, keep_out=keep_out, pose_age_s=age_s)
 
-    def _areas_near(self, x_m: float, y_m: float, motion: Motion) -> list[tuple[str, Floats]]:
+    def _areas_near(self, x_m: float, y_m: float, motion: BaseMotion) -> list[tuple[str, Floats]]:
         """Leave out the areas that the footprint cannot be in before it stands."""
         around_m = self._footprint.radius_m + braking_m(motion, BASE_REACTION_S)
         return [

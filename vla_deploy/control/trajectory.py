@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.control.axes import AxisLimits, AxisState, Floats
+from vla_deploy.control.axes import AxesState, AxisLimits, Floats
 
 MAX_POINTS = 256
 # Waypoints planned in another process may touch a limit; this share above it is still followed.
@@ -28,15 +28,15 @@ class Trajectory:
         self._times = times_s
         self._coefficients = _spline(times_s, positions, start_velocity)
 
-    def sample(self, elapsed_s: float) -> AxisState:
+    def sample(self, elapsed_s: float) -> AxesState:
         """Return the state `elapsed_s` after the start; the last point at rest once it is over."""
         if elapsed_s >= self.duration_s:
             rest = np.zeros_like(self.target)
-            return AxisState(position=self.target, velocity=rest, acceleration=rest)
+            return AxesState(position=self.target, velocity=rest, acceleration=rest)
         segment = max(int(np.searchsorted(self._times, elapsed_s, side="right")) - 1, 0)
         t = elapsed_s - self._times[segment]
         c0, c1, c2, c3 = self._coefficients[:, segment]
-        return AxisState(
+        return AxesState(
             position=c0 + t * (c1 + t * (c2 + t * c3)),
             velocity=c1 + t * (2.0 * c2 + 3.0 * t * c3),
             acceleration=2.0 * c2 + 6.0 * t * c3,
@@ -62,7 +62,7 @@ def plan_trajectory(
     joints: Sequence[str],
     times_s: Floats,
     positions: Floats,
-    start: AxisState,
+    start: AxesState,
     limits: AxisLimits,
     position_range: tuple[Floats, Floats],
     start_tolerance: Floats,

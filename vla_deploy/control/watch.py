@@ -16,7 +16,7 @@ _OVER_S = 1.0
 _NO_REASON = "a budget is exhausted"
 
 
-class Watch:
+class InputCollector:
     """Read the cells that control depends on, and put a tick's measurements together."""
 
     def __init__(self, space: SharedSpace, servos: ServoLine, wheels: Wheels, clock: Clock) -> None:

@@ -15,10 +15,10 @@ from vla_deploy.robots.protection import Zone, ZoneSource
 from vla_deploy.safety.surroundings import ZoneFinding
 from vla_deploy.safety.zones import (
     IDLE,
+    BaseMotion,
     Footprint,
-    Motion,
     Points,
-    Trigger,
+    ZoneMemory,
     braking_m,
     judge_zone,
 )
@@ -43,7 +43,7 @@ class ZoneWatch:
         self._zones = robot.protection.zones
         self._footprint = footprint
         self._nearby = {source: Nearby(source, space, robot, model, body) for source in ZoneSource}
-        self._triggers: dict[str, Trigger] = {}
+        self._triggers: dict[str, ZoneMemory] = {}
         self._stands = False
         self._radius_m = robot.base.footprint_radius_m
         self._reach_m = reaches_m(robot)
@@ -63,7 +63,7 @@ class ZoneWatch:
         """Return the age beyond which the depth camera is overdue at its own rate."""
         return self._nearby[ZoneSource.DEPTH].due_s
 
-    def look(self, now_ns: int, position: Floats, motion: Motion) -> None:
+    def look(self, now_ns: int, position: Floats, motion: BaseMotion) -> None:
         """Judge all zones; nothing new around a base that stands leaves them as they were."""
         points = {
             source: nearby.points(now_ns, position, motion)
@@ -79,7 +79,7 @@ class ZoneWatch:
         for nearby in self._nearby.values():
             nearby.close()
 
-    def _judge(self, points: dict[ZoneSource, Points], motion: Motion) -> list[ZoneFinding]:
+    def _judge(self, points: dict[ZoneSource, Points], motion: BaseMotion) -> list[ZoneFinding]:
         distances2 = {source: (seen**2).sum(axis=1) for source, seen in points.items()}
         nearest_m = {
             source: math.sqrt(seen2.min(initial=math.inf)) for source, seen2 in distances2.items()
@@ -114,7 +114,7 @@ class ZoneWatch:
 def reaches_m(robot: RobotDescription) -> dict[str, float]:
     """Return how far from the base's centre a point can matter to each zone."""
     base = robot.base
-    top = Motion(
+    top = BaseMotion(
         v_m_s=_FASTEST_RATIO * base.max_speed_m_s,
         w_rad_s=0.0,
         deceleration_m_s2=base.max_acceleration_m_s2,
@@ -124,7 +124,7 @@ def reaches_m(robot: RobotDescription) -> dict[str, float]:
     }
 
 
-def reach_m(zone: Zone, motion: Motion, footprint_radius_m: float) -> float:
+def reach_m(zone: Zone, motion: BaseMotion, footprint_radius_m: float) -> float:
     """Return how far from the base's centre a point can matter to a zone in that motion."""
     corner_m = max((math.hypot(x, y) for x, y in zone.polygon_m), default=footprint_radius_m)
     driven_m = abs(motion.v_m_s) * zone.time_before_collision_s

@@ -9,7 +9,7 @@ from threading import Lock
 from typing import Any, Final
 
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.analysis.question import Analyser, Image, SceneQuestion, question_of
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.errors import Refused
@@ -67,7 +67,7 @@ class Analyst:
 
 def question_about(
     link: RobotLink, scene: dict[str, Any], goal: str, image: Image | None = None
-) -> Question:
+) -> SceneQuestion:
     """Return a question about a scene, with where the robot is and what it holds now.
 
     Raises:

@@ -1,15 +1,15 @@
 """Examine the computer and tell what keeps the stack from running well, with the remedy."""
 
-from vla_deploy.doctor.context import Context, live_context, recorded_context
-from vla_deploy.doctor.finding import Finding, Level
+from vla_deploy.doctor.context import DoctorContext, live_context, recorded_context
+from vla_deploy.doctor.finding import DoctorFinding, FindingLevel
 from vla_deploy.doctor.report import as_document, as_text, succeeded
 from vla_deploy.doctor.table import CHECKS, Section, examine
 
 __all__ = [
     "CHECKS",
-    "Context",
-    "Finding",
-    "Level",
+    "DoctorContext",
+    "DoctorFinding",
+    "FindingLevel",
     "Section",
     "as_document",
     "as_text",

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, ok, warn
-from vla_deploy.robots.description import LensCalibration, Mounting
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, ok, warn
+from vla_deploy.robots.description import CameraMounting, LensCalibration
 
 
-def camera_calibration(context: Context) -> Iterator[Finding]:
+def camera_calibration(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell whether lens and mounting of the robot's camera were calibrated, and how well."""
     if context.robot is None:
         return
@@ -18,7 +18,7 @@ def camera_calibration(context: Context) -> Iterator[Finding]:
     yield _mounting(camera.mounting, name)
 
 
-def _lens(lens: LensCalibration | None, name: str) -> Finding:
+def _lens(lens: LensCalibration | None, name: str) -> DoctorFinding:
     if lens is None:
         remedy = f"vla-deploy camera calibrate --robot {name}"
         return warn("camera lens", "as the camera itself tells it, never measured", remedy)
@@ -28,7 +28,7 @@ def _lens(lens: LensCalibration | None, name: str) -> Finding:
     return ok("camera lens", f"calibrated {made_at}, f {lens.intrinsics.fx:.1f} px, {error}")
 
 
-def _mounting(mounting: Mounting | None, name: str) -> Finding:
+def _mounting(mounting: CameraMounting | None, name: str) -> DoctorFinding:
     if mounting is None:
         remedy = f"vla-deploy camera hand-eye --robot {name}"
         return warn("camera mounting", "as the MJCF draws it, never measured", remedy)

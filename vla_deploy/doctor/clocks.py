@@ -5,9 +5,9 @@ import struct
 from collections.abc import Iterator
 from typing import Final
 
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, ok, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, ok, warn
 
 GOOD_SOURCES: Final = frozenset({"tsc", "arch_sys_counter", "kvm-clock"})
 JUMP_S: Final = 5.0
@@ -22,7 +22,7 @@ _BOOT_TIME: Final = 2
 _SECONDS: Final = 9
 
 
-def clock_source(context: Context) -> Iterator[Finding]:
+def clock_source(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that time is read from the processor's own counter."""
     folder = "/sys/devices/system/clocksource/clocksource0"
     source = context.tree.text(f"{folder}/current_clocksource")
@@ -33,7 +33,7 @@ def clock_source(context: Context) -> Iterator[Finding]:
         yield warn("clock source", f"{source}: reading the time is slow", remedy)
 
 
-def wall_time(context: Context) -> Iterator[Finding]:
+def wall_time(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the wall clock follows a time server."""
     del context
     library = ctypes.CDLL(None, use_errno=True)
@@ -48,7 +48,7 @@ def wall_time(context: Context) -> Iterator[Finding]:
         yield ok("wall time", "follows a time server")
 
 
-def jump_since_boot(context: Context) -> Iterator[Finding]:
+def jump_since_boot(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Compare the time of boot as it was noted then with what it is by today's wall clock."""
     noted_s, now_s = _noted_boot_s(context), _boot_s(context)
     jump_s = now_s - noted_s
@@ -59,23 +59,23 @@ def jump_since_boot(context: Context) -> Iterator[Finding]:
         yield warn("jump since boot", measured, "sudo hwclock --systohc   # and check its battery")
 
 
-def _noted_boot_s(context: Context) -> float:
+def _noted_boot_s(context: DoctorContext) -> float:
     try:
         content = (context.tree.root / "run/utmp").read_bytes()
     except OSError as error:
-        raise Missing(f"/run/utmp does not note it: {error.strerror}") from error
+        raise ValueMissing(f"/run/utmp does not note it: {error.strerror}") from error
     for layout in _UTMP:
         if len(content) % layout.size:
             continue
         for record in layout.iter_unpack(content):
             if record[0] == _BOOT_TIME:
                 return float(record[_SECONDS])
-    raise Missing("/run/utmp does not note the boot")
+    raise ValueMissing("/run/utmp does not note the boot")
 
 
-def _boot_s(context: Context) -> float:
+def _boot_s(context: DoctorContext) -> float:
     for line in context.tree.text("/proc/stat").splitlines():
         key, _, value = line.partition(" ")
         if key == "btime" and value.isdecimal():
             return float(value)
-    raise Missing("/proc/stat tells no btime")
+    raise ValueMissing("/proc/stat tells no btime")

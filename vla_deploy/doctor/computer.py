@@ -3,15 +3,15 @@
 import os
 from collections.abc import Iterator
 
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, ok, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, ok, warn
 
 _GB = 1e9
 _MB = 1e6
 
 
-def board(context: Context) -> Iterator[Finding]:
+def board(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Name the board and its release."""
     found = context.board
     release = f", JetPack {found.jetpack or 'unknown'} (L4T {found.l4t})" if found.l4t else ""
@@ -22,12 +22,12 @@ def board(context: Context) -> Iterator[Finding]:
         yield ok("board", f"{found.name}{module}{release}")
 
 
-def user(context: Context) -> Iterator[Finding]:
+def user(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell whose rights are examined: the service has its own user."""
     yield ok("examined as", "root" if context.rights.uid == 0 else f"user {context.rights.uid}")
 
 
-def profile(context: Context) -> Iterator[Finding]:
+def profile(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Compare the profile in use with the one made for this board."""
     made, used = context.board.profile_name, context.profile
     if context.profile_fault:
@@ -42,10 +42,10 @@ def profile(context: Context) -> Iterator[Finding]:
         )
 
 
-def memory(context: Context) -> Iterator[Finding]:
+def memory(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Compare processors and memory with what the profile needs."""
     if context.board.memory_bytes is None:
-        raise Missing("; ".join(one for one in context.board.reasons if "memory" in one))
+        raise ValueMissing("; ".join(one for one in context.board.reasons if "memory" in one))
     cpus = os.cpu_count() if context.is_live else None
     measured = f"{context.board.memory_bytes / _GB:.1f} GB" + (f", {cpus} CPUs" if cpus else "")
     needs = None if context.profile is None else context.profile.board

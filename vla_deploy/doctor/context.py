@@ -11,7 +11,7 @@ from typing import Final
 from drivers.clock import Clock, MonotonicClock
 from platforms import Profile
 from platforms.board import Board, identify
-from platforms.tree import Missing, Tree
+from platforms.tree import Tree, ValueMissing
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.state_dir import system_models_dir
@@ -39,7 +39,7 @@ class Rights:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Context:
+class DoctorContext:
     """Hold everything that the checks look at; `is_live` is False for a recorded tree.
 
     `profile_fault` tells why the profile is not the chosen one.
@@ -62,9 +62,9 @@ def live_context(
     robot: RobotDescription | None,
     models: Path,
     profile_fault: str = "",
-) -> Context:
+) -> DoctorContext:
     """Return this very computer; `models` is where a person has added some, beside root's."""
-    return Context(
+    return DoctorContext(
         tree=Tree(),
         is_live=True,
         board=identify(),
@@ -80,9 +80,9 @@ def live_context(
 
 def recorded_context(
     root: Path, profile: Profile | None, robot: RobotDescription | None
-) -> Context:
+) -> DoctorContext:
     """Return a recorded tree; nothing is measured or asked, as that would be another computer."""
-    return Context(
+    return DoctorContext(
         tree=Tree(root),
         is_live=False,
         board=identify(root),
@@ -120,15 +120,15 @@ def ask_command(command: Sequence[str]) -> str:
             command, capture_output=True, text=True, timeout=COMMAND_TIMEOUT_S, check=False
         )
     except (OSError, subprocess.TimeoutExpired, UnicodeDecodeError) as error:
-        raise Missing(f"`{' '.join(command)}` gives nothing: {error}") from error
+        raise ValueMissing(f"`{' '.join(command)}` gives nothing: {error}") from error
     if done.returncode:
         words = (done.stderr.strip() or done.stdout.strip()).splitlines() or [f"{done.returncode}"]
-        raise Missing(f"`{Path(command[0]).name}` says: {words[-1]}")
+        raise ValueMissing(f"`{Path(command[0]).name}` says: {words[-1]}")
     return done.stdout
 
 
 def _ask_nobody(command: Sequence[str]) -> str:
-    raise Missing(f"`{command[0]}` is not asked about a recorded tree")
+    raise ValueMissing(f"`{command[0]}` is not asked about a recorded tree")
 
 
 def _try_fifo() -> str:
@@ -144,7 +144,7 @@ def _try_fifo() -> str:
 def _capabilities() -> int:
     try:
         status = Tree().text("/proc/self/status")
-    except Missing:
+    except ValueMissing:
         return 0
     row = next((line for line in status.splitlines() if line.startswith("CapEff:")), "CapEff: 0")
     return int(row.split()[1], 16)

@@ -8,8 +8,8 @@ from vla_deploy.dashboard.doors import open_port
 from vla_deploy.dashboard.errors import PortTaken, SettingsInvalid, TlsUnusable
 from vla_deploy.dashboard.settings import SETTINGS_FILE, DashboardSettings, read_settings
 from vla_deploy.dashboard.tls import server_context
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, ok, warn
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, ok, warn
 from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.runtime import default_base, running
 
@@ -17,7 +17,7 @@ _NAME: Final = "dashboard"
 _LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
-def dashboard(context: Context) -> Iterator[Finding]:
+def dashboard(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check settings, ports and certificate of whoever runs the robot on this computer."""
     base = default_base()
     file = config_dir_of(base) / SETTINGS_FILE
@@ -30,7 +30,7 @@ def dashboard(context: Context) -> Iterator[Finding]:
     yield from _encryption(settings, file)
 
 
-def _ports(settings: DashboardSettings, *, is_running: bool) -> Iterator[Finding]:
+def _ports(settings: DashboardSettings, *, is_running: bool) -> Iterator[DoctorFinding]:
     for name, port in (("page", settings.port), ("stop door", settings.stop_port)):
         label = f"{_NAME}, {name}"
         if is_running:
@@ -44,7 +44,7 @@ def _ports(settings: DashboardSettings, *, is_running: bool) -> Iterator[Finding
             yield ok(label, f"{settings.host}:{port} is free")
 
 
-def _encryption(settings: DashboardSettings, file: Path) -> Iterator[Finding]:
+def _encryption(settings: DashboardSettings, file: Path) -> Iterator[DoctorFinding]:
     """Check that passwords do not travel in the clear, and that the certificate can be read."""
     if settings.scheme == "http":
         if settings.host not in _LOOPBACK:

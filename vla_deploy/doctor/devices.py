@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, trouble, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble, warn
 from vla_deploy.robots import RobotDescription
 
 LATENCY_MS: Final = 1
@@ -20,7 +20,7 @@ _GOOD_CAN_STATES: Final = frozenset({"ERROR-ACTIVE"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Node:
+class DeviceNode:
     """Name one device file of a robot, its group, and the access that its driver needs."""
 
     name: str
@@ -41,7 +41,7 @@ _GROUPS: Mapping[str, str] = {
 _READ_ONLY: Final = frozenset({"estop"})
 
 
-def device_files(context: Context) -> Iterator[Finding]:
+def device_files(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that each device file of the robot is there and open to us."""
     if context.robot is None:
         yield missing("devices", "no robot was named", _NAME_ONE)
@@ -50,15 +50,15 @@ def device_files(context: Context) -> Iterator[Finding]:
         yield _judged(context, node)
 
 
-def _nodes(robot: RobotDescription) -> Iterator[Node]:
+def _nodes(robot: RobotDescription) -> Iterator[DeviceNode]:
     for attribute, group in _GROUPS.items():
         device = getattr(robot, attribute)
         if device is not None and device.path.startswith("/"):
             access = os.R_OK if attribute in _READ_ONLY else _OS_ACCESS
-            yield Node(name=device.device, path=device.path, group=group, access=access)
+            yield DeviceNode(name=device.device, path=device.path, group=group, access=access)
 
 
-def _judged(context: Context, node: Node) -> Finding:
+def _judged(context: DoctorContext, node: DeviceNode) -> DoctorFinding:
     path = context.tree.root / node.path.lstrip("/")
     folder, _, file = node.path.rpartition("/")
     if not os.access(path, os.F_OK, effective_ids=True):
@@ -78,7 +78,7 @@ def _group(path: Path, usual: str) -> str:
     return usual if owner == "root" else owner
 
 
-def latency_timers(context: Context) -> Iterator[Finding]:
+def latency_timers(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check how long FTDI adapters wait for more bytes before they hand over what they have."""
     folder = "/sys/bus/usb-serial/devices"
     for port in context.tree.names(folder):
@@ -88,7 +88,7 @@ def latency_timers(context: Context) -> Iterator[Finding]:
         name = f"{port} latency"
         try:
             wait_ms = context.tree.number(path)
-        except Missing as gone:
+        except ValueMissing as gone:
             yield missing(name, str(gone))
             continue
         judge = ok(name, f"{wait_ms:g} ms")
@@ -97,14 +97,14 @@ def latency_timers(context: Context) -> Iterator[Finding]:
         yield judge
 
 
-def _late_adapter(context: Context, name: str, wait_ms: float, path: str) -> Finding:
+def _late_adapter(context: DoctorContext, name: str, wait_ms: float, path: str) -> DoctorFinding:
     rate_hz = context.profile.control_rate_hz if context.profile else 250.0
     measured = f"{wait_ms:g} ms, expected {LATENCY_MS} ms at {rate_hz:g} Hz"
     remedy = f"echo {LATENCY_MS} | sudo tee {path}"
     return trouble(name, measured, remedy, fatal=wait_ms >= 1000 / rate_hz)
 
 
-def can_link(context: Context) -> Iterator[Finding]:
+def can_link(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the wheel drives' CAN link is up, in good health, and has the right bit rate."""
     if context.robot is None:
         return
@@ -119,7 +119,7 @@ def can_link(context: Context) -> Iterator[Finding]:
         yield _link(context, name, bitrate, up)
 
 
-def _link(context: Context, name: str, bitrate: int, up: str) -> Finding:
+def _link(context: DoctorContext, name: str, bitrate: int, up: str) -> DoctorFinding:
     try:
         link = json.loads(context.ask(("ip", "-details", "-json", "link", "show", name)))[0]
         data: dict[str, Any] = link["linkinfo"].get("info_data", {})
@@ -139,7 +139,7 @@ def _link(context: Context, name: str, bitrate: int, up: str) -> Finding:
     return ok("CAN link", f"{name} is {state} at {bitrate} bit/s")
 
 
-def sound(context: Context) -> Iterator[Finding]:
+def sound(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the sound cards that the robot file names are there."""
     robot = context.robot
     devices = [] if robot is None else [one for one in (robot.microphone, robot.speaker) if one]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Level(StrEnum):
+class FindingLevel(StrEnum):
     """Grade a finding; `missing` means that it could not be found out, or is not installed."""
 
     OK = "ok"
@@ -14,35 +14,35 @@ class Level(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class DoctorFinding:
     """Hold one line; `remedy` is a command to type, empty where nothing needs one."""
 
     name: str
-    level: Level
+    level: FindingLevel
     measured: str
     remedy: str = ""
 
 
-def ok(name: str, measured: str) -> Finding:
+def ok(name: str, measured: str) -> DoctorFinding:
     """Return a finding that needs nothing."""
-    return Finding(name=name, level=Level.OK, measured=measured)
+    return DoctorFinding(name=name, level=FindingLevel.OK, measured=measured)
 
 
-def warn(name: str, measured: str, remedy: str) -> Finding:
+def warn(name: str, measured: str, remedy: str) -> DoctorFinding:
     """Return a finding under which the stack runs, but not as it should."""
-    return Finding(name=name, level=Level.WARN, measured=measured, remedy=remedy)
+    return DoctorFinding(name=name, level=FindingLevel.WARN, measured=measured, remedy=remedy)
 
 
-def fail(name: str, measured: str, remedy: str) -> Finding:
+def fail(name: str, measured: str, remedy: str) -> DoctorFinding:
     """Return a finding that keeps the stack from running."""
-    return Finding(name=name, level=Level.FAIL, measured=measured, remedy=remedy)
+    return DoctorFinding(name=name, level=FindingLevel.FAIL, measured=measured, remedy=remedy)
 
 
-def trouble(name: str, measured: str, remedy: str, *, fatal: bool) -> Finding:
+def trouble(name: str, measured: str, remedy: str, *, fatal: bool) -> DoctorFinding:
     """Return a failure where it is `fatal` to what the profile promises, else a warning."""
     return fail(name, measured, remedy) if fatal else warn(name, measured, remedy)
 
 
-def missing(name: str, why: str, remedy: str = "") -> Finding:
+def missing(name: str, why: str, remedy: str = "") -> DoctorFinding:
     """Return a finding that could not be made."""
-    return Finding(name=name, level=Level.MISSING, measured=why, remedy=remedy)
+    return DoctorFinding(name=name, level=FindingLevel.MISSING, measured=why, remedy=remedy)

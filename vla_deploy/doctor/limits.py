@@ -7,13 +7,13 @@ from typing import Final
 from platforms.probes import Cgroup, read_cgroup
 from platforms.probes.cgroup import MOUNT, UNIFIED
 from vla_deploy.doctor.boot import boot_option
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, ok, warn
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, ok, warn
 from vla_deploy.doctor.realtime import has_group_scheduling, wanted_priority
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class SystemLimit:
     """Name the file that sets a limit, what it limits, and what takes its place where it is not."""
 
     file: str
@@ -21,18 +21,18 @@ class Limit:
     instead: str
 
 
-CONTROLLERS: Mapping[str, Limit] = {
-    "cpu": Limit("cpu.max", "processor time", "nice and affinity"),
-    "memory": Limit("memory.max", "memory", "rlimits and the ladder"),
-    "cpuset": Limit("cpuset.cpus", "which processors", "affinity"),
-    "io": Limit("io.max", "disk traffic", "nothing"),
-    "pids": Limit("pids.max", "number of processes", "rlimits"),
+CONTROLLERS: Mapping[str, SystemLimit] = {
+    "cpu": SystemLimit("cpu.max", "processor time", "nice and affinity"),
+    "memory": SystemLimit("memory.max", "memory", "rlimits and the ladder"),
+    "cpuset": SystemLimit("cpuset.cpus", "which processors", "affinity"),
+    "io": SystemLimit("io.max", "disk traffic", "nothing"),
+    "pids": SystemLimit("pids.max", "number of processes", "rlimits"),
 }
 _SWITCH: Final = "systemd.unified_cgroup_hierarchy=1"
 _OPTIONS: Final = "zgrep CGROUP /proc/config.gz   # what this kernel was built with"
 
 
-def control_groups(context: Context) -> Iterator[Finding]:
+def control_groups(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell the version, and for each controller whether its limit is real."""
     cgroup = read_cgroup(context.tree)
     if cgroup.version != 2 or CONTROLLERS.keys().isdisjoint(cgroup.controllers):
@@ -55,7 +55,9 @@ def control_groups(context: Context) -> Iterator[Finding]:
             yield ok(f"limit of {name}", f"real: {limit.what}{note}")
 
 
-def _objection(context: Context, cgroup: Cgroup, name: str, limit: Limit) -> tuple[str, str]:
+def _objection(
+    context: DoctorContext, cgroup: Cgroup, name: str, limit: SystemLimit
+) -> tuple[str, str]:
     """Return why a limit is not real and the remedy, or nothing twice."""
     if name not in cgroup.controllers:
         remedy = f"echo +{name} | sudo tee /sys/fs/cgroup/cgroup.subtree_control"

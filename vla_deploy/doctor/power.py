@@ -5,10 +5,10 @@ from typing import Final
 
 from platforms.probes import open_probes, read_power_modes
 from platforms.probes.thermal import ZONES
-from platforms.tree import Missing, Tree, number_in
+from platforms.tree import Tree, ValueMissing, number_in
 from vla_deploy.doctor.boot import boot_option
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 
 MARGIN_K: Final = 10.0
 TRIPS: Final = frozenset({"passive", "hot", "critical"})
@@ -18,7 +18,7 @@ _CPUFREQ: Final = "/sys/devices/system/cpu/cpufreq"
 _WATCH: Final = "vla-deploy probes --watch 1"
 
 
-def heat(context: Context) -> Iterator[Finding]:
+def heat(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check the margin of each thermal zone to where the kernel slows the computer down."""
     margins = sorted(_margins(context.tree))
     if not margins:
@@ -43,7 +43,7 @@ def _margins(tree: Tree) -> Iterator[tuple[float, str, float, float]]:
             name = tree.text(f"{zone}/type")
             value_c = number_in(tree.text(f"{zone}/temp"), zone) / 1000
             trip_c = min(_trips_c(tree, zone))
-        except (Missing, ValueError):  # a zone that sleeps, or has no trip point
+        except (ValueMissing, ValueError):  # a zone that sleeps, or has no trip point
             continue
         yield trip_c - value_c, name, value_c, trip_c
 
@@ -57,7 +57,7 @@ def _trips_c(tree: Tree, zone: str) -> Iterator[float]:
                 yield value_c
 
 
-def throttling(context: Context) -> Iterator[Finding]:
+def throttling(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell how often the supply made the board slow down since boot."""
     with open_probes(context.tree.root, nvml=False) as probes:
         readings = probes.read()
@@ -76,7 +76,7 @@ def throttling(context: Context) -> Iterator[Finding]:
         yield ok("throttling", f"{measured} since boot")
 
 
-def power_mode(context: Context) -> Iterator[Finding]:
+def power_mode(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Compare the board's power mode with the one that the profile asks for."""
     modes = read_power_modes(context.tree)
     wanted = context.profile.power_mode if context.profile else ""
@@ -99,7 +99,7 @@ def _plain(mode: str) -> str:
     return mode.removeprefix("MODE_")  # which some releases write before it
 
 
-def governor(context: Context) -> Iterator[Finding]:
+def governor(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the processors do not lower their clock between two ticks."""
     files = [
         f"{_CPUFREQ}/{name}/scaling_governor"
@@ -117,7 +117,7 @@ def governor(context: Context) -> Iterator[Finding]:
         yield warn("CPU governor", f"{', '.join(found)}, expected {GOVERNOR}", remedy)
 
 
-def isolated_processors(context: Context) -> Iterator[Finding]:
+def isolated_processors(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the kernel keeps others off the processors that control has for itself."""
     isolated = context.tree.text("/sys/devices/system/cpu/isolated")
     wanted = context.profile.processes["control"].affinity if context.profile else ()
@@ -139,7 +139,7 @@ def _processors(listed: str) -> set[int]:
     for part in filter(None, listed.split(",")):
         first, _, last = part.partition("-")
         if not first.isdecimal() or not (last or first).isdecimal():
-            raise Missing(f"/sys/devices/system/cpu/isolated says {listed[:40]!r}")
+            raise ValueMissing(f"/sys/devices/system/cpu/isolated says {listed[:40]!r}")
         found.update(range(int(first), int(last or first) + 1))
     return found
 

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from platforms.tree import Missing
-from vla_deploy.doctor.context import UNLIMITED, Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, trouble, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import UNLIMITED, DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble, warn
 
 LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
 MEMORY_LOCK_BYTES: Final = 512 << 20
@@ -22,17 +22,17 @@ _SWITCH: Final = "CONFIG_RT_GROUP_SCHED=y"
 _ANY_OPTION: Final = "CONFIG_"
 
 
-def wanted_priority(context: Context) -> int:
+def wanted_priority(context: DoctorContext) -> int:
     """Return control's SCHED_FIFO priority in the profile, 0 for none."""
     return context.profile.realtime_priority if context.profile else 0
 
 
-def _required(context: Context) -> bool:
+def _required(context: DoctorContext) -> bool:
     profile = context.profile
     return profile is not None and profile.realtime_required and profile.realtime_priority > 0
 
 
-def preempt_rt(context: Context) -> Iterator[Finding]:
+def preempt_rt(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell whether the kernel preempts everywhere."""
     version = context.tree.text("/proc/version")
     if "PREEMPT_RT" in version:
@@ -48,7 +48,7 @@ def preempt_rt(context: Context) -> Iterator[Finding]:
         yield ok("kernel", "no PREEMPT_RT, which the profile does not ask for")
 
 
-def fifo(context: Context) -> Iterator[Finding]:
+def fifo(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that SCHED_FIFO is granted, by asking for it."""
     rights, name = context.rights, "SCHED_FIFO"
     if not rights.fifo_refusal:
@@ -59,7 +59,7 @@ def fifo(context: Context) -> Iterator[Finding]:
     yield trouble(name, measured, remedy, fatal=_required(context))
 
 
-def serial_data(context: Context) -> Iterator[Finding]:
+def serial_data(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the kernel's workers which carry serial data may go before ordinary processes."""
     if not wanted_priority(context):
         yield ok("serial data", "as any ordinary process, as the profile has no real-time priority")
@@ -71,7 +71,7 @@ def serial_data(context: Context) -> Iterator[Finding]:
         yield warn("serial data", measured, remedy)
 
 
-def realtime_share(context: Context) -> Iterator[Finding]:
+def realtime_share(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check how much of each period real-time processes may use."""
     runtime_us = context.tree.number("/proc/sys/kernel/sched_rt_runtime_us")
     period_us = context.tree.number("/proc/sys/kernel/sched_rt_period_us")
@@ -84,7 +84,7 @@ def realtime_share(context: Context) -> Iterator[Finding]:
         yield ok("real-time share", f"{100 * runtime_us / period_us:.0f} % of each period")
 
 
-def fair_server(context: Context) -> Iterator[Finding]:
+def fair_server(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check how long ordinary processes may take a core from real-time ones at a stretch.
 
     Linux 6.12 and newer has a server of `runtime` ns in every `period` for them, which goes before
@@ -100,7 +100,7 @@ def fair_server(context: Context) -> Iterator[Finding]:
     yield warn("fair server", measured, f"echo 0 | sudo tee {FAIR_SERVER}/cpu*/runtime")
 
 
-def group_scheduling(context: Context) -> Iterator[Finding]:
+def group_scheduling(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check for RT_GROUP_SCHED, under which SCHED_FIFO fails below the root control group."""
     is_on = has_group_scheduling(context)
     if is_on is None:
@@ -118,7 +118,7 @@ def group_scheduling(context: Context) -> Iterator[Finding]:
         yield ok("RT_GROUP_SCHED", "on, but SCHED_FIFO is granted here")
 
 
-def has_group_scheduling(context: Context) -> bool | None:
+def has_group_scheduling(context: DoctorContext) -> bool | None:
     """Tell whether the kernel has RT_GROUP_SCHED; None where it does not tell."""
     if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
         return True
@@ -126,7 +126,7 @@ def has_group_scheduling(context: Context) -> bool | None:
     return _SWITCH in options if _ANY_OPTION in options else None
 
 
-def _kernel_options(context: Context) -> str:
+def _kernel_options(context: DoctorContext) -> str:
     """Return how the kernel was configured: it may carry that itself, or /boot has it."""
     try:
         packed = (context.tree.root / "proc/config.gz").read_bytes()
@@ -135,15 +135,15 @@ def _kernel_options(context: Context) -> str:
         return _options_in_boot(context)
 
 
-def _options_in_boot(context: Context) -> str:
+def _options_in_boot(context: DoctorContext) -> str:
     try:
         release = context.tree.text("/proc/sys/kernel/osrelease")
         return context.tree.text(f"/boot/config-{release}")
-    except Missing:
+    except ValueMissing:
         return ""
 
 
-def memory_lock(context: Context) -> Iterator[Finding]:
+def memory_lock(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that control may keep its memory from being swapped out."""
     rights, name = context.rights, "memory lock"
     limit = rights.memory_lock_bytes
@@ -158,7 +158,7 @@ def memory_lock(context: Context) -> Iterator[Finding]:
         yield trouble(name, measured, remedy, fatal=needed)
 
 
-def wake_up(context: Context) -> Iterator[Finding]:
+def wake_up(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Measure for a second how late this computer wakes a process at the control rate."""
     rate_hz = context.profile.control_rate_hz if context.profile else 250.0
     priority = wanted_priority(context)
@@ -175,7 +175,7 @@ def wake_up(context: Context) -> Iterator[Finding]:
         yield trouble("wake-up", measured, remedy, fatal=_required(context))
 
 
-def _lateness_ns(context: Context, period_ns: int) -> list[int]:
+def _lateness_ns(context: DoctorContext, period_ns: int) -> list[int]:
     clock, late_ns = context.clock, []
     deadline_ns = clock.now_ns()
     for _ in range(round(WAKE_UP_TEST_S * NS_PER_S / period_ns)):

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
-from vla_deploy.doctor.finding import Finding, Level
+from vla_deploy.doctor.finding import DoctorFinding, FindingLevel
 from vla_deploy.doctor.table import Section
 
 COLUMNS: Final = 100
 _NAME_COLUMNS: Final = 18
-_INDENT: Final = 2 + len(Level.MISSING) + 2 + _NAME_COLUMNS + 1
+_INDENT: Final = 2 + len(FindingLevel.MISSING) + 2 + _NAME_COLUMNS + 1
 _LEAST_INDENT: Final = 7
 _ARROW: Final = "-> "
 _COMMENT: Final = "   # "
@@ -19,7 +19,9 @@ _COMMENT: Final = "   # "
 
 def succeeded(sections: Sequence[Section]) -> bool:
     """Tell whether nothing failed."""
-    return all(one.level is not Level.FAIL for section in sections for one in section.findings)
+    return all(
+        one.level is not FindingLevel.FAIL for section in sections for one in section.findings
+    )
 
 
 def as_document(sections: Sequence[Section]) -> dict[str, Any]:
@@ -34,13 +36,13 @@ def as_text(sections: Sequence[Section]) -> str:
     """Return lines for a person; under each trouble stands the command that mends it."""
     lines = [line for section in sections for line in _section(section)]
     counts = _counts(sections)
-    summary = ", ".join(f"{counts[level]} {level}" for level in Level)
+    summary = ", ".join(f"{counts[level]} {level}" for level in FindingLevel)
     return "\n".join([*lines, summary])
 
 
 def _counts(sections: Sequence[Section]) -> dict[str, int]:
     counted = Counter(one.level for section in sections for one in section.findings)
-    return {level: counted[level] for level in Level}
+    return {level: counted[level] for level in FindingLevel}
 
 
 def _section(section: Section) -> Iterator[str]:
@@ -50,8 +52,8 @@ def _section(section: Section) -> Iterator[str]:
     yield ""
 
 
-def _lines(finding: Finding) -> Iterator[str]:
-    head = f"  {finding.level:<{len(Level.MISSING)}}  {finding.name:<{_NAME_COLUMNS}} "
+def _lines(finding: DoctorFinding) -> Iterator[str]:
+    head = f"  {finding.level:<{len(FindingLevel.MISSING)}}  {finding.name:<{_NAME_COLUMNS}} "
     room = COLUMNS - _INDENT
     first, *rest = textwrap.wrap(finding.measured, room, break_on_hyphens=False) or [""]
     yield f"{head}{first}"

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 from vla_deploy.gateways.ros.environment import find_environment
 from vla_deploy.gateways.ros.errors import RosNotFound
 from vla_deploy.gateways.ros.imports import IMPORTS, remedy
@@ -41,7 +41,7 @@ print(json.dumps(told))
 """
 
 
-def environment(context: Context) -> Iterator[Finding]:
+def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Start ROS's interpreter and let it import all that the gateway needs."""
     settings = _asked(context)
     if settings is None:
@@ -56,7 +56,7 @@ def environment(context: Context) -> Iterator[Finding]:
         told = json.loads(
             context.ask(["env", *variables, str(found.python), "-c", _PROBE, *IMPORTS])
         )
-    except (Missing, ValueError) as error:
+    except (ValueMissing, ValueError) as error:
         yield fail("interpreter", f"{found.python} cannot be used: {error}", f"{found.python} -VV")
         return
     yield ok("interpreter", f"Python {told['python']}, {found.origin}")
@@ -64,7 +64,7 @@ def environment(context: Context) -> Iterator[Finding]:
     yield from _middleware(told)
 
 
-def usage(context: Context) -> Iterator[Finding]:
+def usage(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell whether anything asks for ROS, and in which domain the robot would be."""
     settings = _asked(context)
     if settings is None:
@@ -75,7 +75,7 @@ def usage(context: Context) -> Iterator[Finding]:
     yield _reach(settings)
 
 
-def leftovers(context: Context) -> Iterator[Finding]:
+def leftovers(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Count what ROS processes have left in shared memory when they were killed."""
     if _asked(context) is None:
         return
@@ -88,7 +88,7 @@ def leftovers(context: Context) -> Iterator[Finding]:
         yield ok("DDS leftovers", "none in /dev/shm")
 
 
-def logs(context: Context) -> Iterator[Finding]:
+def logs(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Measure the logs of ROS: it never removes one."""
     if _asked(context) is None:
         return
@@ -102,14 +102,14 @@ def logs(context: Context) -> Iterator[Finding]:
         yield ok("ROS logs", measured)
 
 
-def _asked(context: Context) -> RosSettings | None:
+def _asked(context: DoctorContext) -> RosSettings | None:
     """Return the robot's settings where it or the profile asks for ROS."""
     settings = RosSettings() if context.robot is None else context.robot.ros
     by_profile = context.profile is not None and context.profile.ros
     return settings if settings.enabled or by_profile else None
 
 
-def _imported(told: dict[str, Any]) -> Iterator[Finding]:
+def _imported(told: dict[str, Any]) -> Iterator[DoctorFinding]:
     absent: dict[str, str] = told["absent"]
     if "rclpy" not in absent:
         yield ok("rclpy", told["rclpy"])
@@ -120,7 +120,7 @@ def _imported(told: dict[str, Any]) -> Iterator[Finding]:
         yield ok("ROS messages", f"all {len(messages)} packages")
 
 
-def _middleware(told: dict[str, Any]) -> Iterator[Finding]:
+def _middleware(told: dict[str, Any]) -> Iterator[DoctorFinding]:
     choose = f"export RMW_IMPLEMENTATION={TESTED_RMW}"
     if told["rmw"] == TESTED_RMW:
         yield ok("RMW", TESTED_RMW)
@@ -132,7 +132,7 @@ def _middleware(told: dict[str, Any]) -> Iterator[Finding]:
         yield fail("RMW", f"cannot be loaded: {told.get('rmw_fault', '')}", choose)
 
 
-def _domain(settings: RosSettings) -> Finding:
+def _domain(settings: RosSettings) -> DoctorFinding:
     text = os.environ.get("ROS_DOMAIN_ID", "")
     of_variable = settings.domain_id is None and text
     value = text if of_variable else str(settings.domain_id or 0)
@@ -143,7 +143,7 @@ def _domain(settings: RosSettings) -> Finding:
     return fail("ROS domain", expected, "export ROS_DOMAIN_ID=0   # or [ros] domain_id")
 
 
-def _reach(settings: RosSettings) -> Finding:
+def _reach(settings: RosSettings) -> DoctorFinding:
     """Tell who else can take part: DDS asks nobody for a password."""
     name, peers = "ROS discovery", os.environ.get("ROS_STATIC_PEERS", "")
     can = {

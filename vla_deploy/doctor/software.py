@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError, ModelUnknown
 from vla_deploy.inference.file_check import check_parts, checked_file
 from vla_deploy.inference.store import ModelStore
@@ -32,7 +32,7 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
 _NAME: Final = re.compile(r"^[A-Za-z0-9._-]+")
 
 
-def python(context: Context) -> Iterator[Finding]:
+def python(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check the interpreter's version."""
     del context
     version = sys.version_info[:2]
@@ -44,7 +44,7 @@ def python(context: Context) -> Iterator[Finding]:
         yield fail("Python", f"{measured}, expected {wanted}", "uv python install 3.12")
 
 
-def packages(context: Context) -> Iterator[Finding]:
+def packages(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that every required package is installed, and which extras are."""
     del context
     required = importlib.metadata.requires(PROJECT) or [] if _installed(PROJECT) else []
@@ -75,7 +75,7 @@ def _installed(name: str) -> bool:
     return True
 
 
-def models(context: Context) -> Iterator[Finding]:
+def models(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the models which the profile names are there, and whole."""
     wanted = context.profile.models if context.profile else {}
     if not wanted:
@@ -102,15 +102,15 @@ def _fault_of(store: ModelStore, name: str) -> str:
     return ""
 
 
-def open_gl(context: Context) -> Iterator[Finding]:
+def open_gl(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Open EGL in a process of its own, as a broken driver may take its caller along."""
     try:
         yield ok("OpenGL (EGL)", context.ask((sys.executable, str(EGL_SCRIPT))).strip())
-    except Missing as missing_egl:
+    except ValueMissing as missing_egl:
         yield warn("OpenGL (EGL)", f"{missing_egl}; the twin draws nothing", GL_PACKAGES)
 
 
-def service(context: Context) -> Iterator[Finding]:
+def service(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Tell how the systemd unit is, if it is installed."""
     if not any(context.tree.exists(f"{folder}/{UNIT}") for folder in UNIT_FOLDERS):
         yield missing("service", f"{UNIT} is not installed", "sudo vla-deploy install")

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, missing, ok, warn
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.runtime.one_line import one_line
@@ -16,7 +16,7 @@ from vla_deploy.supervisor.runtime import default_base
 NAME: Final = "spoken stop"
 
 
-def spoken_stop(context: Context) -> Iterator[Finding]:
+def spoken_stop(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that stop words are switched on and that their model runs."""
     profile, robot = context.profile, context.robot
     if profile is None:

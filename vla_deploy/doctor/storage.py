@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from platforms.probes.memory import meminfo_bytes
-from platforms.tree import Missing
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, ok, warn
+from platforms.tree import ValueMissing
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, fail, ok, warn
 
 FOLDERS: Mapping[str, Path] = {
     "state": Path("/var/lib/vla-deploy"),
@@ -20,7 +20,7 @@ SHARED_MEMORY_BYTES: Final = 256 << 20
 _MB: Final = 1e6
 
 
-def disks(context: Context) -> Iterator[Finding]:
+def disks(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check the file systems on which state and logs are, or will be."""
     least_mb = max(LEAST_FREE_MB, context.profile.total.disk_free_mb if context.profile else 0.0)
     for name, folder in FOLDERS.items():
@@ -35,7 +35,7 @@ def disks(context: Context) -> Iterator[Finding]:
             yield ok(f"disk, {name}", measured)
 
 
-def shared_memory(context: Context) -> Iterator[Finding]:
+def shared_memory(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the topics between processes find room."""
     free = _free_bytes(context.tree.root, Path("/dev/shm"))
     measured = f"{free / _MB:.0f} MB free in /dev/shm"
@@ -46,12 +46,12 @@ def shared_memory(context: Context) -> Iterator[Finding]:
         yield ok("shared memory", measured)
 
 
-def swap(context: Context) -> Iterator[Finding]:
+def swap(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that no memory is out on a disk: fetching it back takes longer than a tick."""
     rows = meminfo_bytes(context.tree.text("/proc/meminfo"))
     total, free = rows.get("SwapTotal"), rows.get("SwapFree")
     if total is None or free is None:
-        raise Missing("/proc/meminfo tells nothing of swap")
+        raise ValueMissing("/proc/meminfo tells nothing of swap")
     devices = context.tree.text("/proc/swaps").splitlines()[1:]
     disks_used = [row.split()[0] for row in devices if row.split() and "zram" not in row]
     used = f"{(total - free) / _MB:.0f} of {total / _MB:.0f} MB used"
@@ -73,5 +73,5 @@ def _free_bytes(root: Path, folder: Path) -> float:
     try:
         found = os.statvfs(path)
     except OSError as error:
-        raise Missing(f"{path}: {error.strerror}") from error
+        raise ValueMissing(f"{path}: {error.strerror}") from error
     return float(found.f_bavail * found.f_frsize)

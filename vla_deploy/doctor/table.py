@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from platforms.tree import Missing
+from platforms.tree import ValueMissing
 from vla_deploy.doctor import (
     camera,
     clocks,
@@ -19,11 +19,11 @@ from vla_deploy.doctor import (
     speech,
     storage,
 )
-from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, missing, warn
+from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.finding import DoctorFinding, missing, warn
 
 _log = logging.getLogger(__name__)
-Examination = Callable[[Context], Iterator[Finding]]
+Examination = Callable[[DoctorContext], Iterator[DoctorFinding]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,24 +85,24 @@ class Section:
     """Hold the findings of one topic."""
 
     topic: str
-    findings: tuple[Finding, ...]
+    findings: tuple[DoctorFinding, ...]
 
 
-def examine(context: Context) -> tuple[Section, ...]:
+def examine(context: DoctorContext) -> tuple[Section, ...]:
     """Carry out every check; what cannot be looked at is a finding of its own."""
-    found: dict[str, list[Finding]] = {}
+    found: dict[str, list[DoctorFinding]] = {}
     for check in CHECKS:
         found.setdefault(check.topic, []).extend(_findings(context, check))
     return tuple(Section(topic=topic, findings=tuple(rows)) for topic, rows in found.items())
 
 
-def _findings(context: Context, check: Check) -> list[Finding]:
+def _findings(context: DoctorContext, check: Check) -> list[DoctorFinding]:
     if check.live and not context.is_live:
         return [missing(check.name, "to be examined on the computer itself")]
-    findings: list[Finding] = []
+    findings: list[DoctorFinding] = []
     try:
         findings.extend(check.run(context))
-    except (Missing, OSError) as error:
+    except (ValueMissing, OSError) as error:
         findings.append(missing(check.name, str(error)))
     except Exception as error:  # a check that breaks must not take the others with it
         _log.exception("the check %r broke", check.name)

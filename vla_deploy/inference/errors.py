@@ -71,7 +71,7 @@ class FetchFailed(InferenceError):
     """Say that a published model could not be fetched."""
 
 
-class ToolMissing(InferenceError):
+class PackageMissing(InferenceError):
     """Say that an optional package is missing, and how to install it."""
 
 

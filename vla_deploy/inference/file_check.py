@@ -5,10 +5,10 @@ from pathlib import Path
 
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.manifest import ModelFile, Variant
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 
 
-def checked_file(model: Model, variant: Variant) -> Path:
+def checked_file(model: StoredModel, variant: Variant) -> Path:
     """Return the path of one of a model's files, whose content is what the manifest says.
 
     Raises:
@@ -17,7 +17,7 @@ def checked_file(model: Model, variant: Variant) -> Path:
     return _checked(model.folder, model.manifest.files[variant])
 
 
-def check_parts(model: Model) -> None:
+def check_parts(model: StoredModel) -> None:
     """Check every part of a model that has several files.
 
     Raises:

@@ -9,9 +9,9 @@ from vla_deploy.robots.schema import (
     POSITIVE,
     TABLE,
     TEXT,
-    Check,
-    Fault,
+    RobotFileFault,
     Shape,
+    ValueCheck,
     check_record,
     is_number,
 )
@@ -20,12 +20,12 @@ KEY_WORDS: Final = "key_words"
 THRESHOLDS: Final = ("low", "normal", "high")
 """How easily a word is taken for said: high alarms at the slightest."""
 
-_THRESHOLD: Final = Check(
+_THRESHOLD: Final = ValueCheck(
     expected="a number above 0 and up to 1", holds=lambda value: is_number(value) and 0 < value <= 1
 )
 _SPOTTING: Shape = {
     "features": TEXT,
-    "words": Check(
+    "words": ValueCheck(
         expected="a list of words in small letters, none twice",
         holds=lambda value: (
             isinstance(value, list)
@@ -34,7 +34,7 @@ _SPOTTING: Shape = {
             and len(set(value)) == len(value)
         ),
     ),
-    "smoothing_frames": Check(
+    "smoothing_frames": ValueCheck(
         expected="an integer in 1..50",
         holds=lambda value: (
             isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 50
@@ -47,7 +47,7 @@ _SPOTTING: Shape = {
 _MEASURED: Shape = {"missed_ratio": NUMBER, "false_alarms_per_hour": NUMBER, "delay_p95_s": NUMBER}
 
 
-def key_words_faults(key_words: Mapping[str, Any]) -> Iterator[Fault]:
+def key_words_faults(key_words: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find every key of the table that is unknown, missing or wrong."""
     yield from check_record(key_words, KEY_WORDS, _SPOTTING)
     thresholds = key_words.get("thresholds")
@@ -58,14 +58,16 @@ def key_words_faults(key_words: Mapping[str, Any]) -> Iterator[Fault]:
         yield from check_record(key_words["measured"], f"{KEY_WORDS}.measured", _MEASURED)
 
 
-def key_words_cross_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+def key_words_cross_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find a spotter without its table, and one whose scores are not those of its words."""
     if document["role"] == KEY_WORDS and KEY_WORDS not in document:
-        yield Fault(key=KEY_WORDS, got="nothing", expected="a table, as the role is key_words")
+        yield RobotFileFault(
+            key=KEY_WORDS, got="nothing", expected="a table, as the role is key_words"
+        )
     if KEY_WORDS not in document:
         return
     wanted = 1 + len(document[KEY_WORDS]["words"])
     shapes = [record["shape"] for record in document["outputs"]]
     if len(shapes) != 1 or len(shapes[0]) != 3 or shapes[0][1] != wanted:
         expected = f"one of shape [1, {wanted}, moments], none and each word"
-        yield Fault(key="outputs", got=f"shapes {shapes}", expected=expected)
+        yield RobotFileFault(key="outputs", got=f"shapes {shapes}", expected=expected)

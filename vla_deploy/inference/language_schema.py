@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from vla_deploy.inference.manifest import Use
+from vla_deploy.inference.manifest import LanguageUse
 from vla_deploy.inference.parts_schema import parts_faults
 from vla_deploy.robots.schema import (
     NUMBER,
     OPTIONAL_TABLE,
-    Check,
-    Fault,
+    RobotFileFault,
     Shape,
+    ValueCheck,
     check_record,
     one_of,
 )
@@ -21,8 +21,8 @@ TOKENIZER: Final = "tokenizer.json"
 NEEDED_PARTS: Final = (GENAI_CONFIG, TOKENIZER)
 
 _LANGUAGE: Shape = {
-    "use": one_of(*Use),
-    "most_tokens": Check(
+    "use": one_of(*LanguageUse),
+    "most_tokens": ValueCheck(
         expected="an integer above 0",
         holds=lambda value: isinstance(value, int) and not isinstance(value, bool) and value > 0,
     ),
@@ -38,16 +38,16 @@ _CERTAINTY: Shape = {
 }
 
 
-def language_faults(language: Mapping[str, Any]) -> Iterator[Fault]:
+def language_faults(language: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find every key of the table that is unknown, missing or wrong."""
     yield from check_record(language, "language", _LANGUAGE)
     if isinstance(language.get("certainty"), dict):
         yield from check_record(language["certainty"], "language.certainty", _CERTAINTY)
 
 
-def language_cross_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+def language_cross_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find what of such a manifest does not fit together."""
     yield from parts_faults(document, table="language", role=PLANNER, needed=NEEDED_PARTS)
     paths = [part["path"] for part in document["parts"]]
     if not any(path.endswith(".onnx") for path in paths):
-        yield Fault(key="parts", got=f"{paths}", expected="an .onnx file among them")
+        yield RobotFileFault(key="parts", got=f"{paths}", expected="an .onnx file among them")

@@ -20,7 +20,7 @@ class Variant(StrEnum):
     INT8_S8S8 = "int8_s8s8"
 
 
-class Layout(StrEnum):
+class TensorLayout(StrEnum):
     """Name the order of an image tensor's dimensions."""
 
     NCHW = "nchw"
@@ -60,7 +60,7 @@ class ImageInput:
 
     width_px: int
     height_px: int
-    layout: Layout
+    layout: TensorLayout
     colour: str
     fit: Fit
     fill: int
@@ -97,7 +97,7 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Detection:
+class DetectionOutputs:
     """Declare how a detector's outputs are read; `adapter` names the reader.
 
     Boxes of one class that overlap by more than `iou_threshold` count as one thing. Boxes below
@@ -120,7 +120,7 @@ class Detection:
         return self.score_threshold if weak is None else weak
 
 
-class Context(StrEnum):
+class EncoderContext(StrEnum):
     """Say how much sound a Whisper's encoder takes.
 
     Stock weights know only windows of 30 s, `padded` with silence; `trimmed` ones were trained on
@@ -154,11 +154,11 @@ class Whisper:
     """
 
     languages: tuple[str, ...]
-    context: Context
+    context: EncoderContext
     calibration: Calibration | None = None
 
 
-class Use(StrEnum):
+class LanguageUse(StrEnum):
     """Say what a language model is asked: anything in words, or plain commands alone."""
 
     CHAT = "chat"
@@ -188,7 +188,7 @@ class Language:
     An answer has `most_tokens` at most. `certainty` is None where nobody has measured it.
     """
 
-    use: Use
+    use: LanguageUse
     most_tokens: int
     certainty: Certainty | None = None
 
@@ -239,7 +239,7 @@ class Manifest:
     inputs: tuple[Tensor, ...] = ()
     outputs: tuple[Tensor, ...] = ()
     files: Mapping[Variant, ModelFile] = field(default_factory=dict)
-    detection: Detection | None = None
+    detection: DetectionOutputs | None = None
     key_words: KeyWords | None = None
     parts: tuple[ModelFile, ...] = ()
     whisper: Whisper | None = None

@@ -13,19 +13,19 @@ from vla_deploy.inference.manifest import (
     Calibration,
     Certainty,
     ClassMeasured,
-    Context,
-    Detection,
+    DetectionOutputs,
+    EncoderContext,
     Fit,
     ImageInput,
     KeyWords,
     Language,
-    Layout,
+    LanguageUse,
     Manifest,
     Measured,
     ModelFile,
     SpottingMeasured,
     Tensor,
-    Use,
+    TensorLayout,
     Variant,
     Whisper,
 )
@@ -91,9 +91,9 @@ def _tensors(records: list[Document]) -> tuple[Tensor, ...]:
     return tuple(Tensor(**{**record, "shape": tuple(record["shape"])}) for record in records)
 
 
-def _detection(table: Document) -> Detection:
+def _detection(table: Document) -> DetectionOutputs:
     image = table["image"]
-    return Detection(
+    return DetectionOutputs(
         **{
             **table,
             "classes": tuple(table["classes"]),
@@ -101,7 +101,7 @@ def _detection(table: Document) -> Detection:
             "image": ImageInput(
                 **{
                     **image,
-                    "layout": Layout(image["layout"]),
+                    "layout": TensorLayout(image["layout"]),
                     "fit": Fit(image["fit"]),
                     "mean": tuple(image["mean"]),
                     "std": tuple(image["std"]),
@@ -131,7 +131,7 @@ def _whisper(table: Document) -> Whisper:
     calibration = table.get("calibration")
     return Whisper(
         languages=tuple(table["languages"]),
-        context=Context(table["context"]),
+        context=EncoderContext(table["context"]),
         calibration=None if calibration is None else Calibration(**calibration),
     )
 
@@ -139,7 +139,7 @@ def _whisper(table: Document) -> Whisper:
 def _language(table: Document) -> Language:
     certainty = table.get("certainty")
     return Language(
-        use=Use(table["use"]),
+        use=LanguageUse(table["use"]),
         most_tokens=table["most_tokens"],
         certainty=None if certainty is None else Certainty(**certainty),
     )

@@ -16,7 +16,7 @@ from vla_deploy.inference.errors import MemoryRefused
 from vla_deploy.inference.providers import CPU
 from vla_deploy.inference.runtime import available_providers
 from vla_deploy.inference.stats import resident_mb
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.ipc import ClaimBook, ClaimRefused, IpcError, SharedSpace
 
 RAM: Final = "ram_mb"
@@ -56,7 +56,7 @@ class RunMemory:
         self._ipc = ipc
         self._clock = clock
 
-    def load(self, model: Model, choice: ModelChoice, load: Callable[[], LoadedT]) -> LoadedT:
+    def load(self, model: StoredModel, choice: ModelChoice, load: Callable[[], LoadedT]) -> LoadedT:
         """Claim what a model declares by the size of its weights, load it, claim what it took.
 
         Nobody waits here: what holds the memory gives it back when it likes, and a robot can go on
@@ -124,7 +124,7 @@ class RunMemory:
             space.close()
 
 
-def _needs(model: Model, choice: ModelChoice) -> dict[str, int]:
+def _needs(model: StoredModel, choice: ModelChoice) -> dict[str, int]:
     """Return what the largest file takes: weights are held as they lie on the disk, or as one."""
     largest_bytes = max(path.stat().st_size for path in model.folder.rglob("*") if path.is_file())
     amount = max(1, ceil(largest_bytes / _MB))

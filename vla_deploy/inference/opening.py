@@ -28,7 +28,7 @@ from vla_deploy.inference.runtime import (
     InferenceSession,
     SessionOptions,
 )
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.one_line import one_line
 
 _FATAL_ONLY: Final = 4  # what goes wrong is raised, and told once
@@ -75,7 +75,7 @@ class _Refused(Exception):
 
 
 def open_with_choice(
-    model: Model, choice: ModelChoice, engines: Path, available: tuple[str, ...]
+    model: StoredModel, choice: ModelChoice, engines: Path, available: tuple[str, ...]
 ) -> Opened:
     """Open a session with the first provider of the choice that really runs the model.
 
@@ -147,7 +147,11 @@ def read_graph(path: Path) -> Graph:
 
 
 def _open(
-    model: Model, choice: ModelChoice, provider: str, engines: Path, available: tuple[str, ...]
+    model: StoredModel,
+    choice: ModelChoice,
+    provider: str,
+    engines: Path,
+    available: tuple[str, ...],
 ) -> Opened:
     if provider not in available:
         raise _Refused(f"this onnxruntime {VERSION} has only {', '.join(available)}")

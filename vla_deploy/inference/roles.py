@@ -10,7 +10,7 @@ from platforms import ModelChoice, Profile
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.memory_claims import LoadedT, RunMemory
 from vla_deploy.inference.session import ModelSession, open_session
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.runtime.state_dir import engines_dir_of, models_dir_of
 
 _log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class ModelShelf:
         shelf = cls.of_base(run_dir.parent, clock)
         return replace(shelf, memory=RunMemory(run_dir / "ipc", clock))
 
-    def load(self, model: Model, choice: ModelChoice, load: Callable[[], LoadedT]) -> LoadedT:
+    def load(self, model: StoredModel, choice: ModelChoice, load: Callable[[], LoadedT]) -> LoadedT:
         """Load a model, its memory claimed until it is closed; outside a run nothing is claimed.
 
         Raises:

@@ -12,12 +12,12 @@ from drivers.latency import LatencyHistogram
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.graph_check import output_faults
-from vla_deploy.inference.manifest import Layout, Manifest, Tensor
+from vla_deploy.inference.manifest import Manifest, Tensor, TensorLayout
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.opening import Opened, open_with_choice
 from vla_deploy.inference.runtime import SESSION_ERRORS, available_providers
 from vla_deploy.inference.stats import SessionStats, resident_mb
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.one_line import one_line
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -27,7 +27,9 @@ WARM_UP_RUNS: Final = 2  # the first one lays out the memory that the next ones 
 class ModelSession:
     """Run one model in this thread or another one; one run at a time."""
 
-    def __init__(self, model: Model, choice: ModelChoice, opened: Opened, clock: Clock) -> None:
+    def __init__(
+        self, model: StoredModel, choice: ModelChoice, opened: Opened, clock: Clock
+    ) -> None:
         self.model = model
         self.provider = opened.provider
         self.variant = opened.variant
@@ -113,7 +115,7 @@ class ModelSession:
 
 
 def open_session(
-    model: Model,
+    model: StoredModel,
     choice: ModelChoice,
     *,
     engines: Path,
@@ -148,4 +150,4 @@ def run_shape(manifest: Manifest, tensor: Tensor) -> tuple[int, ...]:
         return tuple(one if isinstance(one, int) else 1 for one in tensor.shape)
     image = manifest.detection.image
     size = (image.height_px, image.width_px)
-    return (1, 3, *size) if image.layout == Layout.NCHW else (1, *size, 3)
+    return (1, 3, *size) if image.layout == TensorLayout.NCHW else (1, *size, 3)

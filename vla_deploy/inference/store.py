@@ -16,7 +16,7 @@ EMBEDDED: Final = Path(__file__).resolve().parent.parent / "models"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model:
+class StoredModel:
     """Hold a model's manifest and the folder that its files lie in."""
 
     manifest: Manifest
@@ -40,7 +40,7 @@ class ModelStore:
         folders = (self.embedded, *self._added)
         return tuple(sorted({name for folder in folders for name in _names(folder)}))
 
-    def load(self, name: str) -> Model:
+    def load(self, name: str) -> StoredModel:
         """Return a model by its name.
 
         Raises:
@@ -51,7 +51,7 @@ class ModelStore:
         for folder, is_embedded in ((place / name, embedded) for place, embedded in places):
             if is_name(name) and (folder / MANIFEST).is_file():
                 manifest = read_manifest(folder)
-                return Model(manifest=manifest, folder=folder, is_embedded=is_embedded)
+                return StoredModel(manifest=manifest, folder=folder, is_embedded=is_embedded)
         known = ", ".join(self.names()) or "none"
         raise ModelUnknown(
             f"no model {name!r}: expected one of {known}, from {self.embedded} or "

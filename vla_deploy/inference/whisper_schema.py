@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from vla_deploy.inference.manifest import Context
+from vla_deploy.inference.manifest import EncoderContext
 from vla_deploy.inference.parts_schema import parts_faults
 from vla_deploy.robots.schema import (
     NUMBER,
     OPTIONAL_TABLE,
-    Check,
-    Fault,
+    RobotFileFault,
     Shape,
+    ValueCheck,
     check_record,
     one_of,
 )
@@ -21,7 +21,7 @@ VOCABULARIES: Final = ("vocabulary.json", "vocabulary.txt")
 """CTranslate2 converters of different age name it differently; one of them is there."""
 
 _WHISPER: Shape = {
-    "languages": Check(
+    "languages": ValueCheck(
         expected='a list of language codes such as "en", none twice',
         holds=lambda value: (
             isinstance(value, list)
@@ -30,9 +30,9 @@ _WHISPER: Shape = {
             and len(set(value)) == len(value)
         ),
     ),
-    "context": one_of(*Context),
+    "context": one_of(*EncoderContext),
     # Manifests of earlier releases have it; it has no meaning any more.
-    "hot_words": Check(expected="true or false", holds=lambda _: True, is_optional=True),
+    "hot_words": ValueCheck(expected="true or false", holds=lambda _: True, is_optional=True),
     "calibration": OPTIONAL_TABLE,
 }
 _CALIBRATION: Shape = {
@@ -43,16 +43,16 @@ _CALIBRATION: Shape = {
 }
 
 
-def whisper_faults(whisper: Mapping[str, Any]) -> Iterator[Fault]:
+def whisper_faults(whisper: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find every key of the table that is unknown, missing or wrong."""
     yield from check_record(whisper, "whisper", _WHISPER)
     if isinstance(whisper.get("calibration"), dict):
         yield from check_record(whisper["calibration"], "whisper.calibration", _CALIBRATION)
 
 
-def whisper_cross_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+def whisper_cross_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     """Find what of such a manifest does not fit together."""
     yield from parts_faults(document, table="whisper", role=SPEECH_TO_TEXT, needed=NEEDED_PARTS)
     paths = [part["path"] for part in document["parts"]]
     if not any(name in paths for name in VOCABULARIES):
-        yield Fault(key="parts", got=f"{paths}", expected=f"{VOCABULARIES[0]} among them")
+        yield RobotFileFault(key="parts", got=f"{paths}", expected=f"{VOCABULARIES[0]} among them")

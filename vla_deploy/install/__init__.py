@@ -1,18 +1,18 @@
 """Put the robot's service onto a computer, update it, and take it off again."""
 
-from vla_deploy.install.changes import Change, Kind, install_changes, uninstall_changes
+from vla_deploy.install.changes import ChangeKind, FileChange, install_changes, uninstall_changes
 from vla_deploy.install.errors import InstallError
-from vla_deploy.install.files import Credential, ServiceChoice, SystemFile, system_files
-from vla_deploy.install.layout import Layout
+from vla_deploy.install.files import Credential, InstalledFile, ServiceChoice, system_files
+from vla_deploy.install.layout import InstallLayout
 
 __all__ = [
-    "Change",
+    "ChangeKind",
     "Credential",
+    "FileChange",
     "InstallError",
-    "Kind",
-    "Layout",
+    "InstallLayout",
+    "InstalledFile",
     "ServiceChoice",
-    "SystemFile",
     "install_changes",
     "system_files",
     "uninstall_changes",

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
-from vla_deploy.install.files import SystemFile
+from vla_deploy.install.files import InstalledFile
 
 NEW_SUFFIX = ".vla-new"
 
 
-class Kind(StrEnum):
+class ChangeKind(StrEnum):
     """Name what happens to one file."""
 
     SAME = "same"
@@ -24,10 +24,10 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class FileChange:
     """Say what happens to one file; `before` is None when there is none, `after` likewise."""
 
-    kind: Kind
+    kind: ChangeKind
     path: Path
     before: str | None = None
     after: str | None = None
@@ -43,7 +43,7 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def paths_of(wanted: Iterable[SystemFile], known: Known) -> tuple[Path, ...]:
+def paths_of(wanted: Iterable[InstalledFile], known: Known) -> tuple[Path, ...]:
     """Return every path that a decision must know the content of."""
     paths = [file.path for file in wanted]
     return tuple(dict.fromkeys([*paths, *(beside(path) for path in paths), *known]))
@@ -55,27 +55,29 @@ def beside(path: Path) -> Path:
 
 
 def install_changes(
-    wanted: Iterable[SystemFile], known: Known, on_disk: OnDisk
-) -> tuple[Change, ...]:
+    wanted: Iterable[InstalledFile], known: Known, on_disk: OnDisk
+) -> tuple[FileChange, ...]:
     """Return what makes the disk hold `wanted`, and nothing that an earlier version left."""
     placed = [_placed(file, known, on_disk) for file in wanted]
-    changes = placed + [_beside(change, on_disk) for change in placed if change.kind is Kind.KEEP]
+    changes = placed + [
+        _beside(change, on_disk) for change in placed if change.kind is ChangeKind.KEEP
+    ]
     paths = {change.path for change in changes}
     stale = {path: digests for path, digests in known.items() if path not in paths}
     return (*changes, *uninstall_changes(stale, on_disk))
 
 
-def uninstall_changes(known: Known, on_disk: OnDisk) -> tuple[Change, ...]:
+def uninstall_changes(known: Known, on_disk: OnDisk) -> tuple[FileChange, ...]:
     """Return what removes everything that we wrote and nobody has edited since."""
     return tuple(
-        Change(kind=_leaving(on_disk.get(path), digests), path=path, before=on_disk.get(path))
+        FileChange(kind=_leaving(on_disk.get(path), digests), path=path, before=on_disk.get(path))
         for path, digests in known.items()
     )
 
 
-def _placed(file: SystemFile, known: Known, on_disk: OnDisk) -> Change:
+def _placed(file: InstalledFile, known: Known, on_disk: OnDisk) -> FileChange:
     before = on_disk.get(file.path)
-    return Change(
+    return FileChange(
         kind=_arriving(before, file.text, known.get(file.path, frozenset())),
         path=file.path,
         before=before,
@@ -84,21 +86,21 @@ def _placed(file: SystemFile, known: Known, on_disk: OnDisk) -> Change:
     )
 
 
-def _beside(edited: Change, on_disk: OnDisk) -> Change:
+def _beside(edited: FileChange, on_disk: OnDisk) -> FileChange:
     path = beside(edited.path)
-    kind = Kind.SAME if on_disk.get(path) == edited.after else Kind.BESIDE
+    kind = ChangeKind.SAME if on_disk.get(path) == edited.after else ChangeKind.BESIDE
     return replace(edited, kind=kind, path=path)
 
 
-def _arriving(before: str | None, after: str, digests: frozenset[str]) -> Kind:
+def _arriving(before: str | None, after: str, digests: frozenset[str]) -> ChangeKind:
     if before is None:
-        return Kind.WRITE
+        return ChangeKind.WRITE
     if before == after:
-        return Kind.SAME
-    return Kind.UPDATE if digest(before) in digests else Kind.KEEP
+        return ChangeKind.SAME
+    return ChangeKind.UPDATE if digest(before) in digests else ChangeKind.KEEP
 
 
-def _leaving(before: str | None, digests: frozenset[str]) -> Kind:
+def _leaving(before: str | None, digests: frozenset[str]) -> ChangeKind:
     if before is None:
-        return Kind.FORGET
-    return Kind.REMOVE if digest(before) in digests else Kind.KEEP
+        return ChangeKind.FORGET
+    return ChangeKind.REMOVE if digest(before) in digests else ChangeKind.KEEP

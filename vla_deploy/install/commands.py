@@ -5,9 +5,9 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from vla_deploy.install.errors import CommandFailed
-from vla_deploy.install.files import SystemFile
-from vla_deploy.install.layout import RELEASE_FILES, SERVICE, STATE_FOLDERS, Layout
+from vla_deploy.install.errors import SystemCommandFailed
+from vla_deploy.install.files import InstalledFile
+from vla_deploy.install.layout import RELEASE_FILES, SERVICE, STATE_FOLDERS, InstallLayout
 
 Command = tuple[str, ...]
 _TIMEOUT_S = 120.0
@@ -17,7 +17,7 @@ _RELOAD: tuple[Command, ...] = (
 )
 
 
-def after_install(files: Iterable[SystemFile]) -> tuple[Command, ...]:
+def after_install(files: Iterable[InstalledFile]) -> tuple[Command, ...]:
     """Return what makes the system know user, folders, devices and units."""
     units = [file.path.name for file in files if "WantedBy=" in file.text]
     return (
@@ -36,7 +36,7 @@ def before_uninstall(paths: Iterable[Path]) -> tuple[Command, ...]:
     return (("systemctl", "disable", "--now", SERVICE, *units),)
 
 
-def after_uninstall(layout: Layout, *, purge: bool) -> tuple[Command, ...]:
+def after_uninstall(layout: InstallLayout, *, purge: bool) -> tuple[Command, ...]:
     """Return what makes the system forget; with `purge` also state, releases and user.
 
     Of the prefix only what is known to be ours goes: others may keep files there.
@@ -60,8 +60,8 @@ def run_command(command: Sequence[str]) -> str:
             command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise CommandFailed(f"`{shlex.join(command)}` did not run: {error}") from error
+        raise SystemCommandFailed(f"`{shlex.join(command)}` did not run: {error}") from error
     if done.returncode:
         words = (done.stderr or done.stdout).strip() or "nothing said"
-        raise CommandFailed(f"`{shlex.join(command)}` ended with {done.returncode}: {words}")
+        raise SystemCommandFailed(f"`{shlex.join(command)}` ended with {done.returncode}: {words}")
     return done.stdout

@@ -4,13 +4,13 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from vla_deploy.install.changes import Change, Kind
-from vla_deploy.install.layout import Layout
+from vla_deploy.install.changes import ChangeKind, FileChange
+from vla_deploy.install.layout import InstallLayout
 
-_WRITTEN = (Kind.WRITE, Kind.UPDATE, Kind.BESIDE)
+_WRITTEN = (ChangeKind.WRITE, ChangeKind.UPDATE, ChangeKind.BESIDE)
 
 
-def read_files(layout: Layout, paths: Iterable[Path]) -> dict[Path, str | None]:
+def read_files(layout: InstallLayout, paths: Iterable[Path]) -> dict[Path, str | None]:
     """Return the content of each file; None for one that is not there."""
     found = {}
     for path in paths:
@@ -19,13 +19,13 @@ def read_files(layout: Layout, paths: Iterable[Path]) -> dict[Path, str | None]:
     return found
 
 
-def apply_changes(layout: Layout, changes: Iterable[Change]) -> None:
+def apply_changes(layout: InstallLayout, changes: Iterable[FileChange]) -> None:
     """Write and remove what was decided."""
     for change in changes:
         file = layout.on_disk(change.path)
         if change.kind in _WRITTEN and change.after is not None:
             write_file(file, change.after, change.mode)
-        elif change.kind is Kind.REMOVE:
+        elif change.kind is ChangeKind.REMOVE:
             file.unlink()
             _remove_empty_parents(file.parent, layout.on_disk(layout.prefix))
 

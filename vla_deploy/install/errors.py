@@ -39,5 +39,5 @@ class ToolMissing(InstallError):
     """Say which, and what to do instead."""
 
 
-class CommandFailed(InstallError):
+class SystemCommandFailed(InstallError):
     """Say which command, and what it answered."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from platforms import Profile
 from vla_deploy.install.errors import ArgumentRefused, TemplateBroken
-from vla_deploy.install.layout import Layout
+from vla_deploy.install.layout import InstallLayout
 from vla_deploy.robots import RobotDescription
 from vla_deploy.supervisor.service_times import (
     RESTART_S,
@@ -64,7 +64,7 @@ class ServiceChoice:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SystemFile:
+class InstalledFile:
     """Hold one file as it should be on the robot's computer."""
 
     path: Path
@@ -73,8 +73,8 @@ class SystemFile:
 
 
 def system_files(
-    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: Layout
-) -> tuple[SystemFile, ...]:
+    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: InstallLayout
+) -> tuple[InstalledFile, ...]:
     """Return every file that the service needs, in the order in which they are written.
 
     Raises:
@@ -114,7 +114,7 @@ def filled(text: str, values: Mapping[str, str], name: str) -> str:
 
 
 def _values(
-    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: Layout
+    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: InstallLayout
 ) -> dict[str, str]:
     memory_mb = profile.total.memory_mb
     return {
@@ -184,8 +184,8 @@ def _link(name: str, match: re.Match[str]) -> str:
     return ", ".join((*conditions, f'SYMLINK+="vla-deploy/{name}"'))
 
 
-def _file(path: Path, name: str, values: Mapping[str, str], mode: int = 0o644) -> SystemFile:
-    return SystemFile(path=path, text=filled(_template(name), values, name), mode=mode)
+def _file(path: Path, name: str, values: Mapping[str, str], mode: int = 0o644) -> InstalledFile:
+    return InstalledFile(path=path, text=filled(_template(name), values, name), mode=mode)
 
 
 def _template(name: str) -> str:

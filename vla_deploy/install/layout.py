@@ -16,7 +16,7 @@ DEFAULT_PREFIX = Path("/opt/vla-deploy")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Layout:
+class InstallLayout:
     """Name the folders; `root` is put in front of each when it is written, never into a text.
 
     `ip` is the program that sets network links up, `nvpmodel` the one that sets power modes.

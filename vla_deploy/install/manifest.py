@@ -5,16 +5,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.install.changes import Change, Kind, Known, digest
+from vla_deploy.install.changes import ChangeKind, FileChange, Known, digest
 from vla_deploy.install.disk import write_file
 from vla_deploy.install.errors import InstallError
 from vla_deploy.install.files import ServiceChoice
-from vla_deploy.install.layout import Layout
+from vla_deploy.install.layout import InstallLayout
 
-_OURS = (Kind.SAME, Kind.WRITE, Kind.UPDATE, Kind.BESIDE)
+_OURS = (ChangeKind.SAME, ChangeKind.WRITE, ChangeKind.UPDATE, ChangeKind.BESIDE)
 
 
-def read_manifest(layout: Layout) -> dict[Path, frozenset[str]]:
+def read_manifest(layout: InstallLayout) -> dict[Path, frozenset[str]]:
     """Return the digests of what was written, by path; nothing when nothing is installed.
 
     Raises:
@@ -24,7 +24,7 @@ def read_manifest(layout: Layout) -> dict[Path, frozenset[str]]:
     return {Path(path): frozenset(digests) for path, digests in listed.items()}
 
 
-def installed_choice(layout: Layout) -> ServiceChoice:
+def installed_choice(layout: InstallLayout) -> ServiceChoice:
     """Return what the installed service runs; what it would run when nothing is installed.
 
     Raises:
@@ -35,7 +35,7 @@ def installed_choice(layout: Layout) -> ServiceChoice:
 
 
 def write_manifest(
-    layout: Layout,
+    layout: InstallLayout,
     known: Mapping[Path, Iterable[str]],
     choice: ServiceChoice | None = None,
 ) -> None:
@@ -50,7 +50,7 @@ def write_manifest(
     write_file(file, f"{text}\n", 0o644)
 
 
-def _document(layout: Layout) -> dict[str, Any]:
+def _document(layout: InstallLayout) -> dict[str, Any]:
     file = layout.on_disk(layout.manifest)
     if not file.is_file():
         return {}
@@ -73,7 +73,7 @@ def _damaged(file: Path, what: str) -> InstallError:
     )
 
 
-def during(known: Known, changes: Iterable[Change]) -> dict[Path, frozenset[str]]:
+def during(known: Known, changes: Iterable[FileChange]) -> dict[Path, frozenset[str]]:
     """Return what is ours while the changes go on: the old versions and the new ones."""
     return {
         path: known.get(path, frozenset()) | digests
@@ -81,7 +81,7 @@ def during(known: Known, changes: Iterable[Change]) -> dict[Path, frozenset[str]
     }
 
 
-def afterwards(known: Known, changes: Iterable[Change]) -> dict[Path, frozenset[str]]:
+def afterwards(known: Known, changes: Iterable[FileChange]) -> dict[Path, frozenset[str]]:
     """Return what is ours once every change is made; a kept file that was edited still is."""
     ours = {
         change.path: frozenset({digest(change.after)})
@@ -91,6 +91,6 @@ def afterwards(known: Known, changes: Iterable[Change]) -> dict[Path, frozenset[
     edited = {
         change.path: known[change.path]
         for change in changes
-        if change.kind is Kind.KEEP and change.path in known
+        if change.kind is ChangeKind.KEEP and change.path in known
     }
     return {**edited, **ours}

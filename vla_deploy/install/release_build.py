@@ -19,7 +19,7 @@ exec "$here/../venv/bin/python" -I -m vla_deploy.cli "$@"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class ReleaseSource:
     """Say what a release is made of.
 
     `wheelhouse` is a folder of wheels to install from without a network. `system_packages` lets it
@@ -52,7 +52,7 @@ def version_of(wheel: Path) -> str:
     return str(header["Version"])
 
 
-def add_release(store: ReleaseStore, release_id: str, source: Source) -> Path:
+def add_release(store: ReleaseStore, release_id: str, source: ReleaseSource) -> Path:
     """Build a release beside the others; it has its name only once it is complete.
 
     Raises:
@@ -72,7 +72,7 @@ def add_release(store: ReleaseStore, release_id: str, source: Source) -> Path:
     return store.accept(release_id)
 
 
-def _pip_install(python: Path, source: Source) -> list[str]:
+def _pip_install(python: Path, source: ReleaseSource) -> list[str]:
     offline = source.wheelhouse is not None or source.packages_of is not None
     options = ["--no-index"] if offline else []
     options += ["--find-links", str(source.wheelhouse)] if source.wheelhouse else []

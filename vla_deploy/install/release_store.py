@@ -21,7 +21,7 @@ BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class ReleaseTrial:
     """Say which release is on trial, which one it replaced, and who watches since which boot."""
 
     to: str
@@ -82,13 +82,13 @@ class ReleaseStore:
         if release_id:
             point(self.prefix / "previous", f"releases/{release_id}")
 
-    def trial(self) -> Trial | None:
+    def trial(self) -> ReleaseTrial | None:
         """Return the trial that goes on or was cut off."""
         file = self.prefix / "trial"
         if not file.is_file():
             return None
         lines = dict(line.split("=", 1) for line in file.read_text().splitlines())
-        return Trial(
+        return ReleaseTrial(
             to=lines["to"],
             origin=lines["from"],
             boot=lines["boot"],
@@ -97,7 +97,7 @@ class ReleaseStore:
 
     def begin_trial(self, release_id: str) -> None:
         """Write down, before anything changes, what to go back to."""
-        trial = Trial(
+        trial = ReleaseTrial(
             to=release_id,
             origin=self.current(),
             boot=self._boot_id.read_text().strip(),
@@ -112,7 +112,7 @@ class ReleaseStore:
         (self.prefix / "trial-started").unlink(missing_ok=True)
         sync_folder(self.prefix)
 
-    def undo_trial(self, trial: Trial) -> None:
+    def undo_trial(self, trial: ReleaseTrial) -> None:
         """Go back to what was in use before the trial; twice does no harm."""
         self.use(trial.origin)
         self.end_trial()

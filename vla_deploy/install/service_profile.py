@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from platforms import Profile
-from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
+from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
 from vla_deploy.supervisor.profile_choice import (
     ProfileChoice,
     StartProfile,
@@ -18,7 +18,7 @@ _SLICE: Final = Path("/etc/systemd/system/vla-deploy.slice")
 _MEMORY_HIGH: Final = re.compile(r"^MemoryHigh=(\d+)M$", re.MULTILINE)
 
 
-def service_profile(given: str, layout: Layout) -> StartProfile:
+def service_profile(given: str, layout: InstallLayout) -> StartProfile:
     """Return the given profile, else the chosen one, else the one detected, and why."""
     if given:
         return StartProfile(name=given, why="given by --profile")
@@ -32,7 +32,7 @@ def service_profile(given: str, layout: Layout) -> StartProfile:
     return StartProfile(name=inside, why=f"chosen in {layout.root}")
 
 
-def slice_too_small(profile: Profile, layout: Layout) -> str:
+def slice_too_small(profile: Profile, layout: InstallLayout) -> str:
     """Return why the installed slice does not hold a profile's memory; "" where it does."""
     file = layout.on_disk(_SLICE)
     limit = _MEMORY_HIGH.search(file.read_text(errors="replace")) if file.is_file() else None

@@ -8,14 +8,14 @@ from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.install.commands import run_command
-from vla_deploy.install.errors import CommandFailed, ReleaseRefused, SwitchFailed
+from vla_deploy.install.errors import ReleaseRefused, SwitchFailed, SystemCommandFailed
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import ServiceControl, known_trouble, trouble_within
 
 _log = logging.getLogger(__name__)
 
 
-class Step(StrEnum):
+class SwitchStep(StrEnum):
     """Name what is done, in this order when nothing fails."""
 
     CHECK = "check that the new release runs"
@@ -40,17 +40,17 @@ class End(StrEnum):
 
 
 # What follows a step that succeeded, and one that failed.
-NEXT: Final[Mapping[Step, tuple[Step | End, Step | End]]] = {
-    Step.CHECK: (Step.MARK, End.REFUSED),
-    Step.MARK: (Step.SWAP, Step.SWAP_BACK),
-    Step.SWAP: (Step.RESTART, Step.SWAP_BACK),
-    Step.RESTART: (Step.WATCH, Step.SWAP_BACK),
-    Step.WATCH: (Step.CONFIRM, Step.SWAP_BACK),
-    Step.CONFIRM: (Step.PRUNE, Step.SWAP_BACK),
-    Step.PRUNE: (End.SWITCHED, End.SWITCHED),
-    Step.SWAP_BACK: (Step.RESTART_BACK, End.DOWN),
-    Step.RESTART_BACK: (Step.WATCH_BACK, End.DOWN),
-    Step.WATCH_BACK: (End.ROLLED_BACK, End.DOWN),
+NEXT: Final[Mapping[SwitchStep, tuple[SwitchStep | End, SwitchStep | End]]] = {
+    SwitchStep.CHECK: (SwitchStep.MARK, End.REFUSED),
+    SwitchStep.MARK: (SwitchStep.SWAP, SwitchStep.SWAP_BACK),
+    SwitchStep.SWAP: (SwitchStep.RESTART, SwitchStep.SWAP_BACK),
+    SwitchStep.RESTART: (SwitchStep.WATCH, SwitchStep.SWAP_BACK),
+    SwitchStep.WATCH: (SwitchStep.CONFIRM, SwitchStep.SWAP_BACK),
+    SwitchStep.CONFIRM: (SwitchStep.PRUNE, SwitchStep.SWAP_BACK),
+    SwitchStep.PRUNE: (End.SWITCHED, End.SWITCHED),
+    SwitchStep.SWAP_BACK: (SwitchStep.RESTART_BACK, End.DOWN),
+    SwitchStep.RESTART_BACK: (SwitchStep.WATCH_BACK, End.DOWN),
+    SwitchStep.WATCH_BACK: (End.ROLLED_BACK, End.DOWN),
 }
 
 
@@ -90,17 +90,17 @@ class Switch:
         self._clock = clock
         self._origin = store.current()
         self._known_trouble = ""
-        self.do: dict[Step, Callable[[], None]] = {
-            Step.CHECK: self._check,
-            Step.MARK: self._mark,
-            Step.SWAP: lambda: store.use(plan.to),
-            Step.RESTART: self._restart,
-            Step.WATCH: self._watch,
-            Step.CONFIRM: self._confirm,
-            Step.PRUNE: lambda: _log.info("removed: %s", store.prune(plan.keep)),
-            Step.SWAP_BACK: self._swap_back,
-            Step.RESTART_BACK: self._restart,
-            Step.WATCH_BACK: self._watch,
+        self.do: dict[SwitchStep, Callable[[], None]] = {
+            SwitchStep.CHECK: self._check,
+            SwitchStep.MARK: self._mark,
+            SwitchStep.SWAP: lambda: store.use(plan.to),
+            SwitchStep.RESTART: self._restart,
+            SwitchStep.WATCH: self._watch,
+            SwitchStep.CONFIRM: self._confirm,
+            SwitchStep.PRUNE: lambda: _log.info("removed: %s", store.prune(plan.keep)),
+            SwitchStep.SWAP_BACK: self._swap_back,
+            SwitchStep.RESTART_BACK: self._restart,
+            SwitchStep.WATCH_BACK: self._watch,
         }
 
     def run(self) -> SwitchReport:
@@ -113,18 +113,18 @@ class Switch:
         if self._plan.to == self._origin:
             raise ReleaseRefused(f"release {self._plan.to} is in use already")
         failures: list[str] = []
-        step: Step | End = Step.CHECK
-        while isinstance(step, Step):
+        step: SwitchStep | End = SwitchStep.CHECK
+        while isinstance(step, SwitchStep):
             failure = self._failure_of(step)
             failures += [f"{step.value}: {failure}"] if failure else []
             step = NEXT[step][bool(failure)]
         return SwitchReport(end=step, current=self._store.current(), failures=tuple(failures))
 
-    def _failure_of(self, step: Step) -> str:
+    def _failure_of(self, step: SwitchStep) -> str:
         _log.info("%s", step.value)
         try:
             self.do[step]()
-        except (CommandFailed, ReleaseRefused, SwitchFailed, OSError) as error:
+        except (SystemCommandFailed, ReleaseRefused, SwitchFailed, OSError) as error:
             return str(error)
         return ""
 

@@ -20,7 +20,7 @@ from vla_deploy.ipc.record_ring import Record, RecordReader, RecordWriter
 from vla_deploy.ipc.ring import Event, RingReader, RingWriter
 from vla_deploy.ipc.space import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
-from vla_deploy.ipc.topics import BY_NAME, TOPICS, Field, Kind, Topic
+from vla_deploy.ipc.topics import BY_NAME, TOPICS, PackedField, Topic, TopicKind
 
 __all__ = [
     "BY_NAME",
@@ -36,12 +36,11 @@ __all__ = [
     "ClaimRefused",
     "Doorbell",
     "Event",
-    "Field",
     "Frame",
     "FrameReader",
     "FrameWriter",
     "IpcError",
-    "Kind",
+    "PackedField",
     "Pulse",
     "PulseReader",
     "Record",
@@ -56,5 +55,6 @@ __all__ = [
     "SpaceUnavailable",
     "StopButton",
     "Topic",
+    "TopicKind",
     "UnknownTopic",
 ]

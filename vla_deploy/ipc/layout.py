@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vla_deploy.ipc.topics import Kind, Topic
+from vla_deploy.ipc.topics import Topic, TopicKind
 
 VERSION = 1
 FILE_HEADER_BYTES = 128
@@ -13,15 +13,15 @@ SLOT_HEADER_BYTES = 32
 SLOT_TRAILER_BYTES = 16
 _CACHE_LINE_BYTES = 64
 _SUFFIX = {
-    Kind.CELL: "cell",
-    Kind.RING: "ring",
-    Kind.FRAME: "frames",
-    Kind.RECORD: "records",
+    TopicKind.CELL: "cell",
+    TopicKind.RING: "ring",
+    TopicKind.FRAME: "frames",
+    TopicKind.RECORD: "records",
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Layout:
+class SlotLayout:
     """Place the slots of one topic behind the file header."""
 
     slots: int
@@ -42,17 +42,17 @@ class Layout:
         return self.offset(sequence) + self.stride_bytes - SLOT_TRAILER_BYTES
 
 
-def layout_of(topic: Topic) -> Layout:
+def layout_of(topic: Topic) -> SlotLayout:
     """Lay out a topic: slot header, payload, trailer, rounded up to cache lines."""
     capacity = payload_capacity(topic)
     used = SLOT_HEADER_BYTES + capacity + SLOT_TRAILER_BYTES
     stride = -(-used // _CACHE_LINE_BYTES) * _CACHE_LINE_BYTES
-    return Layout(slots=max(topic.slots, 3), capacity_bytes=capacity, stride_bytes=stride)
+    return SlotLayout(slots=max(topic.slots, 3), capacity_bytes=capacity, stride_bytes=stride)
 
 
 def payload_capacity(topic: Topic) -> int:
     """Return how many payload bytes one slot of the topic takes."""
-    if topic.kind is not Kind.CELL:
+    if topic.kind is not TopicKind.CELL:
         return topic.slot_bytes
     if is_document(topic):
         return topic.fields[0].shape

@@ -20,7 +20,7 @@ _HEAD: Final = struct.Struct("<III")
 NOTHING: Final[Samples] = np.zeros(0, np.int16)
 
 
-class Step(IntEnum):
+class SoundStep(IntEnum):
     """Say what a record tells of a turn."""
 
     SOUND = 0
@@ -34,7 +34,7 @@ class PageSound:
 
     turn: int
     rate_hz: int
-    step: Step
+    step: SoundStep
     samples: Samples = field(default_factory=lambda: NOTHING)
 
     def packed(self) -> bytes:
@@ -53,7 +53,7 @@ def unpacked(payload: bytes) -> PageSound:
     if len(payload) < _HEAD.size or len(body) % 2:
         raise BadPayload(f"page_sound: {len(payload)} bytes are no whole record")
     turn, rate_hz, step = _HEAD.unpack_from(payload)
-    if rate_hz not in RATES_HZ or step not in list(Step):
+    if rate_hz not in RATES_HZ or step not in list(SoundStep):
         raise BadPayload(f"page_sound: rate {rate_hz} Hz, step {step}: of another release?")
     samples = np.frombuffer(body, "<i2").astype(np.int16)
-    return PageSound(turn=turn, rate_hz=rate_hz, step=Step(step), samples=samples)
+    return PageSound(turn=turn, rate_hz=rate_hz, step=SoundStep(step), samples=samples)

@@ -115,7 +115,7 @@ class GoalAnswer:
         }
 
 
-class GoalUnreadable(ValueError):
+class RosGoalUnreadable(ValueError):
     """Say what is wrong with a request or an answer."""
 
 
@@ -140,10 +140,10 @@ def read_request(document: Mapping[str, Any]) -> GoalRequest:
             }
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise GoalUnreadable(f"{REQUEST}: not a request for a goal: {error}") from error
+        raise RosGoalUnreadable(f"{REQUEST}: not a request for a goal: {error}") from error
     fault = next(_faults(request), "")
     if fault:
-        raise GoalUnreadable(f"{REQUEST} {request.request_id}: {fault}")
+        raise RosGoalUnreadable(f"{REQUEST} {request.request_id}: {fault}")
     return request
 
 
@@ -156,7 +156,7 @@ def read_answer(document: Mapping[str, Any]) -> GoalAnswer:
     try:
         return GoalAnswer(**{**document, "state": GoalState(document["state"])})
     except (KeyError, TypeError, ValueError) as error:
-        raise GoalUnreadable(f"{ANSWER}: not an answer about a goal: {error}") from error
+        raise RosGoalUnreadable(f"{ANSWER}: not an answer about a goal: {error}") from error
 
 
 def _faults(request: GoalRequest) -> Iterator[str]:

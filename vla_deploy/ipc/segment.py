@@ -13,7 +13,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.errors import SchemaMismatch, SpaceUnavailable
-from vla_deploy.ipc.layout import VERSION, Layout, file_name, layout_of, schema_hash
+from vla_deploy.ipc.layout import VERSION, SlotLayout, file_name, layout_of, schema_hash
 from vla_deploy.ipc.topics import Topic
 
 _MAGIC = b"VLAIPC\x00\x01"
@@ -111,13 +111,13 @@ def _open(path: Path) -> int:
         ) from error
 
 
-def _is_laid_out(fd: int, topic: Topic, layout: Layout) -> bool:
+def _is_laid_out(fd: int, topic: Topic, layout: SlotLayout) -> bool:
     """Tell whether the file is as expected: its header is written last, so nobody need be asked."""
     is_whole = os.fstat(fd).st_size == layout.file_bytes
     return is_whole and _header(fd) == _expected_header(topic, layout)
 
 
-def _expected_header(topic: Topic, layout: Layout) -> tuple[object, ...]:
+def _expected_header(topic: Topic, layout: SlotLayout) -> tuple[object, ...]:
     return (_MAGIC, VERSION, schema_hash(topic), layout.file_bytes, _boot_id())
 
 
@@ -125,7 +125,7 @@ def _header(fd: int) -> tuple[Any, ...]:
     return _HEADER.unpack(os.pread(fd, _HEADER.size, 0).ljust(_HEADER.size, b"\0"))
 
 
-def _create_or_check(fd: int, path: Path, topic: Topic, layout: Layout) -> None:
+def _create_or_check(fd: int, path: Path, topic: Topic, layout: SlotLayout) -> None:
     expected, found = _expected_header(topic, layout), _header(fd)
     # A blank header is a creator that was killed; another boot's file has no living writer.
     if found[0] == bytes(len(_MAGIC)) or found[4] != expected[4]:
@@ -138,7 +138,7 @@ def _create_or_check(fd: int, path: Path, topic: Topic, layout: Layout) -> None:
         )
 
 
-def _create(fd: int, path: Path, layout: Layout, header: bytes) -> None:
+def _create(fd: int, path: Path, layout: SlotLayout, header: bytes) -> None:
     os.ftruncate(fd, 0)
     try:
         # Memory is reserved now: a full /dev/shm must fail here, not as SIGBUS in the control loop.

@@ -12,7 +12,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from vla_deploy.ipc.layout import SLOT_HEADER_BYTES, SLOT_TRAILER_BYTES, Layout
+from vla_deploy.ipc.layout import SLOT_HEADER_BYTES, SLOT_TRAILER_BYTES, SlotLayout
 
 _HEADER = struct.Struct("<QqIIII")
 _TRAILER = struct.Struct("<IIQ")
@@ -35,7 +35,7 @@ class SlotContent:
 class SlotWriter:
     """Write slots of one mapped file."""
 
-    def __init__(self, memory: mmap.mmap, layout: Layout, *, payload_crc: bool) -> None:
+    def __init__(self, memory: mmap.mmap, layout: SlotLayout, *, payload_crc: bool) -> None:
         self._memory = memory
         self._layout = layout
         self._payload_crc = payload_crc
@@ -61,7 +61,7 @@ class SlotWriter:
 class SlotReader:
     """Read slots of one mapped file."""
 
-    def __init__(self, memory: mmap.mmap, layout: Layout, *, payload_crc: bool) -> None:
+    def __init__(self, memory: mmap.mmap, layout: SlotLayout, *, payload_crc: bool) -> None:
         self._memory = memory
         self._layout = layout
         self._payload_crc = payload_crc

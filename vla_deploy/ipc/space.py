@@ -14,7 +14,7 @@ from vla_deploy.ipc.replay_mark import refuse_in_replay
 from vla_deploy.ipc.ring import RingReader, RingWriter
 from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.shared_document import SharedDocument
-from vla_deploy.ipc.topics import TOPICS, Kind, Topic
+from vla_deploy.ipc.topics import TOPICS, Topic, TopicKind
 
 
 class SharedSpace:
@@ -47,50 +47,50 @@ class SharedSpace:
 
     def cell_writer(self, name: str) -> CellWriter:
         """Open a latest-value cell as its owner."""
-        topic = self._topic(name, Kind.CELL)
+        topic = self._topic(name, TopicKind.CELL)
         return CellWriter(self._segment(topic, writable=True), topic, self._clock)
 
     def cell_reader(self, name: str) -> CellReader:
         """Open a latest-value cell for reading."""
-        topic = self._topic(name, Kind.CELL)
+        topic = self._topic(name, TopicKind.CELL)
         return CellReader(self._segment(topic, writable=False), topic)
 
     def shared_document(self, name: str) -> SharedDocument:
         """Open a cell whose document several processes change in turns."""
-        topic = self._topic(name, Kind.CELL)
+        topic = self._topic(name, TopicKind.CELL)
         return SharedDocument(self._segment(topic, writable=True), topic, self._clock)
 
     def ring_writer(self, name: str) -> RingWriter:
         """Open an event ring for publishing."""
-        topic = self._topic(name, Kind.RING)
+        topic = self._topic(name, TopicKind.RING)
         return RingWriter(self._segment(topic, writable=True), topic, self._clock)
 
     def ring_reader(self, name: str, *, from_start: bool) -> RingReader:
         """Open an event ring for reading, from its oldest event or from now on."""
-        topic = self._topic(name, Kind.RING)
+        topic = self._topic(name, TopicKind.RING)
         return RingReader(self._segment(topic, writable=False), from_start=from_start)
 
     def frame_writer(self, name: str) -> FrameWriter:
         """Open a frame ring as its owner."""
-        topic = self._topic(name, Kind.FRAME)
+        topic = self._topic(name, TopicKind.FRAME)
         return FrameWriter(self._segment(topic, writable=True), topic)
 
     def frame_reader(self, name: str) -> FrameReader:
         """Open a frame ring for reading."""
-        return FrameReader(self._segment(self._topic(name, Kind.FRAME), writable=False))
+        return FrameReader(self._segment(self._topic(name, TopicKind.FRAME), writable=False))
 
     def record_writer(self, name: str) -> RecordWriter:
         """Open a record ring as its owner."""
-        topic = self._topic(name, Kind.RECORD)
+        topic = self._topic(name, TopicKind.RECORD)
         return RecordWriter(self._segment(topic, writable=True), topic, self._clock)
 
     def record_reader(self, name: str) -> RecordReader:
         """Open a record ring for reading."""
-        return RecordReader(self._segment(self._topic(name, Kind.RECORD), writable=False))
+        return RecordReader(self._segment(self._topic(name, TopicKind.RECORD), writable=False))
 
     def pulse_reader(self, name: str) -> PulseReader:
         """Follow how often a topic of any kind is written, and when it was last."""
-        return PulseReader(self._segment(self._topic(name, *Kind), writable=False))
+        return PulseReader(self._segment(self._topic(name, *TopicKind), writable=False))
 
     def doorbell(self, name: str) -> Doorbell:
         """Listen for the writers of an event or frame ring.
@@ -98,7 +98,7 @@ class SharedSpace:
         Raises:
             UnknownTopic: no such topic, or a cell: cells are polled, they ring no bell.
         """
-        topic = self._topic(name, Kind.RING, Kind.FRAME)
+        topic = self._topic(name, TopicKind.RING, TopicKind.FRAME)
         bell = Doorbell(self._directory, topic.name, self._clock)
         self._opened.append(bell)
         return bell
@@ -116,7 +116,7 @@ class SharedSpace:
         self._opened.append(segment)
         return segment
 
-    def _topic(self, name: str, *kinds: Kind) -> Topic:
+    def _topic(self, name: str, *kinds: TopicKind) -> Topic:
         topic = self._topics.get(name)
         if topic is None:
             known = ", ".join(sorted(self._topics))

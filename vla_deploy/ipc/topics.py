@@ -13,7 +13,7 @@ SCAN_BEAMS = 360
 OBSTACLE_POINTS = 256
 
 
-class Kind(Enum):
+class TopicKind(Enum):
     """Name what a reader may rely on."""
 
     CELL = "latest-value cell"
@@ -23,7 +23,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class PackedField:
     """Describe one packed field; `dtype` is a numpy code, little-endian, "json" is bounded text."""
 
     name: str
@@ -43,10 +43,10 @@ class Topic:
     """
 
     name: str
-    kind: Kind
+    kind: TopicKind
     owner: str
     summary: str
-    fields: tuple[Field, ...] = ()
+    fields: tuple[PackedField, ...] = ()
     rate_hz: float = 0.0
     deadline_s: float = 0.0
     slots: int = 4
@@ -54,20 +54,20 @@ class Topic:
     private: bool = False
 
 
-def _joint(name: str, dtype: str, unit: str) -> Field:
-    return Field(name, dtype, MAX_JOINTS, unit)
+def _joint(name: str, dtype: str, unit: str) -> PackedField:
+    return PackedField(name, dtype, MAX_JOINTS, unit)
 
 
 TOPICS: tuple[Topic, ...] = (
     Topic(
         name="joint_state",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="control",
         rate_hz=250,
         deadline_s=0.05,
         summary="every servo joint, in the order of the robot file",
         fields=(
-            Field("joint_count", "u4"),
+            PackedField("joint_count", "u4"),
             _joint("position", "f8", "rad or m"),
             _joint("velocity", "f8", "rad/s or m/s"),
             _joint("setpoint", "f8", "rad or m"),
@@ -79,41 +79,41 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="base_state",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="control",
         rate_hz=250,
         deadline_s=0.1,
         summary="wheel odometry, odom frame: starts at 0, 0, 0",
         fields=(
-            Field("x_m", "f8", unit="m"),
-            Field("y_m", "f8", unit="m"),
-            Field("yaw_rad", "f8", unit="rad"),
-            Field("v_m_s", "f8", unit="m/s"),
-            Field("w_rad_s", "f8", unit="rad/s"),
-            Field("enabled", "u1"),
+            PackedField("x_m", "f8", unit="m"),
+            PackedField("y_m", "f8", unit="m"),
+            PackedField("yaw_rad", "f8", unit="rad"),
+            PackedField("v_m_s", "f8", unit="m/s"),
+            PackedField("w_rad_s", "f8", unit="rad/s"),
+            PackedField("enabled", "u1"),
         ),
     ),
     Topic(
         name="base_command",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="executor",
         rate_hz=50,
         deadline_s=0.25,
         summary="wanted base velocity; too old means ramp to zero",
-        fields=(Field("v_m_s", "f8", unit="m/s"), Field("w_rad_s", "f8", unit="rad/s")),
+        fields=(PackedField("v_m_s", "f8", unit="m/s"), PackedField("w_rad_s", "f8", unit="rad/s")),
     ),
     Topic(
         name="control_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="control",
         rate_hz=20,
         deadline_s=0.2,
         summary="control state, active verdict, tick statistics, as JSON; what changes, sooner",
-        fields=(Field("document", "json", 8192),),
+        fields=(PackedField("document", "json", 8192),),
     ),
     Topic(
         name="tick_record",
-        kind=Kind.RECORD,
+        kind=TopicKind.RECORD,
         owner="control",
         rate_hz=250,
         summary="what every tick was judged by and what was sent, for the flight recorder",
@@ -122,7 +122,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="flight_request",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="a request to write what the flight recorder holds, with its reason",
         slots=16,
@@ -130,7 +130,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="flight_event",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="recorder",
         summary="a flight was saved, or could not be, with its file and causes",
         slots=32,
@@ -138,16 +138,16 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="recorder_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="recorder",
         rate_hz=2,
         deadline_s=3.0,
         summary="what the flight recorder holds and whether it writes, as JSON",
-        fields=(Field("document", "json", 256),),
+        fields=(PackedField("document", "json", 256),),
     ),
     Topic(
         name="recording_request",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="asks the recorder to begin or to end a rolling recording: topics, duration, label",
         slots=16,
@@ -155,16 +155,16 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="recording_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="recorder",
         rate_hz=2,
         deadline_s=3.0,
         summary="whether a rolling recording is made, into which file, what was lost, as JSON",
-        fields=(Field("document", "json", 4096),),
+        fields=(PackedField("document", "json", 4096),),
     ),
     Topic(
         name="replay_request",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="asks a replay to pause, to go on, to seek, to go at another speed",
         slots=16,
@@ -172,16 +172,16 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="replay_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="replay",
         rate_hz=2,
         deadline_s=3.0,
         summary="which file is replayed, where it stands, at which speed, as JSON",
-        fields=(Field("document", "json", 1024),),
+        fields=(PackedField("document", "json", 1024),),
     ),
     Topic(
         name="motion_command",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="executor",
         summary="joint goals, trajectories and cancels for control",
         slots=32,
@@ -189,7 +189,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="motion_result",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="control",
         summary="end of each motion: done, touched, cancelled, refused, stopped, with the reason",
         slots=64,
@@ -197,7 +197,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="operator",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="estop, reset, arm, disarm; straight to control",
         slots=64,
@@ -205,74 +205,76 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="pose",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="perception",
         rate_hz=50,
         deadline_s=0.5,
         summary="robot base in the map frame",
         fields=(
-            Field("x_m", "f8", unit="m"),
-            Field("y_m", "f8", unit="m"),
-            Field("yaw_rad", "f8", unit="rad"),
-            Field("match_ratio", "f8", unit="share of lidar points on the map"),
-            Field("covariance", "f8", 9, "x, y, yaw by rows, m and rad"),
-            Field("state", "u1", unit="0 tracking, 1 unsure, 2 lost"),
-            Field("doubt", "u1", unit="why, see vla_deploy/navigation.place_judge.py"),
+            PackedField("x_m", "f8", unit="m"),
+            PackedField("y_m", "f8", unit="m"),
+            PackedField("yaw_rad", "f8", unit="rad"),
+            PackedField("match_ratio", "f8", unit="share of lidar points on the map"),
+            PackedField("covariance", "f8", 9, "x, y, yaw by rows, m and rad"),
+            PackedField("state", "u1", unit="0 tracking, 1 unsure, 2 lost"),
+            PackedField("doubt", "u1", unit="why, see vla_deploy/navigation.place_judge.py"),
         ),
     ),
     Topic(
         name="scan",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="perception",
         rate_hz=10,
         deadline_s=0.5,
         summary="planar lidar; beam i at angle i degrees counter-clockwise from the robot's front",
         fields=(
-            Field("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),
-            Field("beam_age_s", "f4", SCAN_BEAMS, "s, from the beam's moment to the stamp"),
+            PackedField("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),
+            PackedField("beam_age_s", "f4", SCAN_BEAMS, "s, from the beam's moment to the stamp"),
         ),
     ),
     Topic(
         name="near_obstacles",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="perception",
         rate_hz=5,
         deadline_s=1.0,
         summary="depth camera: what stands up from the floor, nearest first, in the base frame",
         fields=(
-            Field("count", "u4"),
-            Field("period_s", "f4", unit="s, between two looks, by the profile and its ladder"),
-            Field("x_m", "f4", OBSTACLE_POINTS, "m"),
-            Field("y_m", "f4", OBSTACLE_POINTS, "m"),
-            Field("z_m", "f4", OBSTACLE_POINTS, "m"),
+            PackedField("count", "u4"),
+            PackedField(
+                "period_s", "f4", unit="s, between two looks, by the profile and its ladder"
+            ),
+            PackedField("x_m", "f4", OBSTACLE_POINTS, "m"),
+            PackedField("y_m", "f4", OBSTACLE_POINTS, "m"),
+            PackedField("z_m", "f4", OBSTACLE_POINTS, "m"),
         ),
     ),
     Topic(
         name="imu",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="perception",
         rate_hz=100,
         deadline_s=0.2,
         summary="orientation and acceleration in the base frame",
         fields=(
-            Field("yaw_rad", "f8", unit="rad"),
-            Field("pitch_rad", "f8", unit="rad"),
-            Field("roll_rad", "f8", unit="rad"),
-            Field("acceleration_m_s2", "f8", 3, "m/s^2"),
+            PackedField("yaw_rad", "f8", unit="rad"),
+            PackedField("pitch_rad", "f8", unit="rad"),
+            PackedField("roll_rad", "f8", unit="rad"),
+            PackedField("acceleration_m_s2", "f8", 3, "m/s^2"),
         ),
     ),
     Topic(
         name="scene",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="perception",
         rate_hz=5,
         deadline_s=2.0,
         summary="objects with id, class, colour, map-frame position, size, last seen, as JSON",
-        fields=(Field("document", "json", 32768),),
+        fields=(PackedField("document", "json", 32768),),
     ),
     Topic(
         name="rgbd",
-        kind=Kind.FRAME,
+        kind=TopicKind.FRAME,
         owner="perception",
         rate_hz=5,
         deadline_s=2.0,
@@ -282,7 +284,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="utterance",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="a command in words, or a whole plan as JSON, with its command id",
         slots=32,
@@ -290,7 +292,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="say",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="what the robot is to say aloud: say id and text; or a say id to take back",
         slots=32,
@@ -298,7 +300,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="voice_event",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="speech",
         summary="what became of what was to be said: began, finished, interrupted, failed, dropped",
         slots=64,
@@ -306,7 +308,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="plan",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="planner",
         summary="validated plans for the executor",
         slots=16,
@@ -314,7 +316,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="task_event",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="what became of a command: planning, asked, plan, rejected, action, said, finished",
         slots=256,
@@ -322,25 +324,25 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="executor_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="executor",
         rate_hz=10,
         deadline_s=1.0,
         summary="active command and action, what each hand holds, as JSON",
-        fields=(Field("document", "json", 8192),),
+        fields=(PackedField("document", "json", 8192),),
     ),
     Topic(
         name="planner_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="planner",
         rate_hz=2,
         deadline_s=2.0,
         summary="commands in work, what was asked, how each rung has been doing, as JSON",
-        fields=(Field("document", "json", 16384),),
+        fields=(PackedField("document", "json", 16384),),
     ),
     Topic(
         name="heard",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="speech",
         summary="what was understood of each phrase: text, confidence, verdict and its reason",
         slots=64,
@@ -348,43 +350,43 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="speech_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="speech",
         rate_hz=5,
         deadline_s=2.0,
         summary="whether the robot hears and speaks, why not, how well and how fast, as JSON",
-        fields=(Field("document", "json", 8192),),
+        fields=(PackedField("document", "json", 8192),),
     ),
     Topic(
         name="dashboard_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="dashboard",
         rate_hz=2,
         deadline_s=3.0,
         summary="where the page is and who looks at it, as JSON",
-        fields=(Field("document", "json", 1024),),
+        fields=(PackedField("document", "json", 1024),),
     ),
     Topic(
         name="stop_door_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="stop_door",
         rate_hz=2,
         deadline_s=3.0,
         summary="where the stop door listens and how often it was used, as JSON",
-        fields=(Field("document", "json", 1024),),
+        fields=(PackedField("document", "json", 1024),),
     ),
     Topic(
         name="ros_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="ros",
         rate_hz=2,
         deadline_s=3.0,
         summary="the ROS 2 graph that the robot is in, what is under way for it, as JSON",
-        fields=(Field("document", "json", 4096),),
+        fields=(PackedField("document", "json", 4096),),
     ),
     Topic(
         name="ros_request",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="executor",
         summary="goals for servers beyond the robot, their cancels, and leave to drive",
         slots=32,
@@ -392,7 +394,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="ros_answer",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="ros",
         summary="how a goal stands with its server: accepted, feedback, cancelling, how it ended",
         slots=64,
@@ -400,20 +402,20 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="remote_base_command",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="ros",
         rate_hz=20,
         deadline_s=0.25,
         summary="base velocity wanted from beyond the robot; control takes the younger of the two",
         fields=(
-            Field("v_m_s", "f8", unit="m/s"),
-            Field("w_rad_s", "f8", unit="rad/s"),
-            Field("valid_s", "f8", unit="s, then it is stale"),
+            PackedField("v_m_s", "f8", unit="m/s"),
+            PackedField("w_rad_s", "f8", unit="rad/s"),
+            PackedField("valid_s", "f8", unit="s, then it is stale"),
         ),
     ),
     Topic(
         name="page_sound",
-        kind=Kind.RECORD,
+        kind=TopicKind.RECORD,
         owner="dashboard",
         summary="what a person says into a browser's microphone, and how their turn ends",
         slots=64,
@@ -422,68 +424,68 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="twin_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="twin",
         rate_hz=2,
         deadline_s=3.0,
         summary="simulated time and how well it keeps pace with the wall clock, as JSON",
-        fields=(Field("document", "json", 1024),),
+        fields=(PackedField("document", "json", 1024),),
     ),
     Topic(
         name="process_table",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="state, pid, restarts, memory and CPU of every process, as JSON",
-        fields=(Field("document", "json", 16384),),
+        fields=(PackedField("document", "json", 16384),),
     ),
     Topic(
         name="resource_directives",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="what the budgets ask of each process: rate, model, suspension, as JSON",
-        fields=(Field("document", "json", 4096),),
+        fields=(PackedField("document", "json", 4096),),
     ),
     Topic(
         name="claims",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="any",
         summary="who holds and who waits for which resource, as JSON; on change",
-        fields=(Field("document", "json", 8192),),
+        fields=(PackedField("document", "json", 8192),),
     ),
     Topic(
         name="budget",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="every budget's line, the ladder, what is enforced how, as JSON",
-        fields=(Field("document", "json", 32768),),
+        fields=(PackedField("document", "json", 32768),),
     ),
     Topic(
         name="board",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="every reading of the computer by name, or why there is none, as JSON",
-        fields=(Field("document", "json", 32768),),
+        fields=(PackedField("document", "json", 32768),),
     ),
     Topic(
         name="budget_stop",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="whether a budget demands that the robot stops, and why, as JSON; for control",
-        fields=(Field("document", "json", 4096),),
+        fields=(PackedField("document", "json", 4096),),
     ),
     Topic(
         name="profile_request",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="asks the supervisor for another profile: request id, name, permission to restart",
         slots=8,
@@ -491,7 +493,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="profile_change",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="supervisor",
         summary="phases of a profile change, for every process: prepare, commit, validate, ...",
         slots=16,
@@ -499,7 +501,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="profile_answer",
-        kind=Kind.RING,
+        kind=TopicKind.RING,
         owner="any",
         summary="what each process says to a phase of a profile change",
         slots=64,
@@ -507,12 +509,12 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(
         name="profile_status",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="supervisor",
         rate_hz=2,
         deadline_s=3.0,
         summary="profile in force, phase of a change, how the last one ended, as JSON",
-        fields=(Field("document", "json", 4096),),
+        fields=(PackedField("document", "json", 4096),),
     ),
 )
 

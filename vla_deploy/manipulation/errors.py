@@ -14,7 +14,7 @@ class TooWide(ManipulationError):
     """Say that an object does not fit between the fingers."""
 
 
-class Unreachable(ManipulationError):
+class PostureUnreachable(ManipulationError):
     """Say that no posture within the limits brings the hand there."""
 
     def __init__(self, reason: str, *, position_error_m: float, rotation_error_rad: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
-from vla_deploy.manipulation.errors import Unreachable
+from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
 
@@ -161,9 +161,9 @@ class ArmKinematics:
                 f"{self.side} hand: the straight line needs a jump of {jump:.2f} rad at "
                 f"{ratio:.0%} of its length; start from another posture"
             )
-            raise Unreachable(reason, position_error_m=0.0, rotation_error_rad=0.0)
+            raise PostureUnreachable(reason, position_error_m=0.0, rotation_error_rad=0.0)
 
-    def _unreachable(self, target: Array, nearest: IkSolution, starts: int) -> Unreachable:
+    def _unreachable(self, target: Array, nearest: IkSolution, starts: int) -> PostureUnreachable:
         arm = nearest.positions[self._columns]
         at_limit = (arm - self._low < AT_LIMIT_RAD) | (self._high - arm < AT_LIMIT_RAD)
         held = ", ".join(name for name, is_at in zip(self._names, at_limit, strict=True) if is_at)
@@ -174,7 +174,7 @@ class ArmKinematics:
             f"{nearest.position_error_m * 1000:.1f} mm and {nearest.rotation_error_rad:.3f} rad"
             f"{f', at the limit of {held}' if held else ''}; stand elsewhere or turn the hand"
         )
-        return Unreachable(
+        return PostureUnreachable(
             reason,
             position_error_m=nearest.position_error_m,
             rotation_error_rad=nearest.rotation_error_rad,

@@ -12,7 +12,7 @@ def unix_s() -> float:
     return datetime.now(UTC).timestamp()
 
 
-class Outcome(StrEnum):
+class EpisodeOutcome(StrEnum):
     """Say what came of a command."""
 
     SUCCEEDED = "succeeded"
@@ -30,7 +30,7 @@ class Episode:
 
     told_s: float
     command: str
-    outcome: Outcome
+    outcome: EpisodeOutcome
     source: str = ""
     goal: str = ""
     reasoning: str = ""

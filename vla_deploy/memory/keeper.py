@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import CellReader, Event, RingReader, SharedSpace
-from vla_deploy.memory.episode import Episode, LastSeen, Outcome
+from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen
 from vla_deploy.memory.errors import MemoryUnusable
 from vla_deploy.memory.store import MemoryStore
 from vla_deploy.world import SceneUnreadable, Snapshot, Thing, read_snapshot
@@ -100,7 +100,7 @@ class MemoryKeeper:
         self._open[command_id] = Episode(
             told_s=self._wall_s(),
             command=text,
-            outcome=Outcome.REFUSED,
+            outcome=EpisodeOutcome.REFUSED,
             source=str(told.get("source", "")),
         )
         while len(self._open) > MOST_OPEN:
@@ -208,17 +208,19 @@ def _planned(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
 
 
 def _refused(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
-    return replace(episode, outcome=Outcome.REFUSED, error=str(told.get("reason") or "")), True
+    return replace(
+        episode, outcome=EpisodeOutcome.REFUSED, error=str(told.get("reason") or "")
+    ), True
 
 
 def _finished(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
-    outcome = Outcome.SUCCEEDED if told.get("success") else Outcome.FAILED
+    outcome = EpisodeOutcome.SUCCEEDED if told.get("success") else EpisodeOutcome.FAILED
     return replace(episode, outcome=outcome, error=str(told.get("error") or "")), True
 
 
 def _answered(episode: Episode, _: Mapping[str, Any]) -> tuple[Episode, bool]:
     """End an utterance that answered a question: what came of it is told of the question."""
-    return replace(episode, outcome=Outcome.SUCCEEDED), True
+    return replace(episode, outcome=EpisodeOutcome.SUCCEEDED), True
 
 
 _Follow = Callable[[Episode, Mapping[str, Any]], tuple[Episode, bool]]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from vla_deploy.memory.embedding import Embedder, LetterGroups
-from vla_deploy.memory.episode import Episode, LastSeen, Outcome, Recollection
+from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen, Recollection
 from vla_deploy.memory.errors import MemoryUnusable, NoSuchEpisode
 from vla_deploy.memory.schema import open_file
 from vla_deploy.memory.search import search, vectors_of
@@ -224,7 +224,11 @@ def _told(path: Path) -> Iterator[None]:
 def _episode(row: Sequence[Any]) -> Episode:
     values = dict(zip(_EPISODE.split(", "), row, strict=True))
     return Episode(
-        **{**values, "outcome": Outcome(values["outcome"]), "plan": json.loads(values["plan"])}
+        **{
+            **values,
+            "outcome": EpisodeOutcome(values["outcome"]),
+            "plan": json.loads(values["plan"]),
+        }
     )
 
 

@@ -2,15 +2,15 @@
 
 from typing import Final
 
-from vla_deploy.memory.episode import Episode, LastSeen, Outcome
+from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen
 
 _MINUTE_S: Final = 60.0
 _HOUR_S: Final = 3600.0
 _DAY_S: Final = 86_400.0
 _ENDS: Final = {
-    Outcome.SUCCEEDED: "and it was done",
-    Outcome.FAILED: "and it failed",
-    Outcome.REFUSED: "and it was refused",
+    EpisodeOutcome.SUCCEEDED: "and it was done",
+    EpisodeOutcome.FAILED: "and it failed",
+    EpisodeOutcome.REFUSED: "and it was refused",
 }
 
 

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from vla_deploy.model_servers.errors import PrivacyRefused, TimedOut, Unreachable
+from vla_deploy.model_servers.errors import PrivacyRefused, ServerUnreachable, TimedOut
 from vla_deploy.model_servers.settings import ServerSettings
 
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
@@ -31,7 +31,7 @@ def resolve(host: str, port: int, timeout_s: float) -> tuple[str, ...]:
         raise TimedOut(f"{host}: no address within {timeout_s:g} s; look at the name server")
     if isinstance(found[0], OSError):
         reason = found[0].strerror or found[0]
-        raise Unreachable(f"{host}: no address: {reason}", was_sent=False) from found[0]
+        raise ServerUnreachable(f"{host}: no address: {reason}", was_sent=False) from found[0]
     return found[0]
 
 

@@ -7,14 +7,14 @@ from typing import Any, Final, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from vla_deploy.model_servers.chat import Chat, Completion, Message, Role
+from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole, Completion
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerInvalid,
     AnswerMalformed,
     AnswerUnusable,
-    RequestRefused,
     ServerFailed,
+    ServerRefused,
 )
 from vla_deploy.model_servers.json_answer import objects_in
 from vla_deploy.model_servers.server import ModelServer
@@ -79,7 +79,7 @@ class StructuredAsker(Generic[Shape]):
             final = frozenset[int]() if rung == rungs[-1] else _NO_SUCH_RUNG
             try:
                 completion = self._server.complete(chat, rung, ends, final)
-            except (RequestRefused, ServerFailed) as error:
+            except (ServerRefused, ServerFailed) as error:
                 if error.status not in final:
                     raise
                 continue
@@ -117,6 +117,8 @@ def _in_words(schema: Mapping[str, Any]) -> str:
 def _repair(chat: Chat, text: str, error: AnswerUnusable) -> Chat:
     """Return the conversation that sends an answer back, without images: its form is wrong."""
     before = tuple(replace(message, images=()) for message in chat.messages)
-    said = Message(role=Role.ASSISTANT, text=text[:_ECHOED_CHARACTERS])
-    wish = Message(text=f"That cannot be used: {error}. Answer again with the JSON object only.")
+    said = ChatMessage(role=ChatRole.ASSISTANT, text=text[:_ECHOED_CHARACTERS])
+    wish = ChatMessage(
+        text=f"That cannot be used: {error}. Answer again with the JSON object only."
+    )
     return replace(chat, messages=(*before, said, wish))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from vla_deploy.model_servers.errors import ModelServerError, ServerFailed, Unreachable
+from vla_deploy.model_servers.errors import ModelServerError, ServerFailed, ServerUnreachable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +26,6 @@ class Backoff:
 
 def may_pass(error: ModelServerError) -> bool:
     """Tell whether the same request may succeed a little later, and was not carried out."""
-    if isinstance(error, Unreachable):
+    if isinstance(error, ServerUnreachable):
         return not error.was_sent
     return isinstance(error, ServerFailed)

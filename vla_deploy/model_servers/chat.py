@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Any
 
 
-class Role(StrEnum):
+class ChatRole(StrEnum):
     """Say who speaks in a conversation."""
 
     USER = "user"
@@ -14,11 +14,11 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Message:
+class ChatMessage:
     """Hold one turn; `images` are JPEG files, of the user's turns only."""
 
     text: str
-    role: Role = Role.USER
+    role: ChatRole = ChatRole.USER
     images: tuple[bytes, ...] = ()
 
 
@@ -29,7 +29,7 @@ class Chat:
     `schema` is the JSON Schema that the answer should have, `schema_name` what to call it.
     """
 
-    messages: tuple[Message, ...]
+    messages: tuple[ChatMessage, ...]
     system: str = ""
     schema: Mapping[str, Any] | None = None
     schema_name: str = "answer"

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from drivers.clock import NS_PER_S
 from vla_deploy.model_servers.asking import StructuredAsker
-from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.server import ModelServer
 
@@ -27,7 +27,7 @@ class Colour(BaseModel):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
+class ServerCheck:
     """Hold what was found; None where it was not tried, or the server does not say.
 
     `sees` is proven by a test card that has nothing to do with where the robot is.
@@ -55,16 +55,18 @@ class Check:
         return {**dataclasses.asdict(self), "is_ok": self.is_ok}
 
 
-def check_server(server: ModelServer, ask: bool) -> Check:
+def check_server(server: ModelServer, ask: bool) -> ServerCheck:
     """Look at a server; with `ask`, let its model answer a question, about a picture if it may."""
     began_ns = server.clock.now_ns()
     try:
         facts = server.models()
     except AnswerUnusable as error:
-        return Check(server=server.name, is_reachable=True, has_model=False, detail=str(error))
+        return ServerCheck(
+            server=server.name, is_reachable=True, has_model=False, detail=str(error)
+        )
     except ModelServerError as error:
-        return Check(server=server.name, is_reachable=False, detail=str(error))
-    found = Check(
+        return ServerCheck(server=server.name, is_reachable=False, detail=str(error))
+    found = ServerCheck(
         server=server.name,
         is_reachable=True,
         latency_s=_since_s(server, began_ns),
@@ -75,13 +77,13 @@ def check_server(server: ModelServer, ask: bool) -> Check:
     return _asked(server, found) if ask and facts.is_present else found
 
 
-def _asked(server: ModelServer, found: Check) -> Check:
+def _asked(server: ModelServer, found: ServerCheck) -> ServerCheck:
     asker = StructuredAsker(server, Colour)
     images = (_red_card(),) if server.settings.vision else ()
     text = "Which colour has the picture?" if images else "Which colour has a ripe tomato?"
     began_ns = server.clock.now_ns()
     try:
-        colour = asker.ask(Chat(messages=(Message(text=text, images=images),))).colour
+        colour = asker.ask(Chat(messages=(ChatMessage(text=text, images=images),))).colour
     except ModelServerError as error:
         return dataclasses.replace(found, answers=False, detail=str(error))
     return dataclasses.replace(

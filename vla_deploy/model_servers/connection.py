@@ -12,7 +12,7 @@ import httpcore2
 
 from vla_deploy.model_servers.addresses import Resolve, check_address
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.model_servers.errors import TimedOut, Unreachable
+from vla_deploy.model_servers.errors import ServerUnreachable, TimedOut
 from vla_deploy.model_servers.settings import ServerSettings
 
 # The client sends a buffer in a loop with one time-out for each turn: small buffers, few turns.
@@ -58,7 +58,9 @@ class GuardedBackend(httpcore2.NetworkBackend):
                 reasons.append(f"{address}: {error}")
                 continue
             return self._checked(stream)
-        raise Unreachable(f"no connection to {host}:{port}: {'; '.join(reasons)}", was_sent=False)
+        raise ServerUnreachable(
+            f"no connection to {host}:{port}: {'; '.join(reasons)}", was_sent=False
+        )
 
     def _checked(self, stream: httpcore2.NetworkStream) -> httpcore2.NetworkStream:
         """Ask the socket itself whom it has reached."""
@@ -124,8 +126,8 @@ def client_errors(settings: ServerSettings) -> Iterator[None]:
         limit_s = settings.read_timeout_s
         raise TimedOut(f"{where}: silent for {limit_s:g} s, or no time left") from error
     except httpcore2.ConnectError as error:
-        raise Unreachable(f"{where}: no connection: {error}", was_sent=False) from error
+        raise ServerUnreachable(f"{where}: no connection: {error}", was_sent=False) from error
     except httpcore2.NetworkError as error:
-        raise Unreachable(f"{where}: the connection broke: {error}", was_sent=True) from error
+        raise ServerUnreachable(f"{where}: the connection broke: {error}", was_sent=True) from error
     except httpcore2.ProtocolError as error:
-        raise Unreachable(f"{where}: no whole HTTP answer: {error}", was_sent=True) from error
+        raise ServerUnreachable(f"{where}: no whole HTTP answer: {error}", was_sent=True) from error

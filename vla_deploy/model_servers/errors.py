@@ -46,7 +46,7 @@ class PrivacyRefused(ModelServerError):
     """Say what would have left the robot, and that nothing did."""
 
 
-class RequestRefused(ModelServerError):
+class ServerRefused(ModelServerError):
     """Say why a server refuses a request; `status` is that of HTTP, 0 where it was not sent."""
 
     def __init__(self, message: str, status: int = 0) -> None:
@@ -66,7 +66,7 @@ class CircuitOpen(Unavailable):
     """Say that a server is left alone for a while after repeated failures."""
 
 
-class Unreachable(Unavailable):
+class ServerUnreachable(Unavailable):
     """Say that there is no connection to a server; `was_sent` where it broke after the request."""
 
     def __init__(self, message: str, *, was_sent: bool) -> None:

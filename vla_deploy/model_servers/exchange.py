@@ -12,7 +12,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
     AnswerTooLarge,
-    RequestRefused,
+    ServerRefused,
 )
 from vla_deploy.model_servers.formats.base import WireRequest
 from vla_deploy.model_servers.settings import ServerSettings
@@ -21,7 +21,7 @@ _BYTES_PER_KB: Final = 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class ServerReply:
     """Hold what a server sent; header names are in small letters."""
 
     status: int
@@ -40,7 +40,9 @@ class Exchange:
         self._resolve = resolve
         self._tls: ssl.SSLContext | None = None
 
-    def send(self, request: WireRequest, headers: Mapping[str, str], deadline: Deadline) -> Reply:
+    def send(
+        self, request: WireRequest, headers: Mapping[str, str], deadline: Deadline
+    ) -> ServerReply:
         """Send a request and return the whole reply, whatever its status.
 
         Raises:
@@ -79,7 +81,7 @@ class Exchange:
         ):
             return self._reply(response)
 
-    def _reply(self, response: Any) -> Reply:
+    def _reply(self, response: Any) -> ServerReply:
         headers = {
             name.decode("latin-1").lower(): value.decode("latin-1")
             for name, value in response.headers
@@ -96,7 +98,7 @@ class Exchange:
                     f"{self._settings.url}: expected at most {limit / _BYTES_PER_KB:.0f} KB, "
                     "got more; raise max_answer_bytes if that is right"
                 )
-        return Reply(status=response.status, headers=headers, body=bytes(body))
+        return ServerReply(status=response.status, headers=headers, body=bytes(body))
 
     def _tls_context(self) -> ssl.SSLContext | None:
         if not self._settings.url.startswith("https://"):
@@ -114,7 +116,7 @@ def _open_tls(settings: ServerSettings) -> ssl.SSLContext:
     try:
         return ssl.create_default_context(cafile=settings.ca_file)
     except OSError as error:  # SSLError is one
-        raise RequestRefused(f"ca_file: {settings.ca_file}: {error}") from error
+        raise ServerRefused(f"ca_file: {settings.ca_file}: {error}") from error
 
 
 def _headers(

@@ -8,8 +8,8 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from vla_deploy.model_servers.credentials import Secret
-from vla_deploy.model_servers.errors import AnswerMalformed, RequestRefused, ServerFailed
-from vla_deploy.model_servers.exchange import Reply
+from vla_deploy.model_servers.errors import AnswerMalformed, ServerFailed, ServerRefused
+from vla_deploy.model_servers.exchange import ServerReply
 from vla_deploy.model_servers.formats.base import Json
 from vla_deploy.model_servers.json_answer import strict_json
 from vla_deploy.model_servers.settings import ServerSettings
@@ -26,7 +26,7 @@ _REASON_CHARACTERS: Final = 200
 _SECONDS: Final = re.compile(r"\d{1,9}(\.\d{1,9})?")
 
 
-def document_of(reply: Reply, settings: ServerSettings, key: Secret | None) -> Json:
+def document_of(reply: ServerReply, settings: ServerSettings, key: Secret | None) -> Json:
     """Return the JSON object that a server answers with.
 
     Raises:
@@ -37,16 +37,16 @@ def document_of(reply: Reply, settings: ServerSettings, key: Secret | None) -> J
     if 200 <= reply.status < 300:
         return _object(reply)
     if 300 <= reply.status < 400:
-        raise RequestRefused(_elsewhere(reply, settings), reply.status)
+        raise ServerRefused(_elsewhere(reply, settings), reply.status)
     said = _said(reply, key)
     message = f"{settings.url}: HTTP {reply.status}{said}"
     spent = not _SPENT.isdisjoint(_codes(_error(reply)))
     if reply.status >= 500 or (reply.status in _PASSING and not spent):
         raise ServerFailed(message, reply.status, retry_after_s(reply))
-    raise RequestRefused(message + _remedy(reply.status, settings), reply.status)
+    raise ServerRefused(message + _remedy(reply.status, settings), reply.status)
 
 
-def retry_after_s(reply: Reply) -> float | None:
+def retry_after_s(reply: ServerReply) -> float | None:
     """Return how long the server asks to be left alone; a date counts from the reply's own."""
     text = reply.headers.get("retry-after", "").strip()
     if _SECONDS.fullmatch(text):
@@ -57,7 +57,7 @@ def retry_after_s(reply: Reply) -> float | None:
     return max(0.0, (until - now).total_seconds())
 
 
-def _object(reply: Reply) -> Json:
+def _object(reply: ServerReply) -> Json:
     try:
         found = strict_json(reply.body.decode("utf-8"))
     except ValueError as error:
@@ -67,7 +67,7 @@ def _object(reply: Reply) -> Json:
     return found
 
 
-def _elsewhere(reply: Reply, settings: ServerSettings) -> str:
+def _elsewhere(reply: ServerReply, settings: ServerSettings) -> str:
     parts = urlsplit(reply.headers.get("location", ""))
     target = f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}" if parts.netloc else "elsewhere"
     return (
@@ -76,7 +76,7 @@ def _elsewhere(reply: Reply, settings: ServerSettings) -> str:
     )
 
 
-def _said(reply: Reply, key: Secret | None) -> str:
+def _said(reply: ServerReply, key: Secret | None) -> str:
     if reply.status in _ABOUT_KEYS:
         return ""
     error = _error(reply)
@@ -86,7 +86,7 @@ def _said(reply: Reply, key: Secret | None) -> str:
     return f": {told[:_REASON_CHARACTERS]}" if told else ""
 
 
-def _error(reply: Reply) -> dict[str, Any]:
+def _error(reply: ServerReply) -> dict[str, Any]:
     """Return the object that describes an error, empty where there is none."""
     try:
         document = _object(reply)

@@ -14,8 +14,8 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerUnusable,
     ModelServerError,
-    RequestRefused,
     ServerFailed,
+    ServerRefused,
     TimedOut,
     Unavailable,
 )
@@ -86,7 +86,7 @@ class ModelServer:
         try:
             check_privacy(self.name, self.settings, chat)
             if chat.has_images and not self.settings.vision:
-                raise RequestRefused(f"server {self.name} takes no images; it has no vision = true")
+                raise ServerRefused(f"server {self.name} takes no images; it has no vision = true")
             request = self.format.request(self.settings, chat, rung or self.format.rungs[0])
             self._rate.take()
             with self._admission.place(ends):
@@ -128,7 +128,7 @@ class ModelServer:
         """Return a reply about models; None where the server knows nothing of what is asked."""
         try:
             return self._send(request, ends)
-        except RequestRefused as error:
+        except ServerRefused as error:
             if error.status == 404:
                 return None
             raise
@@ -164,7 +164,7 @@ class ModelServer:
             else:
                 self._breaker.failed()
             raise
-        except (AnswerUnusable, RequestRefused):
+        except (AnswerUnusable, ServerRefused):
             self._breaker.succeeded()  # it answers, whatever that is worth
             raise
         except BaseException:

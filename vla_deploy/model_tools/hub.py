@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, ToolMissing
+from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, PackageMissing
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.runtime.one_line import one_line
 
@@ -118,7 +118,7 @@ def _client() -> Any:
     try:
         return import_module("huggingface_hub")
     except ImportError as error:
-        raise ToolMissing(
+        raise PackageMissing(
             "fetching needs the hub's client: pip install 'vla-deploy[speech]'"
         ) from error
 

@@ -10,7 +10,7 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Whisper
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 
 CARD: Final = "card.md"
 T = TypeVar("T")
@@ -64,8 +64,8 @@ def require_free(store: ModelStore, name: str, *, replace: bool) -> None:
 
 
 def keep_folder(
-    store: ModelStore, source: FolderSource, manifest: Manifest, try_out: Callable[[Model], T]
-) -> tuple[Model, T]:
+    store: ModelStore, source: FolderSource, manifest: Manifest, try_out: Callable[[StoredModel], T]
+) -> tuple[StoredModel, T]:
     """Keep a model that is a folder of files, as `keep_tried` does."""
     files = {part.path: source.folder / part.path for part in manifest.parts}
     return keep_tried(store, manifest, files, source.card, try_out)
@@ -76,8 +76,8 @@ def keep_tried(
     manifest: Manifest,
     files: Mapping[str, Path],
     card: Path | None,
-    try_out: Callable[[Model], T],
-) -> tuple[Model, T]:
+    try_out: Callable[[StoredModel], T],
+) -> tuple[StoredModel, T]:
     """Copy a model's files and its card under their names, try it out there, and install it.
 
     Returns the model and what the trial gave; when anything is wrong, nothing has changed.
@@ -96,8 +96,8 @@ def keep_tried(
             shutil.copyfile(card, draft / CARD)
         write_manifest(draft, manifest)
         read_manifest(draft)
-        told = try_out(Model(manifest=manifest, folder=draft, is_embedded=False))
+        told = try_out(StoredModel(manifest=manifest, folder=draft, is_embedded=False))
         folder = store.install(draft)
     finally:
         store.abandon(draft)
-    return Model(manifest=manifest, folder=folder, is_embedded=False), told
+    return StoredModel(manifest=manifest, folder=folder, is_embedded=False), told

@@ -17,10 +17,10 @@ from vla_deploy.inference.language_model import (
 )
 from vla_deploy.inference.language_model.model_folder import CONFIG, TEMPLATE, read_genai_config
 from vla_deploy.inference.language_schema import GENAI_CONFIG, PLANNER, TOKENIZER
-from vla_deploy.inference.manifest import Language, Manifest, Use
+from vla_deploy.inference.manifest import Language, LanguageUse, Manifest
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.stats import resident_mb
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
 
@@ -54,7 +54,7 @@ def add_language_model(
     clock: Clock,
     replace: bool = False,
     choice: ModelChoice = PLAIN_CHOICE,
-) -> tuple[Model, ModelAnswer]:
+) -> tuple[StoredModel, ModelAnswer]:
     """Check a model, try it out as `choice` says, keep it; when anything is wrong, nothing changes.
 
     Returns the model, and its answer to a small command.
@@ -82,7 +82,7 @@ def describe(source: LanguageModelSource) -> Manifest:
     if missing:
         faults = tuple(f"{name} is missing; export the model again" for name in missing)
         raise ModelMismatch(str(source.folder), faults)
-    language = Language(use=Use.CHAT, most_tokens=source.most_tokens)
+    language = Language(use=LanguageUse.CHAT, most_tokens=source.most_tokens)
     return source.manifest(PLANNER, names, language=language)
 
 
@@ -91,7 +91,7 @@ def is_part(name: str) -> bool:
     return name in _PARTS or name.endswith(_WEIGHTS)
 
 
-def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> ModelAnswer:
+def try_out(model: StoredModel, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> ModelAnswer:
     """Return a model's answer to a small command, as JSON of a small schema.
 
     Raises:
@@ -112,7 +112,7 @@ def _ask(model: LanguageModel, clock: Clock) -> ModelAnswer:
     return model.answer(_TRIAL, bounds, dict(_TRIAL_SCHEMA))
 
 
-def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> dict[str, Any]:
+def bench(model: StoredModel, choice: ModelChoice, *, rounds: int, clock: Clock) -> dict[str, Any]:
     """Return the figures of a model, as JSON takes them.
 
     `answer_*_s` are of answers to the same small command, `read_tokens_per_s` of a prompt of

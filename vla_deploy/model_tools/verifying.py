@@ -11,7 +11,7 @@ from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.session import ModelSession, open_session
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools import language_models, whispers
 from vla_deploy.model_tools.detectors.trial import only, try_out
 from vla_deploy.perception.detectors.detector import Detector
@@ -19,7 +19,7 @@ from vla_deploy.speech.errors import SpeechError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class ModelFinding:
     """Hold one check and how it came out."""
 
     model: str
@@ -28,7 +28,7 @@ class Finding:
     detail: str
 
 
-def verify(shelf: ModelShelf, name: str, profile: Profile | None = None) -> Iterator[Finding]:
+def verify(shelf: ModelShelf, name: str, profile: Profile | None = None) -> Iterator[ModelFinding]:
     """Check a model by itself and, where a profile is given, as that profile would run it.
 
     A model of several files, which takes seconds to load, is run once.
@@ -36,9 +36,9 @@ def verify(shelf: ModelShelf, name: str, profile: Profile | None = None) -> Iter
     try:
         model = shelf.store.load(name)
     except InferenceError as error:
-        yield Finding(model=name, check="manifest", is_ok=False, detail=str(error))
+        yield ModelFinding(model=name, check="manifest", is_ok=False, detail=str(error))
         return
-    yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
+    yield ModelFinding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
     if model.manifest.parts:
         yield _finding(name, "files", partial(_all_parts, model))
     for variant in model.manifest.files:
@@ -50,23 +50,23 @@ def verify(shelf: ModelShelf, name: str, profile: Profile | None = None) -> Iter
         yield _finding(name, "run", partial(_parts_tried, shelf, model, None))
 
 
-def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
+def _finding(model: str, check: str, act: Callable[[], str]) -> ModelFinding:
     try:
-        return Finding(model=model, check=check, is_ok=True, detail=act())
+        return ModelFinding(model=model, check=check, is_ok=True, detail=act())
     except (InferenceError, SpeechError) as error:
-        return Finding(model=model, check=check, is_ok=False, detail=str(error))
+        return ModelFinding(model=model, check=check, is_ok=False, detail=str(error))
 
 
-def _all_parts(model: Model) -> str:
+def _all_parts(model: StoredModel) -> str:
     check_parts(model)
     return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
 
 
-def _whole(model: Model, variant: Variant) -> str:
+def _whole(model: StoredModel, variant: Variant) -> str:
     return f"{checked_file(model, variant).name}, SHA-256 as in the manifest"
 
 
-def _trial(shelf: ModelShelf, model: Model, variant: Variant) -> str:
+def _trial(shelf: ModelShelf, model: StoredModel, variant: Variant) -> str:
     """Run one file on the CPU, whatever it is made for."""
     session = open_session(
         only(model, variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
@@ -74,7 +74,7 @@ def _trial(shelf: ModelShelf, model: Model, variant: Variant) -> str:
     return _tried(session)
 
 
-def _as_profile(shelf: ModelShelf, model: Model, profile: Profile) -> str:
+def _as_profile(shelf: ModelShelf, model: StoredModel, profile: Profile) -> str:
     choice = choice_for(model.manifest.role, profile)
     if model.manifest.parts:
         return _parts_tried(shelf, model, choice)
@@ -83,7 +83,7 @@ def _as_profile(shelf: ModelShelf, model: Model, profile: Profile) -> str:
     return f"{told}; {_tried(session)}"
 
 
-def _parts_tried(shelf: ModelShelf, model: Model, choice: ModelChoice | None) -> str:
+def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | None) -> str:
     """Run a model of several files, as plainly as it goes without a choice."""
     if model.manifest.whisper is None:
         answer = language_models.try_out(model, shelf.clock, choice or PLAIN_CHOICE)

@@ -19,7 +19,7 @@ from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.recording import sound_of
@@ -67,7 +67,7 @@ def known_recordings(folder: Path) -> list[KnownSound]:
 
 
 def calibrate(
-    model: Model, choice: ModelChoice, known: Sequence[KnownSound], *, beam: int, clock: Clock
+    model: StoredModel, choice: ModelChoice, known: Sequence[KnownSound], *, beam: int, clock: Clock
 ) -> Calibrated:
     """Read every recording and learn how sure the model's words are.
 
@@ -104,7 +104,7 @@ def learn(
     )
 
 
-def keep(model: Model, calibration: Calibration) -> None:
+def keep(model: StoredModel, calibration: Calibration) -> None:
     """Write the weights into the manifest of a model that was added.
 
     Raises:

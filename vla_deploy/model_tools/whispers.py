@@ -13,7 +13,7 @@ from platforms import ModelChoice
 from vla_deploy.inference import opening
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.manifest import Manifest, Whisper
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.inference.whisper_schema import NEEDED_PARTS, SPEECH_TO_TEXT, VOCABULARIES
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
@@ -37,7 +37,7 @@ class WhisperSource(FolderSource):
 
 def add_whisper(
     store: ModelStore, source: WhisperSource, *, clock: Clock, replace: bool = False
-) -> tuple[Model, Transcript]:
+) -> tuple[StoredModel, Transcript]:
     """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
 
     Returns the model, and what it reads in a second of silence.
@@ -71,7 +71,7 @@ def describe(source: WhisperSource) -> Manifest:
     return source.manifest(SPEECH_TO_TEXT, there, whisper=source.whisper)
 
 
-def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Transcript:
+def try_out(model: StoredModel, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Transcript:
     """Return what a model reads in a second of silence.
 
     Raises:
@@ -86,7 +86,7 @@ def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> T
 
 
 def bench(
-    model: Model,
+    model: StoredModel,
     choice: ModelChoice,
     sounds: Mapping[str, Sound],
     *,

@@ -41,7 +41,7 @@ FROZEN_TURN_RAD = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class OdometryStep:
     """Tell one dead-reckoned step in the base's frame, and its variances."""
 
     motion: Pose2D
@@ -70,7 +70,7 @@ class DeadReckoning:
         """Tell whether the IMU kept to one yaw while the wheels turned the robot."""
         return self._same_yaws >= FROZEN_SAMPLES and abs(self._turned_rad) > FROZEN_TURN_RAD
 
-    def move(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> Step:
+    def move(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> OdometryStep:
         """Move by what wheels (way) and IMU (turn) say since the last call; return the step.
 
         Without a usable IMU the wheels' turn is taken.
@@ -154,13 +154,15 @@ class DeadReckoning:
             history.popleft()
 
 
-def _step(wheels: Pose2D, imu_turn_rad: float | None, elapsed_s: float, leapt: bool) -> Step:
+def _step(
+    wheels: Pose2D, imu_turn_rad: float | None, elapsed_s: float, leapt: bool
+) -> OdometryStep:
     way_m = math.hypot(wheels.x_m, wheels.y_m)
     turn_rad = wheels.yaw_rad if imu_turn_rad is None else imu_turn_rad
     silent_s = elapsed_s if elapsed_s > SILENT_S else 0.0
     slip_m2 = SLIP_RATIO**2 * SLIP_LENGTH_M * way_m + SILENT_M2_S * silent_s
     leap_m2 = JUMP_SIGMA_M**2 if leapt else 0.0
-    return Step(
+    return OdometryStep(
         motion=Pose2D(wheels.x_m, wheels.y_m, turn_rad),
         duration_s=elapsed_s,
         along_m2=slip_m2 + leap_m2,

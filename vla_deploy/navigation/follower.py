@@ -43,7 +43,7 @@ MIN_TURN_RATE_RAD_S = 0.06
 MIN_SPEED_M_S = 0.02
 
 
-class Phase(Enum):
+class FollowerPhase(Enum):
     """Name what the follower is doing."""
 
     ALIGN = "align"
@@ -62,15 +62,15 @@ class PathFollower:
         self._limits = limits
         self._final_yaw_rad = final_yaw_rad
         self._segment = 0
-        self.phase = Phase.ALIGN
+        self.phase = FollowerPhase.ALIGN
 
     def step(self, x_m: float, y_m: float, yaw_rad: float) -> Twist:
         """Return the velocity for this moment; at rest once `phase` is ARRIVED."""
         position = np.array((x_m, y_m))
         remaining_m = self._remaining(position)
-        if self.phase in (Phase.ALIGN, Phase.TRACK) and self._at_end(position):
-            self.phase = Phase.FINAL_TURN
-        if self.phase in (Phase.ALIGN, Phase.TRACK):
+        if self.phase in (FollowerPhase.ALIGN, FollowerPhase.TRACK) and self._at_end(position):
+            self.phase = FollowerPhase.FINAL_TURN
+        if self.phase in (FollowerPhase.ALIGN, FollowerPhase.TRACK):
             target = self._look_ahead(position)
             bearing_rad = math.atan2(target[1] - y_m, target[0] - x_m)
             return self._towards(wrap_angle(bearing_rad - yaw_rad), remaining_m)
@@ -78,11 +78,11 @@ class PathFollower:
 
     def _towards(self, error_rad: float, remaining_m: float) -> Twist:
         if abs(error_rad) > TURN_FIRST_RAD:
-            self.phase = Phase.ALIGN
+            self.phase = FollowerPhase.ALIGN
         elif abs(error_rad) < TRACK_RAD:
-            self.phase = Phase.TRACK
+            self.phase = FollowerPhase.TRACK
         turn = self._turn_rate(error_rad)
-        if self.phase is Phase.ALIGN:
+        if self.phase is FollowerPhase.ALIGN:
             return Twist(0.0, turn)
         braking_m_s = math.sqrt(max(0.0, 1.2 * self._limits.acceleration_m_s2 * remaining_m))
         speed = min(self._limits.speed_m_s, braking_m_s) * max(0.0, math.cos(2.0 * error_rad))
@@ -90,11 +90,11 @@ class PathFollower:
 
     def _final_turn(self, yaw_rad: float) -> Twist:
         if self._final_yaw_rad is None:
-            self.phase = Phase.ARRIVED
+            self.phase = FollowerPhase.ARRIVED
             return AT_REST
         error_rad = wrap_angle(self._final_yaw_rad - yaw_rad)
         if abs(error_rad) < YAW_TOLERANCE_RAD:
-            self.phase = Phase.ARRIVED
+            self.phase = FollowerPhase.ARRIVED
             return AT_REST
         return Twist(0.0, self._turn_rate(error_rad))
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.dead_reckoning import Step
+from vla_deploy.navigation.dead_reckoning import OdometryStep
 from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.navigation.pose import Pose2D
 
@@ -48,7 +48,7 @@ class PoseFilter:
         """Return the standard deviation of the heading."""
         return math.sqrt(max(0.0, float(self._p[2, 2])))
 
-    def predict(self, step: Step) -> None:
+    def predict(self, step: OdometryStep) -> None:
         """Move by a dead-reckoned step."""
         drift_rad = self.drift_rad_s * step.duration_s if step.by_imu else 0.0
         motion = Pose2D(step.motion.x_m, step.motion.y_m, step.motion.yaw_rad - drift_rad)

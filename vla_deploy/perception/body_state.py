@@ -22,7 +22,7 @@ STALE_JOINTS_NS = NS_PER_S // 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hand:
+class HandState:
     """Hold what a hand holds, and where its grip is in the base frame."""
 
     name: str
@@ -72,13 +72,13 @@ class BodyState:
         """Return an image that is true where the robot itself is seen."""
         return self._mask.mask(positions, camera)
 
-    def hands(self, positions: Array, now_ns: int) -> list[Hand]:
+    def hands(self, positions: Array, now_ns: int) -> list[HandState]:
         """Return the hands with what they hold, by the executor's word and by touch."""
         sample = self._executor_status.latest()
         told = {} if sample is None else sample.document().get("holding", {})
         holds = self._hands.judge(told, now_ns)
         return [
-            Hand(name=name, hold=holds[name], grip=self._grip(hand.grip_site, positions))
+            HandState(name=name, hold=holds[name], grip=self._grip(hand.grip_site, positions))
             for name, hand in self._robot.hands.items()
         ]
 

@@ -7,36 +7,36 @@ thing of a class can measure at all, however it lies.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from vla_deploy.perception.shapes import Shape
+from vla_deploy.perception.shapes import MeasuredShape
 
 Range = tuple[float, float]
-Measure = Callable[[Shape], float]
+Measure = Callable[[MeasuredShape], float]
 
 SPHERE_RESIDUAL = 0.06
 SPHERE_SIZE = (0.75, 1.3)
 
 
-def _flatness(shape: Shape) -> float:
+def _flatness(shape: MeasuredShape) -> float:
     return shape.height_m / max(shape.footprint.width_m, 1e-6)
 
 
-def _slenderness(shape: Shape) -> float:
+def _slenderness(shape: MeasuredShape) -> float:
     return shape.height_m / max(shape.across_m, 1e-6)
 
 
-def _top_ratio(shape: Shape) -> float:
+def _top_ratio(shape: MeasuredShape) -> float:
     return shape.top.width_m / max(shape.across_m, 1e-6)
 
 
-def _rim_ratio(shape: Shape) -> float:
+def _rim_ratio(shape: MeasuredShape) -> float:
     return shape.top.width_m / max(shape.footprint.width_m, 1e-6)
 
 
-def _squareness(shape: Shape) -> float:
+def _squareness(shape: MeasuredShape) -> float:
     return shape.footprint.width_m / max(shape.footprint.length_m, 1e-6)
 
 
-def _roundness(shape: Shape) -> float:
+def _roundness(shape: MeasuredShape) -> float:
     """Return 1 for the visible part of a ball, 0 for anything else."""
     sphere = shape.sphere
     if sphere is None or sphere.residual_ratio > SPHERE_RESIDUAL:
@@ -48,7 +48,7 @@ def _roundness(shape: Shape) -> float:
     return 1.0 if agrees else 0.0
 
 
-def _longest_m(shape: Shape) -> float:
+def _longest_m(shape: MeasuredShape) -> float:
     return max(shape.height_m, shape.across_m, shape.footprint.length_m)
 
 
@@ -71,7 +71,7 @@ MEASURES: dict[str, Measure] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class ClassRule:
     """Name a class and bound the measures that it must meet, bounds included.
 
     A rule that does not `name` by itself only says that a thing looks like one: a can looks like a
@@ -93,8 +93,8 @@ class Form:
 
 
 OTHER = "object"
-RULES: tuple[Rule, ...] = (
-    Rule(
+RULES: tuple[ClassRule, ...] = (
+    ClassRule(
         "box",
         {
             "hole_m": (0.04, 0.4),
@@ -105,8 +105,8 @@ RULES: tuple[Rule, ...] = (
             "height_m": (0.05, 0.4),
         },
     ),
-    Rule("ball", {"roundness": (1.0, 1.0), "across_m": (0.025, 0.3)}),
-    Rule(
+    ClassRule("ball", {"roundness": (1.0, 1.0), "across_m": (0.025, 0.3)}),
+    ClassRule(
         "bottle",
         {
             "height_m": (0.13, 0.36),
@@ -115,7 +115,7 @@ RULES: tuple[Rule, ...] = (
             "squareness": (0.55, 1.0),
         },
     ),
-    Rule(
+    ClassRule(
         "cup",
         {
             "height_m": (0.06, 0.14),
@@ -124,9 +124,13 @@ RULES: tuple[Rule, ...] = (
             "top_ratio": (0.5, 1.2),
         },
     ),
-    Rule("phone", {"height_m": (0.004, 0.017), "length_m": (0.1, 0.18), "width_m": (0.05, 0.1)}),
-    Rule("keys", {"height_m": (0.004, 0.025), "length_m": (0.03, 0.13), "width_m": (0.012, 0.06)}),
-    Rule(
+    ClassRule(
+        "phone", {"height_m": (0.004, 0.017), "length_m": (0.1, 0.18), "width_m": (0.05, 0.1)}
+    ),
+    ClassRule(
+        "keys", {"height_m": (0.004, 0.025), "length_m": (0.03, 0.13), "width_m": (0.012, 0.06)}
+    ),
+    ClassRule(
         "book",
         {
             "height_m": (0.01, 0.07),
@@ -135,7 +139,7 @@ RULES: tuple[Rule, ...] = (
             "flatness": (0.04, 0.8),
         },
     ),
-    Rule(
+    ClassRule(
         "can",
         {
             "height_m": (0.08, 0.18),
@@ -145,12 +149,12 @@ RULES: tuple[Rule, ...] = (
         },
         names=False,
     ),
-    Rule(
+    ClassRule(
         "bowl",
         {"height_m": (0.03, 0.11), "across_m": (0.09, 0.26), "slenderness": (0.2, 0.75)},
         names=False,
     ),
-    Rule(
+    ClassRule(
         "remote",
         {"height_m": (0.006, 0.035), "length_m": (0.1, 0.26), "width_m": (0.025, 0.075)},
         names=False,
@@ -176,7 +180,7 @@ FURNITURE = "furniture"
 """What tables, sofas and the like are called: a network's word for it names nothing to take."""
 
 
-def judge_form(shape: Shape, *, whole: bool = True) -> Form:
+def judge_form(shape: MeasuredShape, *, whole: bool = True) -> Form:
     """Return what a shape says; of one that is half hidden, only what is too large is certain."""
     fits = [rule for rule in RULES if _holds(rule.bounds, shape)]
     return Form(
@@ -188,11 +192,11 @@ def judge_form(shape: Shape, *, whole: bool = True) -> Form:
     )
 
 
-def _holds(bounds: dict[str, Range], shape: Shape) -> bool:
+def _holds(bounds: dict[str, Range], shape: MeasuredShape) -> bool:
     return all(low <= MEASURES[name](shape) <= high for name, (low, high) in bounds.items())
 
 
-def _can_be(bounds: dict[str, Range], shape: Shape, whole: bool) -> bool:
+def _can_be(bounds: dict[str, Range], shape: MeasuredShape, whole: bool) -> bool:
     return all(
         (low <= MEASURES[name](shape) or not whole) and MEASURES[name](shape) <= high
         for name, (low, high) in bounds.items()

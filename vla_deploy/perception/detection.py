@@ -9,10 +9,10 @@ from vla_deploy.perception.classes import OTHER, Form, judge_form
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster, find_clusters, split_apart, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
-from vla_deploy.perception.naming import Name, Source, by_both, by_form
+from vla_deploy.perception.naming import Name, NameSource, by_both, by_form
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.placement import place
-from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
+from vla_deploy.perception.shapes import MeasuredShape, Rectangle, inside_rectangle, measure
 from vla_deploy.perception.supports import Support
 from vla_deploy.perception.uncertainty import (
     UNKNOWN_MATRIX,
@@ -51,7 +51,7 @@ class Detection:
     covariance_m2: Matrix = UNKNOWN_MATRIX
     size_sigma_m: Vector = UNKNOWN_SIZE_SIGMA_M
     yaw_sigma_rad: float = UNKNOWN_YAW_SIGMA_RAD
-    named_by: Source = Source.FORM
+    named_by: NameSource = NameSource.FORM
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def _detections(cluster: Cluster, look: _Look) -> list[Detection]:
     whole = _detection(cluster, look)
     if whole.class_name == "box":
         return [whole, *_contents(whole, cluster, look)]
-    if whole.named_by in (Source.FORM, Source.BOTH):
+    if whole.named_by in (NameSource.FORM, NameSource.BOTH):
         return [whole]
     parts = [_detection(part, look) for part in split_by_colour(cluster, look.cloud)]
     return [whole] if any(part.class_name == OTHER for part in parts) else parts
@@ -125,7 +125,7 @@ def _least_height_m(cluster: Cluster) -> float:
     return FLAT_SIGMAS * DEPTH_SIGMA_PER_M * cluster.depth_m**2
 
 
-def _name(cluster: Cluster, shape: Shape, network: NetworkView | None) -> Name:
+def _name(cluster: Cluster, shape: MeasuredShape, network: NetworkView | None) -> Name:
     form = judge_form(shape, whole=not (cluster.truncated or cluster.occluded))
     if shape.height_m <= _least_height_m(cluster):
         form = Form(name=OTHER, fits=frozenset(), impossible=form.impossible)

@@ -40,7 +40,7 @@ class Network:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class DetectorAnswer:
     """Hold what a network saw; None where there is none, it failed, or it took too long."""
 
     view: NetworkView | None
@@ -116,10 +116,10 @@ class Eyes:
             self._asked_ns = self._clock.now_ns()
             self._asked = self._executor.submit(_look, detector, rgb)
 
-    def answer(self) -> Answer | None:
+    def answer(self) -> DetectorAnswer | None:
         """Return what the network saw in the image that was asked about last; None: wait on."""
         if self._asked is None or self._given_up:
-            return Answer(view=None)
+            return DetectorAnswer(view=None)
         if not self._asked.done():
             return self._late_answer()
         asked, self._asked = self._asked, None
@@ -127,9 +127,9 @@ class Eyes:
             view = asked.result()
         except RunFailed as error:
             self._fail(str(error))
-            return Answer(view=None)
+            return DetectorAnswer(view=None)
         self._failures, self._trouble = 0, ""
-        return Answer(view=view)
+        return DetectorAnswer(view=view)
 
     def document(self) -> dict[str, Any]:
         """Return how things are named at present, as the scene topic tells it."""
@@ -141,13 +141,13 @@ class Eyes:
             "model": None if detector is None else detector.stats().document(),
         }
 
-    def _late_answer(self) -> Answer | None:
+    def _late_answer(self) -> DetectorAnswer | None:
         if self._clock.now_ns() - self._asked_ns <= LATE_NS:
             return None
         self._given_up = True
         self._late += 1
         self._trouble = f"no answer within {LATE_NS / NS_PER_S:g} s"
-        return Answer(view=None)
+        return DetectorAnswer(view=None)
 
     def _fail(self, why: str) -> None:
         self._failures += 1

@@ -21,14 +21,14 @@ REST_NS: Final = 20 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stand:
+class CameraStand:
     """Hold how the camera was turned, 3 x 3, and where the base stood, in a frame without jumps."""
 
     stamp_ns: int
     rotation: NDArray[np.float64]
     base: Pose2D
 
-    def change_rad(self, other: "Stand") -> float:
+    def change_rad(self, other: "CameraStand") -> float:
         """Return by how much the view changes from here to there."""
         driven_m = math.hypot(other.base.x_m - self.base.x_m, other.base.y_m - self.base.y_m)
         return angle_rad(self.rotation.T @ other.rotation) + driven_m / VIEW_DISTANCE_M
@@ -37,11 +37,11 @@ class Stand:
 class Travel:
     """Add up by how much the view has changed since a stand; at rest nothing is added."""
 
-    def __init__(self, began: Stand) -> None:
+    def __init__(self, began: CameraStand) -> None:
         self._from = began
         self._before_rad = 0.0
 
-    def rad(self, stand: Stand) -> float:
+    def rad(self, stand: CameraStand) -> float:
         """Return the change of view up to a stand."""
         change_rad = self._from.change_rad(stand)
         moved_rad = self._before_rad + change_rad
@@ -63,7 +63,7 @@ class Repeats:
         self._most = most
         self._began: tuple[Glance, Travel] | None = None
 
-    def ratio(self, glance: Glance, stand: Stand) -> float:
+    def ratio(self, glance: Glance, stand: CameraStand) -> float:
         """Return the share of rows that are the same, 0 unless the camera moved meanwhile."""
         began, self._began = self._began, (glance, Travel(stand))
         if began is None:

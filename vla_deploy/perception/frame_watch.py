@@ -10,8 +10,13 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.cloud import Floats
-from vla_deploy.perception.frame_check import STALE_COLOUR_RATIO, Use, Verdict, judge_frame
-from vla_deploy.perception.frame_repeats import Repeats, Stand, Travel
+from vla_deploy.perception.frame_check import (
+    STALE_COLOUR_RATIO,
+    ImageUse,
+    ImageVerdict,
+    judge_frame,
+)
+from vla_deploy.perception.frame_repeats import CameraStand, Repeats, Travel
 from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, measure_frame
 
 
@@ -23,7 +28,7 @@ class FrameWatch:
         self._still: tuple[Glance, Travel] | None = None
         self._repeats = Repeats(STALE_COLOUR_RATIO)
         self._came_ns: int | None = None
-        self._verdict = Verdict(use=Use.ALL, faults=())
+        self._verdict = ImageVerdict(use=ImageUse.ALL, faults=())
         self._refused = 0
 
     def came(self, frame: RgbdFrame, now_ns: int) -> None:
@@ -33,13 +38,13 @@ class FrameWatch:
 
     def judge(
         self, frame: RgbdFrame, depth_m: Floats, rotation: NDArray[np.float64], base: Pose2D
-    ) -> Verdict:
+    ) -> ImageVerdict:
         """Return what an image is good for.
 
         `rotation` is the camera's, 3 x 3, and `base` the robot's pose, in a frame without jumps.
         """
         glance = Glance.of(frame)
-        stand = Stand(stamp_ns=frame.stamp_ns, rotation=rotation, base=base)
+        stand = CameraStand(stamp_ns=frame.stamp_ns, rotation=rotation, base=base)
         seen = replace(
             measure_frame(frame.rgb, depth_m),
             stale_ratio=max(
@@ -50,7 +55,7 @@ class FrameWatch:
             unmoved_rad=self._unmoved_rad(glance, stand),
         )
         self._verdict = judge_frame(seen)
-        self._refused += self._verdict.use is Use.NOTHING
+        self._refused += self._verdict.use is ImageUse.NOTHING
         return self._verdict
 
     def document(self, now_ns: int) -> dict[str, Any]:
@@ -61,7 +66,7 @@ class FrameWatch:
         verdict = silence if silence.faults else self._verdict
         return {**verdict.document(), "refused": self._refused}
 
-    def _unmoved_rad(self, glance: Glance, stand: Stand) -> float:
+    def _unmoved_rad(self, glance: Glance, stand: CameraStand) -> float:
         if self._still is None or not glance.shows_the_same(self._still[0]):
             self._still = (glance, Travel(stand))
             return 0.0

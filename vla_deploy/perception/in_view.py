@@ -25,7 +25,7 @@ FLAT_M = 0.04
 THROUGH_RATIO = 0.25
 
 
-class View(Enum):
+class PlaceView(Enum):
     """Say what the image shows at the place of a remembered thing."""
 
     CLEAR = "its place is in clear view"
@@ -41,7 +41,7 @@ class Image:
     base_from_camera: NDArray[np.float64]
 
 
-def view_of(place: Vector, size_m: Vector, image: Image, found: Sequence[Detection]) -> View:
+def view_of(place: Vector, size_m: Vector, image: Image, found: Sequence[Detection]) -> PlaceView:
     """Tell whether the image shows a thing's place, in the base frame, with nothing in front of it.
 
     What stands there and was found as nothing may well be the thing: that does not show its place
@@ -51,21 +51,21 @@ def view_of(place: Vector, size_m: Vector, image: Image, found: Sequence[Detecti
     rotation, camera_position = image.base_from_camera[:3, :3], image.base_from_camera[:3, 3]
     x, y, z = rotation.T @ (point - camera_position)
     if not 0.2 < z < CLEAR_RANGE_M:
-        return View.HIDDEN
+        return PlaceView.HIDDEN
     camera, cloud = image.camera, image.cloud
     half = math.ceil(0.5 * camera.fx * max(size_m) / z)
     border = BORDER_PX + half
     u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
     if not (border <= u < camera.width - border and border <= v < camera.height - border):
-        return View.HIDDEN
+        return PlaceView.HIDDEN
     around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
     patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
     if cloud.own_body[around].any() or not cloud.valid[patch].all():
-        return View.HIDDEN
+        return PlaceView.HIDDEN
     depth_m = float(np.median(cloud.depth_m[patch]))
     if depth_m < z - 0.5 * max(size_m) - IN_FRONT_M:
-        return View.HIDDEN
-    return View.HIDDEN if _stands(depth_m - z, place, size_m, found) else View.CLEAR
+        return PlaceView.HIDDEN
+    return PlaceView.HIDDEN if _stands(depth_m - z, place, size_m, found) else PlaceView.CLEAR
 
 
 def _stands(beyond_m: float, place: Vector, size_m: Vector, found: Sequence[Detection]) -> bool:

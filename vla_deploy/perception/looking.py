@@ -13,7 +13,7 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body_state import Array, BodyState
 from vla_deploy.perception.cloud import aim_sigma_rad
 from vla_deploy.perception.eyes import Eyes
-from vla_deploy.perception.frame_check import Use
+from vla_deploy.perception.frame_check import ImageUse
 from vla_deploy.perception.frame_watch import FrameWatch
 from vla_deploy.perception.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.near_obstacles import NearObstacles
@@ -30,7 +30,7 @@ MAX_CAMERA_TURN_RAD_S: Final = 0.35
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Moment:
+class ImageMoment:
     """Hold an image and how the robot stood when it was taken.
 
     `seen` is the image on the geometry's `grid`, with its depth in metres and a mask of the robot;
@@ -65,7 +65,7 @@ class Looking:
         self._whereabouts = whereabouts
         self._eyes = eyes
         self._watch = FrameWatch()
-        self._waiting: Moment | None = None
+        self._waiting: ImageMoment | None = None
 
     def came(self, frame: RgbdFrame, now_ns: int) -> None:
         """Take note that an image has come, whether it is looked at or not."""
@@ -78,7 +78,7 @@ class Looking:
             return False
         moment = self._moment(frame, positions)
         verdict = self._watch.judge(frame, frame.depth_m(), moment.view, moment.track)
-        if verdict.use < Use.OBSTACLES:
+        if verdict.use < ImageUse.OBSTACLES:
             return False
         hands = self._body.hands(positions, frame.stamp_ns)
         grips = [np.array(hand.grip) for hand in hands if hand.hold.kind]
@@ -94,9 +94,9 @@ class Looking:
         still = moment.turn_rad_s <= MAX_CAMERA_TURN_RAD_S
         # A pose that the lidar has not borne out yet would put things where they never were.
         placed = still and self._whereabouts.is_borne_out
-        if placed and verdict.use >= Use.FORM and self._waiting is None:
+        if placed and verdict.use >= ImageUse.FORM and self._waiting is None:
             self._waiting = moment
-            if verdict.use >= Use.ALL:
+            if verdict.use >= ImageUse.ALL:
                 self._eyes.ask(as_pinhole(frame))
         return True
 
@@ -129,7 +129,7 @@ class Looking:
             "image": self._watch.document(now_ns),
         }
 
-    def _look(self, moment: Moment, network: NetworkView | None) -> None:
+    def _look(self, moment: ImageMoment, network: NetworkView | None) -> None:
         self.scene.look(
             moment.seen.rgb,
             moment.depth_m,
@@ -142,12 +142,12 @@ class Looking:
             aim_sigma_rad(moment.turn_rad_s),
         )
 
-    def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
+    def _moment(self, frame: RgbdFrame, positions: Array) -> ImageMoment:
         track = self._whereabouts.track_at(frame.stamp_ns)
         view = self._body.view_rotation(frame.stamp_ns, track)
         grid = geometry_grid(frame.intrinsics)
         seen = grid.frame(frame)
-        return Moment(
+        return ImageMoment(
             grid=grid,
             seen=seen,
             depth_m=seen.depth_m(),

@@ -31,7 +31,7 @@ SILENCE: Final = 0.3
 """Share of its recall by which a network that says nothing of a thing lowers the confidence."""
 
 
-class Source(Enum):
+class NameSource(Enum):
     """Say who gave a thing its name."""
 
     NONE = "nobody"
@@ -41,7 +41,7 @@ class Source(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Word:
+class ClassVote:
     """Hold what a network says of one place: a class, and the chance that this is right."""
 
     class_name: str
@@ -54,7 +54,7 @@ class Name:
 
     class_name: str
     confidence: float
-    source: Source
+    source: NameSource
 
 
 def chance_of(score: float, precision: float) -> float:
@@ -65,14 +65,14 @@ def chance_of(score: float, precision: float) -> float:
 def by_form(form: Form, silence: float = 0.0) -> Name:
     """Name a thing by its form alone; `silence` is the recall of a network that saw nothing."""
     if form.name == OTHER:
-        return Name(class_name=OTHER, confidence=OTHER_CONFIDENCE, source=Source.NONE)
+        return Name(class_name=OTHER, confidence=OTHER_CONFIDENCE, source=NameSource.NONE)
     alone = NAMED_ODDS / (1.0 + NAMED_ODDS)
     return Name(
-        class_name=form.name, confidence=alone * (1.0 - SILENCE * silence), source=Source.FORM
+        class_name=form.name, confidence=alone * (1.0 - SILENCE * silence), source=NameSource.FORM
     )
 
 
-def by_both(form: Form, words: Sequence[Word]) -> Name:
+def by_both(form: Form, words: Sequence[ClassVote]) -> Name:
     """Name a thing by its form and what a network says of its place, each class once."""
     odds, something_else = _form_odds(form), 1.0
     for class_name, said in _word_odds(words):
@@ -82,12 +82,12 @@ def by_both(form: Form, words: Sequence[Word]) -> Name:
             odds[class_name] = (1.0 + odds.get(class_name, 0.0)) * (1.0 + said) - 1.0
     best = max(odds, key=lambda name: odds[name], default=OTHER)
     if odds.get(best, 0.0) <= something_else:
-        return Name(class_name=OTHER, confidence=OTHER_CONFIDENCE, source=Source.NONE)
+        return Name(class_name=OTHER, confidence=OTHER_CONFIDENCE, source=NameSource.NONE)
     confidence = odds[best] / (something_else + sum(odds.values()))
     return Name(class_name=best, confidence=confidence, source=_source(best, form, words))
 
 
-def _word_odds(words: Sequence[Word]) -> Iterator[tuple[str, float]]:
+def _word_odds(words: Sequence[ClassVote]) -> Iterator[tuple[str, float]]:
     """Yield each class with its chance over the chance that no word is right."""
     total = sum(word.chance for word in words)
     excess = max(1.0, total / HIGHEST_CHANCE)
@@ -103,7 +103,7 @@ def _form_odds(form: Form) -> dict[str, float]:
     return {name: LOOK_ALIKE_ODDS[name == form.name] for name in sorted(form.fits)}
 
 
-def _source(name: str, form: Form, words: Sequence[Word]) -> Source:
+def _source(name: str, form: Form, words: Sequence[ClassVote]) -> NameSource:
     if all(name != word.class_name for word in words):
-        return Source.FORM
-    return Source.BOTH if name in form.fits else Source.NETWORK
+        return NameSource.FORM
+    return NameSource.BOTH if name in form.fits else NameSource.NETWORK

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.inference.manifest import Detection
+from vla_deploy.inference.manifest import DetectionOutputs
 from vla_deploy.perception.detectors.boxes import Boxes, Floats, iou
-from vla_deploy.perception.naming import Word, chance_of
+from vla_deploy.perception.naming import ClassVote, chance_of
 from vla_deploy.perception.voices import Voice, voices_of
 
 SAME_IOU: Final = 0.5
@@ -30,24 +30,24 @@ class NetworkView:
     """From which a box tells of a thing by itself; one below only helps to name what is there."""
 
     @classmethod
-    def of(cls, boxes: Boxes, detection: Detection) -> "NetworkView":
+    def of(cls, boxes: Boxes, detection: DetectionOutputs) -> "NetworkView":
         """Return the view of a model that declares how its outputs are read."""
         voices, sure_score = voices_of(detection), detection.score_threshold
         return cls(boxes=boxes, voices=voices, sure_score=sure_score)
 
-    def words_for(self, box_px: Box) -> list[Word]:
+    def words_for(self, box_px: Box) -> list[ClassVote]:
         """Return the words for the thing that fills a box (left, top, right, bottom).
 
         There is one for each class that was seen in its place, the surest first.
         """
         overlaps = iou(np.array(box_px, dtype=np.float32), self.boxes.corners_px)
         words = [self.word(int(number)) for number in np.flatnonzero(overlaps > SAME_IOU)]
-        by_class: dict[str, Word] = {}
+        by_class: dict[str, ClassVote] = {}
         for word in sorted(words, key=lambda word: word.chance, reverse=True):
             by_class.setdefault(word.class_name, word)
         return list(by_class.values())
 
-    def sure_words(self, classes: Collection[str]) -> Iterator[tuple[Floats, Word]]:
+    def sure_words(self, classes: Collection[str]) -> Iterator[tuple[Floats, ClassVote]]:
         """Yield the places of some classes, left, top, right, bottom, and what each was called.
 
         Boxes that are not sure, and further names for the same place, are left out.
@@ -62,11 +62,11 @@ class NetworkView:
             told.append(corners)
             yield corners, word
 
-    def word(self, number: int) -> Word:
+    def word(self, number: int) -> ClassVote:
         """Return what one of the boxes says."""
         voice = self.voices[self.boxes.classes[number]]
         chance = chance_of(float(self.boxes.scores[number]), voice.precision)
-        return Word(class_name=voice.class_name, chance=chance)
+        return ClassVote(class_name=voice.class_name, chance=chance)
 
     def silence(self, box_px: Box, class_name: str) -> float:
         """Return how surely a thing of a class would have been found in a box."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster
 from vla_deploy.perception.forms import TurnedFit, fit_lying, fit_upright, sight_frame
-from vla_deploy.perception.shapes import Rectangle, Shape, half_turn, rectangle_of
+from vla_deploy.perception.shapes import MeasuredShape, Rectangle, half_turn, rectangle_of
 from vla_deploy.perception.uncertainty import (
     UNKNOWN_YAW_SIGMA_RAD,
     Matrix,
@@ -74,7 +74,7 @@ class _Sight:
     """Hold what a form is fitted to."""
 
     cluster: Cluster
-    shape: Shape
+    shape: MeasuredShape
     cloud: Cloud
 
     @property
@@ -87,7 +87,7 @@ class _Sight:
         return math.atan2(sight[1], sight[0])
 
 
-def place(cluster: Cluster, shape: Shape, class_name: str, cloud: Cloud) -> Placement:
+def place(cluster: Cluster, shape: MeasuredShape, class_name: str, cloud: Cloud) -> Placement:
     """Return the place of one thing of a class; "object" where the class is not known."""
     sight = _Sight(cluster, shape, cloud)
     spot = _lying(sight) if class_name not in NEVER_LIE else None

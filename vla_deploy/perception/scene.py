@@ -31,7 +31,7 @@ from vla_deploy.perception.track import Sighting, Track
 from vla_deploy.perception.tracking import Tracker
 from vla_deploy.perception.uncertainty import turned
 from vla_deploy.world.document import read_snapshot
-from vla_deploy.world.resting import BEGIN, LET_GO, Bounds, rest_of
+from vla_deploy.world.resting import BEGIN, LET_GO, RelationBounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
 from vla_deploy.world.thing import Rest, Surface
 
@@ -127,7 +127,7 @@ class Scene:
             "hands": self._hands,
         }
 
-    def _rest_of(self, track: Track, begin: Bounds) -> Rest | None:
+    def _rest_of(self, track: Track, begin: RelationBounds) -> Rest | None:
         things = [one.thing for one in self._tracker.objects]
         return rest_of(track.thing, things, self._book.surfaces, begin)
 

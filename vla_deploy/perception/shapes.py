@@ -44,7 +44,7 @@ class Sphere:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
+class MeasuredShape:
     """Hold the measures that the class rules look at.
 
     `across_m` is the width as seen from the camera, which no far side can hide. `hole_m` is how far
@@ -63,7 +63,7 @@ class Shape:
     sphere: Sphere | None
 
 
-def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
+def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> MeasuredShape:
     """Measure one cluster."""
     pixel_m = cluster.depth_m / focal_px
     sigma_m = DEPTH_SIGMA_PER_M * cluster.depth_m**2
@@ -74,7 +74,7 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
     rim = every[cluster.heights > height_m - slice_m]
     top = rectangle_of(rim)
-    return Shape(
+    return MeasuredShape(
         height_m=height_m,
         across_m=_across(xy, camera_position) + pixel_m,
         footprint=rectangle_of(xy),

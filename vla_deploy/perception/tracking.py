@@ -8,7 +8,7 @@ from typing import Any
 from vla_deploy.perception.classes import OTHER
 from vla_deploy.perception.detection import Vector
 from vla_deploy.perception.identity import is_missing, likeliest, may_be, take_over
-from vla_deploy.perception.in_view import View
+from vla_deploy.perception.in_view import PlaceView
 from vla_deploy.perception.matching import match
 from vla_deploy.perception.track import (
     Sighting,
@@ -57,13 +57,13 @@ class Tracker:
         """Return what is no longer where it was and has not been found again, the oldest first."""
         return list(self._vanished)
 
-    def update(self, sightings: list[Sighting], views: dict[int, View], stamp_ns: int) -> None:
+    def update(self, sightings: list[Sighting], views: dict[int, PlaceView], stamp_ns: int) -> None:
         """Take one image's sights; `views` maps `id(track)` to what is seen at its place."""
         pairs = match(self._tracks, sightings, stamp_ns)
         matched = {id(track) for track, _, _ in pairs}
         taken = {id(sighting) for _, sighting, _ in pairs}
         for track in self._tracks:
-            is_clear = views.get(id(track)) is View.CLEAR and not track.held_by
+            is_clear = views.get(id(track)) is PlaceView.CLEAR and not track.held_by
             if is_clear and id(track) not in matched:
                 track.misses += 1
         for track, sighting, was_moved in pairs:

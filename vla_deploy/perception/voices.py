@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from vla_deploy.inference.manifest import ClassMeasured, Detection, Measured
+from vla_deploy.inference.manifest import ClassMeasured, DetectionOutputs, Measured
 from vla_deploy.perception.class_names import known_as
 
 UNKNOWN_PRECISION: Final = 0.5
@@ -29,7 +29,7 @@ class Voice:
 
 
 @lru_cache(maxsize=NETWORKS_KEPT)
-def voices_of(detection: Detection) -> tuple[Voice, ...]:
+def voices_of(detection: DetectionOutputs) -> tuple[Voice, ...]:
     """Return a voice for each of a network's classes, in the order of their numbers."""
     return tuple(_voice(name, detection.measured) for name in detection.classes)
 

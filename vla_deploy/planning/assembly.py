@@ -11,10 +11,10 @@ from platforms import ModelChoice, Profile
 from platforms.profile import PlanningSettings
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.language_model import open_language_model
-from vla_deploy.inference.manifest import Use
+from vla_deploy.inference.manifest import LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, tier_name
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
@@ -110,10 +110,10 @@ def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
 
 
 def _open(
-    robot: RobotDescription, shelf: ModelShelf, model: Model, choice: ModelChoice
+    robot: RobotDescription, shelf: ModelShelf, model: StoredModel, choice: ModelChoice
 ) -> CommandParser | LocalModel:
     language = model.manifest.language
-    if language is not None and language.use is Use.COMMAND_PARSER:
+    if language is not None and language.use is LanguageUse.COMMAND_PARSER:
         # So small a model is done on the CPU before a GPU has begun.
         choice = replace(PLAIN_CHOICE, memory_arena=choice.memory_arena)
         return shelf.load(model, choice, lambda: open_command_parser(model, choice))

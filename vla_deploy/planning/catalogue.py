@@ -31,7 +31,7 @@ class Type(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
+class SkillParameter:
     """Describe one parameter; numbers carry their range, choices their list."""
 
     type: Type
@@ -49,7 +49,7 @@ class SkillSpec:
     """
 
     summary: str
-    parameters: dict[str, Parameter]
+    parameters: dict[str, SkillParameter]
     one_of: tuple[tuple[str, ...], ...] = ()
     resources: tuple[str, ...] = ()
     timeout_s: float = DEFAULT_TIMEOUT_S
@@ -57,17 +57,17 @@ class SkillSpec:
     retryable: bool = False
 
 
-def _number(minimum: float, maximum: float, *, required: bool = True) -> Parameter:
-    return Parameter(type=Type.NUMBER, required=required, minimum=minimum, maximum=maximum)
+def _number(minimum: float, maximum: float, *, required: bool = True) -> SkillParameter:
+    return SkillParameter(type=Type.NUMBER, required=required, minimum=minimum, maximum=maximum)
 
 
-def _choice(*choices: str, required: bool = True) -> Parameter:
-    return Parameter(type=Type.CHOICE, required=required, choices=choices)
+def _choice(*choices: str, required: bool = True) -> SkillParameter:
+    return SkillParameter(type=Type.CHOICE, required=required, choices=choices)
 
 
 _ARM = _choice(*ARMS, required=False)
-_OBJECT = Parameter(type=Type.OBJECT)
-_OBJECT_OR_ELSE = Parameter(type=Type.OBJECT, required=False)
+_OBJECT = SkillParameter(type=Type.OBJECT)
+_OBJECT_OR_ELSE = SkillParameter(type=Type.OBJECT, required=False)
 # Without it the base cruises as fast as its robot file lets it.
 _SPEED = _number(0.05, 2.0, required=False)
 
@@ -76,7 +76,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "navigate_to": SkillSpec(
             summary="drive to a named place, to where an object can be reached, or to a point",
             parameters={
-                "place": Parameter(type=Type.PLACE, required=False),
+                "place": SkillParameter(type=Type.PLACE, required=False),
                 "object": _OBJECT_OR_ELSE,
                 "x_m": _number(-100, 100, required=False),
                 "y_m": _number(-100, 100, required=False),
@@ -130,7 +130,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "place": SkillSpec(
             summary="put what is held in, on or next to something within reach",
             parameters={
-                "destination": Parameter(type=Type.DESTINATION),
+                "destination": SkillParameter(type=Type.DESTINATION),
                 "relation": _choice(*RELATIONS),
                 "arm": _ARM,
             },
@@ -160,13 +160,13 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         ),
         "move_arm": SkillSpec(
             summary="bring the arms to a named pose of the robot file",
-            parameters={"pose": Parameter(type=Type.TEXT), "arm": _ARM},
+            parameters={"pose": SkillParameter(type=Type.TEXT), "arm": _ARM},
             resources=("arm",),
             estimated_duration_s=4.0,
         ),
         "speak": SkillSpec(
             summary="say a sentence",
-            parameters={"text": Parameter(type=Type.TEXT)},
+            parameters={"text": SkillParameter(type=Type.TEXT)},
             resources=("speaker",),
             estimated_duration_s=1.0,
         ),

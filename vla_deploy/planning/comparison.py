@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Action, Plan, execution_order
 from vla_deploy.planning.symbolic.simulation import end_state
@@ -26,7 +26,7 @@ _HOW: Final = frozenset(
 )  # fmt: skip
 
 
-def move_the_same(one: Plan, other: Plan, request: Request) -> bool:
+def move_the_same(one: Plan, other: Plan, request: PlanRequest) -> bool:
     """Return whether two plans move the same things to the same places, and the robot alike.
 
     Both must have been grounded and checked in the world of the request.
@@ -34,7 +34,7 @@ def move_the_same(one: Plan, other: Plan, request: Request) -> bool:
     return _effects(one, request) == _effects(other, request)
 
 
-def _effects(plan: Plan, request: Request) -> tuple[object, ...]:
+def _effects(plan: Plan, request: PlanRequest) -> tuple[object, ...]:
     """Return what a hand takes, where that rests and what is held in the end, and all else done."""
     actions = execution_order(plan.actions)
     state = end_state(actions, request.world, request.scene, request.here)
@@ -47,7 +47,7 @@ def _effects(plan: Plan, request: Request) -> tuple[object, ...]:
     )
 
 
-def _ways(actions: list[Action], request: Request) -> Iterator[str]:
+def _ways(actions: list[Action], request: PlanRequest) -> Iterator[str]:
     """Yield what is done besides handling things and what leads up to that."""
     compared = [one for one in actions if one.skill not in _NOT_COMPARED]
     for number, action in enumerate(compared):
@@ -59,13 +59,13 @@ def _ways(actions: list[Action], request: Request) -> Iterator[str]:
         yield " ".join([action.skill, *_values(action, request)])
 
 
-def _values(action: Action, request: Request) -> Iterator[str]:
+def _values(action: Action, request: PlanRequest) -> Iterator[str]:
     for name, value in sorted(action.parameters.items()):
         if value is not None and (action.skill, name) not in _HOW:
             yield f"{name}={_value(name, value, request)}"
 
 
-def _value(name: str, value: Any, request: Request) -> str:
+def _value(name: str, value: Any, request: PlanRequest) -> str:
     if isinstance(value, int | float):
         return f"{float(value):.{_DIGITS}f}"
     if name == "object":

@@ -94,7 +94,7 @@ class Ambiguous(PlanningError):
         super().__init__(question)
 
 
-class NotReady(PlanningError):
+class NotReadyToMove(PlanningError):
     """Say why the robot may not move now, and what to do about it."""
 
 

@@ -62,7 +62,7 @@ class Aid(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class PlanRequest:
     """Hold one command, with all that may be known when it is planned.
 
     `here` is the robot's x and y in metres and its yaw in radians, in the map. `recollections` are
@@ -164,7 +164,7 @@ class PlanningResult:
         return self.plan is not None or isinstance(self.error, Ambiguous | NotAble)
 
 
-Check = Callable[[Plan, Request], Plan]
+Check = Callable[[Plan, PlanRequest], Plan]
 """Return a proposed plan grounded and checked, or raise the PlanningError that says why it may not
 run."""
 
@@ -181,7 +181,7 @@ class BackEnd(Protocol):
     is_language_model: bool = False
     uses: frozenset[Aid] = frozenset()
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         """Return a plan for the command; nothing moves by that.
 
         Raises:

@@ -22,7 +22,7 @@ from vla_deploy.planning.dialogue.command import (
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.errors import NotReady, PlanningError
+from vla_deploy.planning.errors import NotReadyToMove, PlanningError
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.robots import RobotDescription
@@ -185,7 +185,9 @@ class PlannerNode:
         """Refuse what the person has given up by now: the robot must not move by surprise."""
         age_s = (self._clock.now_ns() - event.stamp_ns) / NS_PER_S
         if age_s > UTTERANCE_AGE_S:
-            raise NotReady(f"the command is {age_s:.0f} s old, the planner was away; give it again")
+            raise NotReadyToMove(
+                f"the command is {age_s:.0f} s old, the planner was away; give it again"
+            )
 
 
 # --- what an earlier planner of this run left behind ---------------------------------------------

@@ -16,7 +16,7 @@ Skill = tuple[str, Mapping[str, Any]]
 """The name of a skill, and its parameters."""
 
 
-class Priority(StrEnum):
+class ActionPriority(StrEnum):
     """Rank actions whose dependencies allow either order."""
 
     HIGH = "high"
@@ -33,7 +33,7 @@ class Action(BaseModel):
     skill: str = Field(min_length=1, max_length=64)
     parameters: dict[str, Any] = Field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
-    priority: Priority = Priority.MEDIUM
+    priority: ActionPriority = ActionPriority.MEDIUM
     description: str = ""
     estimated_duration_s: float = Field(default=0.0, ge=0.0)
     feasibility_score: float = Field(default=1.0, ge=0.0, le=1.0)
@@ -65,7 +65,7 @@ def plan_schema() -> dict[str, Any]:
     return Plan.model_json_schema()
 
 
-_RANK: Final = {Priority.HIGH: 0, Priority.MEDIUM: 1, Priority.LOW: 2}
+_RANK: Final = {ActionPriority.HIGH: 0, ActionPriority.MEDIUM: 1, ActionPriority.LOW: 2}
 
 
 def dependency_faults(actions: Sequence[Action]) -> list[str]:

@@ -28,8 +28,8 @@ from vla_deploy.planning.interfaces import (
     BackEnd,
     Check,
     PlanningResult,
+    PlanRequest,
     Proposal,
-    Request,
 )
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
@@ -56,7 +56,7 @@ _ERRORS: Final = (
 _SILENT: Final = frozenset({AttemptOutcome.DECLINED, AttemptOutcome.LATE})
 
 
-def checked(plan: Plan, request: Request) -> Plan:
+def checked(plan: Plan, request: PlanRequest) -> Plan:
     """Return a plan grounded in the world of a request, and valid there.
 
     Raises:
@@ -123,13 +123,13 @@ class Planner:
         for one in self._slow:
             one.close()
 
-    def plan(self, request: Request) -> PlanningResult:
+    def plan(self, request: PlanRequest) -> PlanningResult:
         """Return the answer of all back ends together; blocks until then."""
         deadline = Deadline.within(self._clock, self.within_s)
         answer = self.plan_at_once(request, deadline)
         return self.plan_slowly(request, deadline, answer) if self.goes_on(answer) else answer
 
-    def plan_at_once(self, request: Request, deadline: Deadline) -> PlanningResult:
+    def plan_at_once(self, request: PlanRequest, deadline: Deadline) -> PlanningResult:
         """Return the answer of the back ends that take no time."""
         answer = self.first_plan((self._patterns,), request, deadline)
         if not self._slow:
@@ -141,7 +141,7 @@ class Planner:
         return bool(self._slow) and (answer.is_unchecked or not answer.is_final)
 
     def plan_slowly(
-        self, request: Request, deadline: Deadline, before: PlanningResult
+        self, request: PlanRequest, deadline: Deadline, before: PlanningResult
     ) -> PlanningResult:
         """Return the answer of the others too; blocks until the deadline at most.
 
@@ -164,7 +164,9 @@ class Planner:
             quick = _checked_by(found.plan, quick, request)
         return _worded(quick, request)
 
-    def check_given(self, document: Json | list[object] | str, request: Request) -> PlanningResult:
+    def check_given(
+        self, document: Json | list[object] | str, request: PlanRequest
+    ) -> PlanningResult:
         """Return the answer to a plan that was made elsewhere, in any dialect."""
         deadline = Deadline.within(self._clock, self.within_s)
         return self.first_plan((_GivenPlan(document),), request, deadline)
@@ -172,7 +174,7 @@ class Planner:
     def first_plan(
         self,
         back_ends: Sequence[BackEnd],
-        request: Request,
+        request: PlanRequest,
         deadline: Deadline,
         before: PlanningResult | None = None,
     ) -> PlanningResult:
@@ -200,7 +202,7 @@ class Planner:
         return answer
 
     def _ask(
-        self, back_end: BackEnd, request: Request, share: Deadline, whole: Deadline
+        self, back_end: BackEnd, request: PlanRequest, share: Deadline, whole: Deadline
     ) -> PlanningResult:
         try:
             if share.left_s <= 0.0:
@@ -222,7 +224,7 @@ class _GivenPlan(BackEnd):
     def __init__(self, given: Json | list[object] | str) -> None:
         self._given = given
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         del request, deadline  # the plan is there already
         return Proposal(plan=parse_plan(self._given), back_end=self.name, confidence=1.0)
 
@@ -239,7 +241,7 @@ def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
     return AttemptOutcome.LATE if is_late else outcome
 
 
-def _needs_check(answer: PlanningResult, request: Request) -> bool:
+def _needs_check(answer: PlanningResult, request: PlanRequest) -> bool:
     """Return whether a plan would move something unasked that words of its command may change."""
     plan, proposal = answer.plan, answer.proposal
     if plan is None or proposal is None or proposal.knows_grammar or proposal.is_read_back:
@@ -247,7 +249,9 @@ def _needs_check(answer: PlanningResult, request: Request) -> bool:
     return moves_anything(plan) and bool(scope_words(request.text))
 
 
-def _checked_by(model_plan: Plan | None, quick: PlanningResult, request: Request) -> PlanningResult:
+def _checked_by(
+    model_plan: Plan | None, quick: PlanningResult, request: PlanRequest
+) -> PlanningResult:
     """Return a quick plan, read back unless the plan of a language model moves the same.
 
     `model_plan` is None where the model was asked and has none.
@@ -260,7 +264,7 @@ def _checked_by(model_plan: Plan | None, quick: PlanningResult, request: Request
     return replace(quick, proposal=replace(proposal, left_out=scope_words(request.text)))
 
 
-def _worded(answer: PlanningResult, request: Request) -> PlanningResult:
+def _worded(answer: PlanningResult, request: PlanRequest) -> PlanningResult:
     """Replace the error by "not understood" where no back end has said more."""
     if isinstance(answer.error, Declined):
         return replace(answer, error=NotUnderstood(request.text))

@@ -15,7 +15,13 @@ from typing import Final, Self
 
 from vla_deploy.planning.builders.tidying import REACH_M
 from vla_deploy.planning.errors import CannotBeDone, NotAble
-from vla_deploy.planning.interfaces import Forbidden, Prohibition, Proposal, Request, StandingOrder
+from vla_deploy.planning.interfaces import (
+    Forbidden,
+    PlanRequest,
+    Prohibition,
+    Proposal,
+    StandingOrder,
+)
 from vla_deploy.planning.knowledge import World, match_place, object_or_none
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import WORDS
@@ -92,7 +98,7 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Stan
     return None
 
 
-def order_of(said: Collection[str], forbids: bool, request: Request) -> StandingOrder:
+def order_of(said: Collection[str], forbids: bool, request: PlanRequest) -> StandingOrder:
     """Return the order about what some words name.
 
     Raises:
@@ -106,7 +112,7 @@ def order_of(said: Collection[str], forbids: bool, request: Request) -> Standing
     return StandingOrder(forbids=forbids, of=meant)
 
 
-def proposal_of(order: StandingOrder, request: Request, back_end: str) -> Proposal:
+def proposal_of(order: StandingOrder, request: PlanRequest, back_end: str) -> Proposal:
     """Return the proposal to say that an order stands from now on."""
     said = Action(id="a1", skill="speak", parameters={"text": order.answer})
     plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))

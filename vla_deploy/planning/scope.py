@@ -13,7 +13,7 @@ from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import Proposal, Request
+from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.plan import Plan
 
 
@@ -108,7 +108,7 @@ def negates(text: str) -> bool:
     return any(group_of(word) is ScopeGroup.NEGATION for word in scope_words(text))
 
 
-def guarded(proposal: Proposal, request: Request) -> Proposal:
+def guarded(proposal: Proposal, request: PlanRequest) -> Proposal:
     """Return a proposal with the words that it leaves out, so that the person is asked.
 
     Raises:

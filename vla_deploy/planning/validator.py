@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, Parameter, SkillSpec, Type
+from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.knowledge import World, match_place, parse_object
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
@@ -90,7 +90,7 @@ def _sense_faults(action: Action, world: World) -> list[str]:
     return []
 
 
-def _value_faults(name: str, value: Any, parameter: Parameter, world: World) -> list[str]:
+def _value_faults(name: str, value: Any, parameter: SkillParameter, world: World) -> list[str]:
     match parameter.type:
         case Type.NUMBER:
             return _number_faults(name, value, parameter)
@@ -110,7 +110,7 @@ def _value_faults(name: str, value: Any, parameter: Parameter, world: World) -> 
             return [] if not _place_faults(name, value, world) else _object_faults(value)
 
 
-def _number_faults(name: str, value: Any, parameter: Parameter) -> list[str]:
+def _number_faults(name: str, value: Any, parameter: SkillParameter) -> list[str]:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return [f"{name} must be a number, got {value!r:.40}"]
     if not parameter.minimum <= value <= parameter.maximum:

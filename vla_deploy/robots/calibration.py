@@ -14,7 +14,7 @@ from typing import Any
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.replacing import replace_text
-from vla_deploy.robots.schema import SERVO, TABLE, TEXT, Fault, Shape, check_record
+from vla_deploy.robots.schema import SERVO, TABLE, TEXT, RobotFileFault, Shape, check_record
 
 CALIBRATION_FILE = "calibration.toml"
 CALIBRATION: Shape = {"joints": TABLE}
@@ -64,7 +64,7 @@ def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) 
     replace_text(file, _as_toml(calibrations))
 
 
-def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[Fault, ...]]:
+def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
     """Return a robot document with the calibration of its directory, and that file's faults."""
     file = directory / CALIBRATION_FILE
     try:
@@ -88,7 +88,7 @@ def _laid_over(row: Document, calibrations: Mapping[str, JointCalibration]) -> D
 
 def _mismatches(
     servos: list[Document], calibrations: Mapping[str, JointCalibration]
-) -> Iterator[Fault]:
+) -> Iterator[RobotFileFault]:
     ids = {row.get("joint"): row.get("id") for row in servos}
     names = sorted(name for name in ids if isinstance(name, str))
     for joint, measured in calibrations.items():
@@ -97,11 +97,15 @@ def _mismatches(
             yield unknown_name(key, joint, "a servo's joint", names)
         elif ids[joint] != measured.servo_id:
             expected = f"{ids[joint]}, the id in the robot file: calibrate the joint again"
-            yield Fault(key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected)
+            yield RobotFileFault(
+                key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected
+            )
 
 
-def _told(fault: Fault) -> Fault:
-    return Fault(key=f"{CALIBRATION_FILE}: {fault.key}", got=fault.got, expected=fault.expected)
+def _told(fault: RobotFileFault) -> RobotFileFault:
+    return RobotFileFault(
+        key=f"{CALIBRATION_FILE}: {fault.key}", got=fault.got, expected=fault.expected
+    )
 
 
 def _parse(file: Path) -> Document:
@@ -110,11 +114,11 @@ def _parse(file: Path) -> Document:
     except FileNotFoundError:
         return {"joints": {}}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = Fault(key="(file)", got=str(error), expected="a TOML document")
+        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def _faults(document: Document) -> Iterator[Fault]:
+def _faults(document: Document) -> Iterator[RobotFileFault]:
     yield from check_record(document, "", CALIBRATION)
     for name, record in table(document, "joints").items():
         row = record if isinstance(record, dict) else {}

@@ -18,11 +18,19 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.robots.description import Camera, LensCalibration, Mounting
+from vla_deploy.robots.description import CameraDescription, CameraMounting, LensCalibration
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.lens_schema import lens_faults
 from vla_deploy.robots.replacing import replace_text
-from vla_deploy.robots.schema import NUMBER, TEXT, Check, Fault, Shape, check_record, is_number
+from vla_deploy.robots.schema import (
+    NUMBER,
+    TEXT,
+    RobotFileFault,
+    Shape,
+    ValueCheck,
+    check_record,
+    is_number,
+)
 from vla_deploy.runtime.one_line import one_line
 
 LENS_FILE: Final = "camera.yaml"
@@ -38,11 +46,11 @@ MODELS: Final[Mapping[str, tuple[int, ...]]] = {"plumb_bob": (4, 5), "rational_p
 Document = Mapping[str, Any]
 
 
-def _numbers(count: int) -> Check:
+def _numbers(count: int) -> ValueCheck:
     def holds(value: Any) -> bool:
         return isinstance(value, list) and len(value) == count and all(map(is_number, value))
 
-    return Check(expected=f"a list of {count} numbers", holds=holds)
+    return ValueCheck(expected=f"a list of {count} numbers", holds=holds)
 
 
 MOUNTING: Shape = {
@@ -59,9 +67,11 @@ MOUNTING_HEADER = """\
 """
 
 
-def with_calibration(camera: Camera, directory: Path) -> tuple[Camera, tuple[Fault, ...]]:
+def with_calibration(
+    camera: CameraDescription, directory: Path
+) -> tuple[CameraDescription, tuple[RobotFileFault, ...]]:
     """Return a camera with the calibration files of its robot's folder, and their faults."""
-    faults: list[Fault] = []
+    faults: list[RobotFileFault] = []
     try:
         camera = replace(camera, lens=read_lens(directory / LENS_FILE, camera))
     except RobotFileError as error:
@@ -74,7 +84,7 @@ def with_calibration(camera: Camera, directory: Path) -> tuple[Camera, tuple[Fau
     return camera, tuple(faults)
 
 
-def read_lens(file: Path, camera: Camera) -> LensCalibration | None:
+def read_lens(file: Path, camera: CameraDescription) -> LensCalibration | None:
     """Return the lens of a camera_info file; None where there is no file.
 
     Raises:
@@ -95,7 +105,7 @@ def read_lens(file: Path, camera: Camera) -> LensCalibration | None:
     return _lens(document)
 
 
-def write_lens(file: Path, lens: LensCalibration, camera: Camera) -> None:
+def write_lens(file: Path, lens: LensCalibration, camera: CameraDescription) -> None:
     """Replace the file in one act; the one before stays as `<file>.bak`.
 
     Raises:
@@ -126,7 +136,7 @@ def write_lens(file: Path, lens: LensCalibration, camera: Camera) -> None:
     replace_text(file, yaml.safe_dump(document, sort_keys=False, default_flow_style=None))
 
 
-def read_mounting(file: Path, camera: Camera) -> Mounting | None:
+def read_mounting(file: Path, camera: CameraDescription) -> CameraMounting | None:
     """Return the correction of the camera's place; None where there is no file.
 
     Raises:
@@ -143,10 +153,10 @@ def read_mounting(file: Path, camera: Camera) -> Mounting | None:
     if faults:
         raise RobotFileError(file, faults)
     lists = {key: tuple(document[key]) for key in ("translation_m", "quaternion_xyzw")}
-    return Mounting(**{**document, **lists})
+    return CameraMounting(**{**document, **lists})
 
 
-def require_plausible(file: Path, mounting: Mounting, camera: Camera) -> None:
+def require_plausible(file: Path, mounting: CameraMounting, camera: CameraDescription) -> None:
     """Check a mounting before it is written, as it will be checked when it is read.
 
     Raises:
@@ -157,7 +167,7 @@ def require_plausible(file: Path, mounting: Mounting, camera: Camera) -> None:
         raise RobotFileError(file, faults)
 
 
-def write_mounting(file: Path, mounting: Mounting) -> None:
+def write_mounting(file: Path, mounting: CameraMounting) -> None:
     """Replace the file in one act; the one before stays as `<file>.bak`.
 
     Raises:
@@ -167,14 +177,14 @@ def write_mounting(file: Path, mounting: Mounting) -> None:
     replace_text(file, MOUNTING_HEADER + "".join(rows))
 
 
-def _wrong(document: Document, camera: Camera) -> Iterator[Fault]:
+def _wrong(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:
     for key in ("site", "model"):
         if document[key] != (expected := getattr(camera, key)):
             told = f"{expected!r}, as in the robot file: measure this camera's mounting again"
-            yield Fault(key=key, got=repr(document[key]), expected=told)
+            yield RobotFileFault(key=key, got=repr(document[key]), expected=told)
     length = float(np.linalg.norm(document["quaternion_xyzw"]))
     if abs(length - 1.0) > 1e-3:
-        yield Fault(
+        yield RobotFileFault(
             key="quaternion_xyzw",
             got=f"one of length {length:.4g}",
             expected="a rotation: length 1",
@@ -182,15 +192,17 @@ def _wrong(document: Document, camera: Camera) -> Iterator[Fault]:
     shift_m = float(np.linalg.norm(document["translation_m"]))
     if shift_m > MAX_SHIFT_M:
         told = f"at most {MAX_SHIFT_M} m; correct the site in the MJCF if it sits there"
-        yield Fault(key="translation_m", got=f"{shift_m:.3f} m", expected=told)
+        yield RobotFileFault(key="translation_m", got=f"{shift_m:.3f} m", expected=told)
     turn_rad = 2.0 * math.acos(min(1.0, abs(document["quaternion_xyzw"][3])))
     if turn_rad > MAX_TURN_RAD:
         told = f"at most {math.degrees(MAX_TURN_RAD):.0f} degrees; correct the site in the MJCF"
-        yield Fault(key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=told)
+        yield RobotFileFault(
+            key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=told
+        )
     focal_px = camera.intrinsics.fx
     if abs(document["focal_px"] / focal_px - 1.0) > SAME_FOCAL_RATIO:
         told = f"{focal_px:.1f}, the lens in force: run `vla-deploy camera hand-eye` again"
-        yield Fault(key="focal_px", got=repr(document["focal_px"]), expected=told)
+        yield RobotFileFault(key="focal_px", got=repr(document["focal_px"]), expected=told)
 
 
 def _lens(document: Document) -> LensCalibration:
@@ -228,9 +240,9 @@ def _text(file: Path) -> str | None:
         raise _unreadable(file, str(error), "a text file that can be read") from error
 
 
-def _told(file: str, error: RobotFileError) -> list[Fault]:
+def _told(file: str, error: RobotFileError) -> list[RobotFileFault]:
     return [replace(fault, key=f"{file}: {fault.key}") for fault in error.faults]
 
 
 def _unreadable(file: Path, got: str, expected: str) -> RobotFileError:
-    return RobotFileError(file, (Fault(key="(file)", got=got, expected=expected),))
+    return RobotFileError(file, (RobotFileFault(key="(file)", got=got, expected=expected),))

@@ -9,7 +9,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.robots.schema import Fault, is_number
+from vla_deploy.robots.schema import RobotFileFault, is_number
 
 Document = Mapping[str, Any]
 DEVICES = (
@@ -43,10 +43,10 @@ def texts(record: Document, key: str) -> list[str]:
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
 
 
-def unknown_name(key: str, name: str, kind: str, known: Collection[str]) -> Fault:
+def unknown_name(key: str, name: str, kind: str, known: Collection[str]) -> RobotFileFault:
     """Return the fault of a name that nothing bears, with the names there are."""
     listed = ", ".join(sorted(known)) or "there is none"
-    return Fault(key=key, got=repr(name), expected=f"{kind}: {listed}")
+    return RobotFileFault(key=key, got=repr(name), expected=f"{kind}: {listed}")
 
 
 def _servos(document: Document) -> list[Document]:
@@ -61,17 +61,21 @@ def _joints(records: list[Document]) -> set[str]:
     return {row["joint"] for row in records if isinstance(row.get("joint"), str)}
 
 
-def _repeats(values: Iterator[tuple[str, object]] | list[tuple[str, object]]) -> Iterator[Fault]:
+def _repeats(
+    values: Iterator[tuple[str, object]] | list[tuple[str, object]],
+) -> Iterator[RobotFileFault]:
     first: dict[object, str] = {}
     for key, value in values:
         if not isinstance(value, str | int):
             continue
         if value in first:
-            yield Fault(key=key, got=repr(value), expected=f"a value not used by {first[value]}")
+            yield RobotFileFault(
+                key=key, got=repr(value), expected=f"a value not used by {first[value]}"
+            )
         first.setdefault(value, key)
 
 
-def nothing_used_twice(document: Document) -> Iterator[Fault]:
+def nothing_used_twice(document: Document) -> Iterator[RobotFileFault]:
     """Servo ids, node ids, driven joints and device names are unique."""
     servos = [(f"servo_bus.servos[{i}]", row) for i, row in enumerate(_servos(document))]
     drives = [(f"can_bus.drives[{i}]", row) for i, row in enumerate(_drives(document))]
@@ -84,7 +88,7 @@ def nothing_used_twice(document: Document) -> Iterator[Fault]:
 NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
 
 
-def drives_fit_protocol(document: Document) -> Iterator[Fault]:
+def drives_fit_protocol(document: Document) -> Iterator[RobotFileFault]:
     """Node ids are those of the protocol, and ODrive axes have their list of endpoints."""
     bus = table(document, "can_bus")
     protocol = bus.get("protocol", "cia402")
@@ -94,20 +98,20 @@ def drives_fit_protocol(document: Document) -> Iterator[Fault]:
     for i, row in enumerate(_drives(document)):
         node_id = row.get("node_id")
         if isinstance(node_id, int) and node_id not in allowed:
-            yield Fault(
+            yield RobotFileFault(
                 key=f"can_bus.drives[{i}].node_id",
                 got=repr(node_id),
                 expected=f"an integer in {allowed[0]}..{allowed[-1]}, as {protocol} has them",
             )
     if protocol == "odrive" and "endpoints" not in bus:
-        yield Fault(
+        yield RobotFileFault(
             key="can_bus.endpoints",
             got="nothing",
             expected="the flat_endpoints.json of the axes' firmware: it arms their watchdog",
         )
 
 
-def models_are_listed(document: Document) -> Iterator[Fault]:
+def models_are_listed(document: Document) -> Iterator[RobotFileFault]:
     """Each servo's model has its datasheet figures."""
     models = subtables(document, "servo_models")
     for i, row in enumerate(_servos(document)):
@@ -117,20 +121,24 @@ def models_are_listed(document: Document) -> Iterator[Fault]:
             yield unknown_name(key, model, "a key of servo_models", models)
 
 
-def limits_match_servos(document: Document) -> Iterator[Fault]:
+def limits_match_servos(document: Document) -> Iterator[RobotFileFault]:
     """Each servo joint has limits, the lower below the upper."""
     limits, joints = subtables(document, "limits"), _joints(_servos(document))
     for joint in sorted(joints - limits.keys()):
-        yield Fault(key=f"limits.{joint}", got="nothing", expected="a table: it has a servo")
+        yield RobotFileFault(
+            key=f"limits.{joint}", got="nothing", expected="a table: it has a servo"
+        )
     for joint, row in limits.items():
         low, high = row.get("min"), row.get("max")
         if joint not in joints:
             yield unknown_name(f"limits.{joint}", joint, "a servo's joint", joints)
         elif is_number(low) and is_number(high) and not low < high:
-            yield Fault(key=f"limits.{joint}.min", got=repr(low), expected=f"below max {high}")
+            yield RobotFileFault(
+                key=f"limits.{joint}.min", got=repr(low), expected=f"below max {high}"
+            )
 
 
-def servos_reach(document: Document) -> Iterator[Fault]:
+def servos_reach(document: Document) -> Iterator[RobotFileFault]:
     """A servo's one turn covers its joint's limits, its no-load speed the velocity limit."""
     limits, models = table(document, "limits"), table(document, "servo_models")
     for row in _servos(document):
@@ -142,15 +150,19 @@ def servos_reach(document: Document) -> Iterator[Fault]:
             value = bounds.get(end)
             if is_number(value) and abs(value - offset) > pi * travel:
                 expected = f"within {pi * travel:.4g} of the servo's offset {offset}"
-                yield Fault(key=f"limits.{joint}.{end}", got=repr(value), expected=expected)
+                yield RobotFileFault(
+                    key=f"limits.{joint}.{end}", got=repr(value), expected=expected
+                )
         velocity, speed = bounds.get("velocity"), table(models, row.get("model"))
         no_load = speed.get("no_load_speed_rad_s")
         if is_number(velocity) and is_number(no_load) and velocity > no_load * travel:
             expected = f"at most the servo's no-load speed {no_load * travel:.4g}"
-            yield Fault(key=f"limits.{joint}.velocity", got=repr(velocity), expected=expected)
+            yield RobotFileFault(
+                key=f"limits.{joint}.velocity", got=repr(velocity), expected=expected
+            )
 
 
-def groups_cover_joints(document: Document) -> Iterator[Fault]:
+def groups_cover_joints(document: Document) -> Iterator[RobotFileFault]:
     """Each driven joint is in exactly one group."""
     driven = _joints(_servos(document)) | _joints(_drives(document))
     placed: list[tuple[str, object]] = [
@@ -163,10 +175,12 @@ def groups_cover_joints(document: Document) -> Iterator[Fault]:
         if joint not in driven:
             yield unknown_name(key, str(joint), "a driven joint", driven)
     for joint in sorted(driven - {joint for _, joint in placed}):
-        yield Fault(key="groups", got=f"no group with {joint}", expected="each joint in a group")
+        yield RobotFileFault(
+            key="groups", got=f"no group with {joint}", expected="each joint in a group"
+        )
 
 
-def hands_name_groups(document: Document) -> Iterator[Fault]:
+def hands_name_groups(document: Document) -> Iterator[RobotFileFault]:
     """A hand names two groups; that of the gripper has one joint."""
     groups = subtables(document, "groups")
     for name, row in subtables(document, "hands").items():
@@ -177,16 +191,18 @@ def hands_name_groups(document: Document) -> Iterator[Fault]:
         joints = texts(table(groups, row.get("gripper")), "joints")
         if len(joints) > 1:
             got = f"a group of {len(joints)} joints"
-            yield Fault(key=f"hands.{name}.gripper", got=got, expected="a group of one joint")
+            yield RobotFileFault(
+                key=f"hands.{name}.gripper", got=got, expected="a group of one joint"
+            )
 
 
-def poses_are_reachable(document: Document) -> Iterator[Fault]:
+def poses_are_reachable(document: Document) -> Iterator[RobotFileFault]:
     """A pose names servo joints and stays inside their limits."""
     limits, joints = table(document, "limits"), _joints(_servos(document))
     for name, targets in table(document, "poses").items():
         if not isinstance(targets, dict):
             key = f"poses.{name}"
-            yield Fault(key=key, got=repr(targets), expected="a table of joint = position")
+            yield RobotFileFault(key=key, got=repr(targets), expected="a table of joint = position")
             continue
         for joint, value in targets.items():
             yield from _pose_target(f"poses.{name}.{joint}", joint, value, joints, limits)
@@ -194,18 +210,18 @@ def poses_are_reachable(document: Document) -> Iterator[Fault]:
 
 def _pose_target(
     key: str, joint: str, value: object, joints: set[str], limits: Document
-) -> Iterator[Fault]:
+) -> Iterator[RobotFileFault]:
     bounds = table(limits, joint)
     low, high = bounds.get("min"), bounds.get("max")
     if joint not in joints:
         yield unknown_name(key, joint, "a servo's joint", joints)
     elif not is_number(value):
-        yield Fault(key=key, got=repr(value), expected="a number")
+        yield RobotFileFault(key=key, got=repr(value), expected="a number")
     elif is_number(low) and is_number(high) and not low <= value <= high:
-        yield Fault(key=key, got=repr(value), expected=f"inside the limits {low}..{high}")
+        yield RobotFileFault(key=key, got=repr(value), expected=f"inside the limits {low}..{high}")
 
 
-def places_are_distinct(document: Document) -> Iterator[Fault]:
+def places_are_distinct(document: Document) -> Iterator[RobotFileFault]:
     """The start is a place; no two places share a name or an alias."""
     home = table(document, "home")
     places = subtables(home, "places")
@@ -218,16 +234,18 @@ def places_are_distinct(document: Document) -> Iterator[Fault]:
     yield from _repeats(words)
 
 
-def ros_is_on_where_needed(document: Document) -> Iterator[Fault]:
+def ros_is_on_where_needed(document: Document) -> Iterator[RobotFileFault]:
     """Yield a fault for each part that is moved over ROS by a robot that is in no ROS graph."""
     ros = table(document, "ros")
     for key in ("navigation", "arms"):
         if ros.get(key, "own") != "own" and ros.get("enabled") is not True:
             expected = 'enabled = true in [ros], or "own"'
-            yield Fault(key=f"ros.{key}", got=f"{ros[key]!r} while ROS is off", expected=expected)
+            yield RobotFileFault(
+                key=f"ros.{key}", got=f"{ros[key]!r} while ROS is off", expected=expected
+            )
 
 
-CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
+CHECKS: tuple[Callable[[Document], Iterator[RobotFileFault]], ...] = (
     nothing_used_twice,
     drives_fit_protocol,
     models_are_listed,
@@ -241,7 +259,7 @@ CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
 )
 
 
-def missing_files(document: Document, directory: Path) -> Iterator[Fault]:
+def missing_files(document: Document, directory: Path) -> Iterator[RobotFileFault]:
     """Yield a fault for each file that the robot file names and that is not there."""
     can_bus = table(document, "can_bus")
     named = (
@@ -252,4 +270,4 @@ def missing_files(document: Document, directory: Path) -> Iterator[Fault]:
     )
     for key, name in named:
         if isinstance(name, str) and not (directory / name).is_file():
-            yield Fault(key=key, got=repr(name), expected=f"a file under {directory}")
+            yield RobotFileFault(key=key, got=repr(name), expected=f"a file under {directory}")

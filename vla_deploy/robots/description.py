@@ -129,7 +129,7 @@ class LensCalibration:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mounting:
+class CameraMounting:
     """Hold by how much the camera sits otherwise than its site, measured with a lens `focal_px`.
 
     `residual_m` is how far apart the measurements put the board; `made_at` is a date for people.
@@ -157,7 +157,7 @@ class Mounting:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Camera:
+class CameraDescription:
     """Describe the RGB-D camera; `site` is its optical frame: x right, y down, z forward.
 
     `lens` and `mounting` are what calibration measured; None means as told by the camera, and as
@@ -172,7 +172,7 @@ class Camera:
     height: int
     fovy_rad: float
     lens: LensCalibration | None = None
-    mounting: Mounting | None = None
+    mounting: CameraMounting | None = None
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -203,7 +203,7 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EstopButton:
+class EstopButtonDescription:
     """Describe the emergency-stop input; `number` is a key's code (HID) or a GPIO line's offset."""
 
     device: str
@@ -248,7 +248,7 @@ class JointLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Group:
+class StopGroup:
     """Name joints that stop together, and how.
 
     A group that holds something keeps its power through a stop, unless it may `drop_payload`.
@@ -321,13 +321,13 @@ class RobotDescription:
     base: BaseGeometry
     lidar: SerialSensor
     imu: SerialSensor
-    camera: Camera
+    camera: CameraDescription
     limits: Mapping[str, JointLimits]
-    groups: Mapping[str, Group]
+    groups: Mapping[str, StopGroup]
     hands: Mapping[str, Hand]
     poses: Mapping[str, Mapping[str, float]]
     home: Home
-    estop: EstopButton | None = None
+    estop: EstopButtonDescription | None = None
     microphone: Audio | None = None
     speaker: Audio | None = None
     voice: VoiceSettings = VoiceSettings()
@@ -386,7 +386,7 @@ class RobotDescription:
         """Return the jerk limits in joint order."""
         return np.array([self.limits[name].jerk for name in self.joint_names])
 
-    def group(self, name: str) -> Group:
+    def group(self, name: str) -> StopGroup:
         """Return a joint group.
 
         Raises:

@@ -5,13 +5,13 @@ RobotFileError    the robot file, or a file it names, cannot be used: fix every 
 
 from pathlib import Path
 
-from vla_deploy.robots.schema import Fault
+from vla_deploy.robots.schema import RobotFileFault
 
 
 class RobotFileError(ValueError):
     """Report every fault of one robot file at once."""
 
-    def __init__(self, file: Path, faults: tuple[Fault, ...]) -> None:
+    def __init__(self, file: Path, faults: tuple[RobotFileFault, ...]) -> None:
         self.file = file
         self.faults = faults
         if len(faults) == 1:

@@ -17,7 +17,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematic_tree import Joint, KinematicTree, Link
 from vla_deploy.robots.mjcf_document import Element, MjcfDocument, read_document, vector
 from vla_deploy.robots.orientation import UNTURNED, matrix, numbers, product, quaternion_of
-from vla_deploy.robots.schema import Fault
+from vla_deploy.robots.schema import RobotFileFault
 from vla_deploy.robots.tree_reader import MOVING, tree_of
 
 Array = NDArray[np.float64]
@@ -155,30 +155,32 @@ def _wheels(robot: RobotDescription) -> tuple[str, ...]:
     return tuple(drive.joint for drive in robot.can_bus.drives)
 
 
-def _refuse(document: MjcfDocument, faults: Iterable[Fault]) -> None:
+def _refuse(document: MjcfDocument, faults: Iterable[RobotFileFault]) -> None:
     if listed := tuple(faults):
         raise RobotFileError(document.path, listed)
 
 
-def _unread(document: MjcfDocument) -> Iterator[Fault]:
+def _unread(document: MjcfDocument) -> Iterator[RobotFileFault]:
     for tag in _NOT_READ:
         if document.root.find(f".//{tag}") is not None:
-            yield Fault(key=tag, got=f"a <{tag}>", expected="bodies, joints and geoms written out")
+            yield RobotFileFault(
+                key=tag, got=f"a <{tag}>", expected="bodies, joints and geoms written out"
+            )
     for tag in _LOOPS:
         if document.root.find(f"equality/{tag}") is not None:
             expected = "a tree of bodies: URDF has no closed loops"
-            yield Fault(key=f"equality.{tag}", got=f"a <{tag}>", expected=expected)
+            yield RobotFileFault(key=f"equality.{tag}", got=f"a <{tag}>", expected=expected)
 
 
-def _coupling_faults(document: MjcfDocument, leads: Container[str]) -> Iterator[Fault]:
+def _coupling_faults(document: MjcfDocument, leads: Container[str]) -> Iterator[RobotFileFault]:
     for couple in document.root.findall("equality/joint"):
         key, leader = f"equality.joint {couple.get('joint1', '')}", couple.get("joint2", "")
         if leader not in leads:
             got = f"joint2 {leader!r}"
-            yield Fault(key=key, got=got, expected="a joint that a servo or a drive moves")
+            yield RobotFileFault(key=key, got=got, expected="a joint that a servo or a drive moves")
         if np.any(_polynomial(couple)[2:] != 0.0):
             got = f"polycoef {couple.get('polycoef', '')}"
-            yield Fault(
+            yield RobotFileFault(
                 key=key, got=got, expected="a straight line: zeros behind the second number"
             )
 
@@ -197,36 +199,44 @@ def _couplings(document: MjcfDocument) -> dict[str, JointCoupling]:
     return couplings
 
 
-def _joint_faults(document: MjcfDocument, leads: Collection[str]) -> Iterator[Fault]:
+def _joint_faults(document: MjcfDocument, leads: Collection[str]) -> Iterator[RobotFileFault]:
     moving = {*leads, *document.leaders}
     for body in document.bodies:
         if not body.name:
-            yield Fault(key="body", got=f"one without a name in {body.parent!r}", expected="a name")
+            yield RobotFileFault(
+                key="body", got=f"one without a name in {body.parent!r}", expected="a name"
+            )
         for joint in body.element.findall("joint"):
             told = document.attributes(joint, body.child_class)
             name, kind = told.get("name", ""), told.get("type", "hinge")
             if name not in moving:
                 continue
             if kind not in MOVING:
-                yield Fault(
+                yield RobotFileFault(
                     key=f"joint {name}", got=f"a {kind} joint", expected="a hinge or a slide"
                 )
             if float(told.get("ref", "0")) != 0.0:
                 expected = "no ref: the joint's zero is where the body is drawn"
-                yield Fault(key=f"joint {name}", got=f"ref {told['ref']}", expected=expected)
+                yield RobotFileFault(
+                    key=f"joint {name}", got=f"ref {told['ref']}", expected=expected
+                )
             if not body.parent:
                 expected = "a root body that nothing moves against the base"
-                yield Fault(key=f"joint {name}", got="a joint of the root body", expected=expected)
+                yield RobotFileFault(
+                    key=f"joint {name}", got="a joint of the root body", expected=expected
+                )
 
 
-def _name_faults(joints: Sequence[FrameJoint]) -> Iterator[Fault]:
+def _name_faults(joints: Sequence[FrameJoint]) -> Iterator[RobotFileFault]:
     frames = Counter([BASE_FRAME, *(joint.child for joint in joints)])
     names = Counter(joint.name for joint in joints)
     for kind, counts in (("frame", frames), ("joint", names)):
         for name, count in counts.items():
             if count > 1:
                 got = f"{count} {kind}s of that name"
-                yield Fault(key=f"{kind} {name}", got=got, expected="one: rename a body or a site")
+                yield RobotFileFault(
+                    key=f"{kind} {name}", got=got, expected="one: rename a body or a site"
+                )
 
 
 def _body_joints(

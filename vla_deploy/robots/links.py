@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from drivers.opener import DeviceLink
-from drivers.registry import Kind, sensor_model
+from drivers.registry import SensorKind, sensor_model
 from vla_deploy.robots.description import RobotDescription
 
 
@@ -12,8 +12,8 @@ def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> di
     bauds = {
         robot.servo_bus.device: robot.servo_bus.baud,
         robot.can_bus.device: robot.can_bus.bitrate,
-        robot.lidar.device: sensor_model(Kind.LIDAR, robot.lidar.model).baud,
-        robot.imu.device: sensor_model(Kind.IMU, robot.imu.model).baud,
+        robot.lidar.device: sensor_model(SensorKind.LIDAR, robot.lidar.model).baud,
+        robot.imu.device: sensor_model(SensorKind.IMU, robot.imu.model).baud,
         robot.camera.device: 0,
     }
     optional = (robot.estop, robot.microphone, robot.speaker)

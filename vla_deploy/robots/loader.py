@@ -14,12 +14,11 @@ from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables
 from vla_deploy.robots.description import (
     Audio,
     BaseGeometry,
-    Camera,
+    CameraDescription,
     CanBus,
     Drive,
-    EstopButton,
+    EstopButtonDescription,
     FloorPose,
-    Group,
     Hand,
     Home,
     JointLimits,
@@ -31,6 +30,7 @@ from vla_deploy.robots.description import (
     ServoBus,
     ServoModel,
     StopCategory,
+    StopGroup,
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
@@ -38,7 +38,7 @@ from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.overrides import read_overrides, traced
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.ros_settings import ROS, ros_settings
-from vla_deploy.robots.schema import Fault, Shape, check_record
+from vla_deploy.robots.schema import RobotFileFault, Shape, check_record
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
@@ -95,7 +95,7 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     faults = (*override_faults, *calibration_faults, *found)
     if faults:
         raise RobotFileError(file, faults)
-    camera, faults = with_calibration(Camera(**document["camera"]), file.parent)
+    camera, faults = with_calibration(CameraDescription(**document["camera"]), file.parent)
     if faults:
         raise RobotFileError(file, faults)
     return _build(document, file.parent, camera)
@@ -113,7 +113,9 @@ def robot_file(name_or_path: str | Path) -> Path:
         if candidate.is_file():
             return candidate
     expected = f"a robot file, its folder, or one of {', '.join(robot_names())}"
-    raise RobotFileError(given, (Fault(key="(file)", got="no such file", expected=expected),))
+    raise RobotFileError(
+        given, (RobotFileFault(key="(file)", got="no such file", expected=expected),)
+    )
 
 
 def robot_names() -> tuple[str, ...]:
@@ -125,11 +127,11 @@ def _parse(file: Path) -> Document:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = Fault(key="(file)", got=str(error), expected="a TOML document")
+        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def _faults(document: Document, directory: Path) -> Iterator[Fault]:
+def _faults(document: Document, directory: Path) -> Iterator[RobotFileFault]:
     for record, key, shape in _records(document):
         yield from check_record(record, key, shape)
     yield from missing_files(document, directory)
@@ -138,14 +140,14 @@ def _faults(document: Document, directory: Path) -> Iterator[Fault]:
     yield from _faults_against_mjcf(document, directory)
 
 
-def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[Fault]:
+def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[RobotFileFault]:
     name = document.get("mjcf")
     if not isinstance(name, str) or not (directory / name).is_file():
         return
     try:
         mjcf = read_mjcf_names(directory / name)
     except ElementTree.ParseError as error:
-        yield Fault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
+        yield RobotFileFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
 
@@ -171,7 +173,7 @@ def _as_table(value: Any) -> Document:
     return value if isinstance(value, dict) else {}
 
 
-def _build(document: Document, directory: Path, camera: Camera) -> RobotDescription:
+def _build(document: Document, directory: Path, camera: CameraDescription) -> RobotDescription:
     servo_bus = document["servo_bus"]
     return RobotDescription(
         name=document["name"],
@@ -185,7 +187,7 @@ def _build(document: Document, directory: Path, camera: Camera) -> RobotDescript
         lidar=SerialSensor(**document["lidar"]),
         imu=SerialSensor(**document["imu"]),
         camera=camera,
-        estop=EstopButton(**document["estop"]) if "estop" in document else None,
+        estop=EstopButtonDescription(**document["estop"]) if "estop" in document else None,
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
@@ -200,8 +202,8 @@ def _build(document: Document, directory: Path, camera: Camera) -> RobotDescript
     )
 
 
-def _group(name: str, row: Document) -> Group:
-    return Group(
+def _group(name: str, row: Document) -> StopGroup:
+    return StopGroup(
         name=name,
         joints=tuple(row["joints"]),
         stop_category=StopCategory(row["stop_category"]),

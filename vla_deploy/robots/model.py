@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vla_deploy.robots.description import RobotDescription
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.mjcf import read_mjcf_names
-from vla_deploy.robots.schema import Fault
+from vla_deploy.robots.schema import RobotFileFault
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,9 @@ class RobotModel:
         missing = [name for name in robot.joint_names if not whole.existJointName(name)]
         if missing:
             got = f"a model of {whole.nq} coordinates without {', '.join(missing)}"
-            fault = Fault(key="mjcf", got=got, expected="every servo joint below the first body")
+            fault = RobotFileFault(
+                key="mjcf", got=got, expected="every servo joint below the first body"
+            )
             raise RobotFileError(robot.mjcf_path, (fault,))
 
 

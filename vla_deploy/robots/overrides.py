@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from vla_deploy.robots.schema import Fault
+from vla_deploy.robots.schema import RobotFileFault
 
 OVERRIDES_FILE: Final = "overrides.toml"
 Document = Mapping[str, Any]
 
 
-def read_overrides(directory: Path) -> tuple[Document, tuple[Fault, ...]]:
+def read_overrides(directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
     """Return the overrides of a robot's folder, empty where it has none, and the file's faults."""
     try:
         text = (directory / OVERRIDES_FILE).read_text(encoding="utf-8")
@@ -20,10 +20,12 @@ def read_overrides(directory: Path) -> tuple[Document, tuple[Fault, ...]]:
     except FileNotFoundError:
         return {}, ()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        return {}, (Fault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),)
+        return {}, (
+            RobotFileFault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),
+        )
 
 
-def traced(fault: Fault, overrides: Document, own: Document) -> Fault:
+def traced(fault: RobotFileFault, overrides: Document, own: Document) -> RobotFileFault:
     """Return the fault of a merged document, with the name of the overrides where they made it.
 
     A value that lacks in a table is theirs where the robot file itself has no such table.

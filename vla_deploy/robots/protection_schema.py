@@ -18,9 +18,9 @@ from vla_deploy.robots.schema import (
     OPTIONAL_POSITIVE,
     POLYGON,
     TABLE,
-    Check,
-    Fault,
+    RobotFileFault,
     Shape,
+    ValueCheck,
     is_number,
     one_of,
 )
@@ -36,26 +36,26 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1000
 
 
-COUNT = Check(expected="an integer in 1..1000", holds=_is_count, is_optional=True)
-NOT_NEGATIVE = Check(
+COUNT = ValueCheck(expected="an integer in 1..1000", holds=_is_count, is_optional=True)
+NOT_NEGATIVE = ValueCheck(
     expected="a number, 0 or above", holds=lambda v: is_number(v) and v >= 0, is_optional=True
 )
-RATIO = Check(
+RATIO = ValueCheck(
     expected="a number above 0 and below 1",
     holds=lambda v: is_number(v) and 0 < v < 1,
     is_optional=True,
 )
-LEAN = Check(
+LEAN = ValueCheck(
     expected="an angle in 0.01..0.8 rad", holds=lambda v: is_number(v) and 0.01 <= v <= 0.8
 )
-POINT_3 = Check(expected="[x, y, z]", holds=lambda v: _is_list_of(v, 3, is_number))
-SOURCES = Check(
+POINT_3 = ValueCheck(expected="[x, y, z]", holds=lambda v: _is_list_of(v, 3, is_number))
+SOURCES = ValueCheck(
     expected=f"a list with one or more of {', '.join(ZoneSource)}",
     holds=lambda v: (
         isinstance(v, list) and len(v) > 0 and all(one in list(ZoneSource) for one in v)
     ),
 )
-PAIRS = Check(
+PAIRS = ValueCheck(
     expected="a list of pairs of geom names",
     holds=lambda v: (
         isinstance(v, list)
@@ -67,7 +67,7 @@ PAIRS = Check(
 ZONE: Shape = {
     "kind": one_of(*ZoneKind),
     "sources": SOURCES,
-    "polygon_m": Check(expected=POLYGON.expected, holds=POLYGON.holds, is_optional=True),
+    "polygon_m": ValueCheck(expected=POLYGON.expected, holds=POLYGON.holds, is_optional=True),
     "min_points": COUNT,
     "trigger_count": COUNT,
     "release_count": COUNT,
@@ -100,14 +100,14 @@ _NEEDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 
 
-def zones_fit_their_kind(document: Document) -> Iterator[Fault]:
+def zones_fit_their_kind(document: Document) -> Iterator[RobotFileFault]:
     """Each zone has what its kind needs and nothing that its kind does not use."""
     for name, row in subtables(document, "zones").items():
         kind = row.get("kind")
         needed, unused = _NEEDS.get(kind, ((), ())) if isinstance(kind, str) else ((), ())
         for key in needed:
             if key not in row:
-                yield Fault(
+                yield RobotFileFault(
                     key=f"zones.{name}.{key}",
                     got="nothing",
                     expected=f"a value: it is a {kind} zone",
@@ -115,13 +115,15 @@ def zones_fit_their_kind(document: Document) -> Iterator[Fault]:
         for key in unused:
             if key in row:
                 expected = f"no such key: a {kind} zone has no use for it"
-                yield Fault(key=f"zones.{name}.{key}", got=repr(row[key]), expected=expected)
+                yield RobotFileFault(
+                    key=f"zones.{name}.{key}", got=repr(row[key]), expected=expected
+                )
         if kind == ZoneKind.LIMIT and not {"speed_m_s", "turn_rad_s"} & row.keys():
             expected = "speed_m_s, turn_rad_s or both: it is a limit zone"
-            yield Fault(key=f"zones.{name}", got="neither", expected=expected)
+            yield RobotFileFault(key=f"zones.{name}", got="neither", expected=expected)
 
 
-def workspaces_bound_hands(document: Document) -> Iterator[Fault]:
+def workspaces_bound_hands(document: Document) -> Iterator[RobotFileFault]:
     """A workspace is that of a hand, and its lower corner lies below the upper one."""
     hands = subtables(document, "hands")
     for name, row in subtables(document, "workspace").items():
@@ -133,10 +135,12 @@ def workspaces_bound_hands(document: Document) -> Iterator[Fault]:
             assert isinstance(high, list)
             if not all(a < b for a, b in zip(low, high, strict=True)):
                 key = f"workspace.{name}.min_m"
-                yield Fault(key=key, got=repr(low), expected=f"below max_m {high} on every axis")
+                yield RobotFileFault(
+                    key=key, got=repr(low), expected=f"below max_m {high} on every axis"
+                )
 
 
-def contact_torques_fit_servos(document: Document) -> Iterator[Fault]:
+def contact_torques_fit_servos(document: Document) -> Iterator[RobotFileFault]:
     """A contact threshold is that of a servo joint, and below what the servo can give."""
     models = subtables(document, "servo_models")
     servos = {row.get("joint"): row for row in rows(table(document, "servo_bus"), "servos")}
@@ -150,10 +154,10 @@ def contact_torques_fit_servos(document: Document) -> Iterator[Fault]:
         limit = stall if is_number(stall) else float("inf")
         if not (is_number(value) and 0 < value < limit):
             below = f"a number above 0 and below the stall torque {stall}"
-            yield Fault(key=key, got=repr(value), expected=below)
+            yield RobotFileFault(key=key, got=repr(value), expected=below)
 
 
-def support_holds_centre(document: Document) -> Iterator[Fault]:
+def support_holds_centre(document: Document) -> Iterator[RobotFileFault]:
     """The support polygon is convex, counter-clockwise, and the base's centre is inside."""
     corners = table(document, "tip_over").get("support_m")
     if not POLYGON.holds(corners):
@@ -162,10 +166,10 @@ def support_holds_centre(document: Document) -> Iterator[Fault]:
     pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
     if not all(a[0] * b[1] - a[1] * b[0] > 0 for a, b in pairs):
         expected = "corners counter-clockwise around the base's centre [0, 0]"
-        yield Fault(key="tip_over.support_m", got=repr(corners), expected=expected)
+        yield RobotFileFault(key="tip_over.support_m", got=repr(corners), expected=expected)
 
 
-CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
+CHECKS: tuple[Callable[[Document], Iterator[RobotFileFault]], ...] = (
     zones_fit_their_kind,
     workspaces_bound_hands,
     contact_torques_fit_servos,

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.schema import Fault
+from vla_deploy.robots.schema import RobotFileFault
 
 
 def replace_text(file: Path, text: str) -> None:
@@ -26,5 +26,5 @@ def replace_text(file: Path, text: str) -> None:
     except OSError as error:
         fresh.unlink(missing_ok=True)
         expected = "a file that can be written; choose one with --output"
-        fault = Fault(key="(file)", got=error.strerror or str(error), expected=expected)
+        fault = RobotFileFault(key="(file)", got=error.strerror or str(error), expected=expected)
         raise RobotFileError(file, (fault,)) from error

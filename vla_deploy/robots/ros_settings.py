@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.robots.schema import NUMBER, OPTIONAL_TEXT, Check, Shape, is_number, one_of
+from vla_deploy.robots.schema import NUMBER, OPTIONAL_TEXT, Shape, ValueCheck, is_number, one_of
 
 
 class Accepts(StrEnum):
@@ -68,8 +68,8 @@ FOLLOW_JOINT_TRAJECTORY: Final = "follow_joint_trajectory"
 _FLAG: Final = one_of(False, True, is_optional=True)
 
 
-def _number(low: float, high: float, unit: str) -> Check:
-    return Check(
+def _number(low: float, high: float, unit: str) -> ValueCheck:
+    return ValueCheck(
         expected=f"a number in {low:g}..{high:g} {unit}",
         holds=lambda value: is_number(value) and low <= value <= high,
         is_optional=True,
@@ -80,7 +80,7 @@ ROS: Final[Shape] = {
     "enabled": _FLAG,
     "accept": one_of(*(one.value for one in Accepts), is_optional=True),
     # Domains above 101 meet the ports that Linux hands out by itself.
-    "domain_id": Check(
+    "domain_id": ValueCheck(
         expected="an integer in 0..101",
         holds=lambda value: isinstance(value, int) and NUMBER.holds(value) and 0 <= value <= 101,
         is_optional=True,

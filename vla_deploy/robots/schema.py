@@ -6,11 +6,11 @@ from math import isfinite
 from typing import Any, TypeGuard
 
 from drivers.estop.open_estop import MODELS as ESTOP_MODELS
-from drivers.registry import Kind, model_names
+from drivers.registry import SensorKind, model_names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fault:
+class RobotFileFault:
     """Say what is wrong with one key of a file."""
 
     key: str
@@ -22,7 +22,7 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
+class ValueCheck:
     """Say what a value must be, in words and as a test."""
 
     expected: str
@@ -35,37 +35,39 @@ def is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
-def _integer(low: int, high: int) -> Check:
+def _integer(low: int, high: int) -> ValueCheck:
     def holds(value: Any) -> bool:
         return is_number(value) and isinstance(value, int) and low <= value <= high
 
-    return Check(expected=f"an integer in {low}..{high}", holds=holds)
+    return ValueCheck(expected=f"an integer in {low}..{high}", holds=holds)
 
 
-def one_of(*choices: Any, is_optional: bool = False) -> Check:
+def one_of(*choices: Any, is_optional: bool = False) -> ValueCheck:
     """Return the check that a value is one of `choices`."""
     listed = ", ".join(str(choice) for choice in choices)
-    return Check(
+    return ValueCheck(
         expected=f"one of {listed}", holds=lambda value: value in choices, is_optional=is_optional
     )
 
 
-NUMBER = Check(expected="a number", holds=is_number)
-POSITIVE = Check(expected="a number above 0", holds=lambda value: is_number(value) and value > 0)
-TEXT = Check(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
-TABLE = Check(expected="a table", holds=lambda value: isinstance(value, dict))
-OPTIONAL_TABLE = Check(expected="a table", holds=TABLE.holds, is_optional=True)
-OPTIONAL_TEXT = Check(expected="a text", holds=TEXT.holds, is_optional=True)
-OPTIONAL_POSITIVE = Check(expected=POSITIVE.expected, holds=POSITIVE.holds, is_optional=True)
-TABLES = Check(
+NUMBER = ValueCheck(expected="a number", holds=is_number)
+POSITIVE = ValueCheck(
+    expected="a number above 0", holds=lambda value: is_number(value) and value > 0
+)
+TEXT = ValueCheck(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
+TABLE = ValueCheck(expected="a table", holds=lambda value: isinstance(value, dict))
+OPTIONAL_TABLE = ValueCheck(expected="a table", holds=TABLE.holds, is_optional=True)
+OPTIONAL_TEXT = ValueCheck(expected="a text", holds=TEXT.holds, is_optional=True)
+OPTIONAL_POSITIVE = ValueCheck(expected=POSITIVE.expected, holds=POSITIVE.holds, is_optional=True)
+TABLES = ValueCheck(
     expected="a list of tables",
     holds=lambda value: isinstance(value, list) and all(isinstance(row, dict) for row in value),
 )
-TEXTS = Check(
+TEXTS = ValueCheck(
     expected="a list of texts",
     holds=lambda value: isinstance(value, list) and all(isinstance(row, str) for row in value),
 )
-POLYGON = Check(
+POLYGON = ValueCheck(
     expected="three or more [x, y] corners",
     holds=lambda value: isinstance(value, list) and len(value) >= 3 and all(map(_is_point, value)),
 )
@@ -75,7 +77,7 @@ def _is_point(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
 
 
-Shape = Mapping[str, Check]
+Shape = Mapping[str, ValueCheck]
 
 ROBOT: Shape = {
     "name": TEXT,
@@ -140,7 +142,7 @@ DRIVE: Shape = {
     "sign": one_of(-1, 1),
     "gear_ratio": POSITIVE,
     "mode": one_of("profile_velocity", "cyclic_synchronous_velocity", is_optional=True),
-    "counts_per_rev": Check(
+    "counts_per_rev": ValueCheck(
         expected="an integer above 0",
         holds=lambda value: POSITIVE.holds(value) and isinstance(value, int),
         is_optional=True,
@@ -160,18 +162,23 @@ BASE: Shape = {
 LIDAR: Shape = {
     "device": TEXT,
     "path": TEXT,
-    "model": one_of(*model_names(Kind.LIDAR)),
+    "model": one_of(*model_names(SensorKind.LIDAR)),
     "site": TEXT,
 }
-IMU: Shape = {"device": TEXT, "path": TEXT, "model": one_of(*model_names(Kind.IMU)), "site": TEXT}
+IMU: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "model": one_of(*model_names(SensorKind.IMU)),
+    "site": TEXT,
+}
 CAMERA: Shape = {
     "device": TEXT,
     "path": TEXT,
-    "model": one_of(*model_names(Kind.CAMERA)),
+    "model": one_of(*model_names(SensorKind.CAMERA)),
     "site": TEXT,
     "width": _integer(16, 1920),
     "height": _integer(16, 1080),
-    "fovy_rad": Check(
+    "fovy_rad": ValueCheck(
         expected="an angle in 0.1..2.8 rad",
         holds=lambda value: is_number(value) and 0.1 <= value <= 2.8,
     ),
@@ -193,7 +200,7 @@ VOICE: Shape = {
     "program": OPTIONAL_TEXT,
     "words_per_minute": replace(_integer(80, 450), is_optional=True),
     "pitch": replace(_integer(0, 99), is_optional=True),
-    "volume_ratio": Check(
+    "volume_ratio": ValueCheck(
         expected="a number in 0..1",
         holds=lambda value: is_number(value) and 0.0 <= value <= 1.0,
         is_optional=True,
@@ -226,21 +233,23 @@ PLANNING: Shape = {
 }
 
 
-def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Fault, ...]:
+def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[RobotFileFault, ...]:
     """Return the faults of one table: missing keys, unknown keys, values of the wrong kind."""
     prefix = f"{key}." if key else ""
     missing = [
-        Fault(key=prefix + name, got="nothing", expected=check.expected)
+        RobotFileFault(key=prefix + name, got="nothing", expected=check.expected)
         for name, check in shape.items()
         if name not in record and not check.is_optional
     ]
     unknown = [
-        Fault(key=prefix + name, got="an unknown key", expected=f"one of {', '.join(shape)}")
+        RobotFileFault(
+            key=prefix + name, got="an unknown key", expected=f"one of {', '.join(shape)}"
+        )
         for name in record
         if name not in shape
     ]
     wrong = [
-        Fault(key=prefix + name, got=repr(record[name]), expected=check.expected)
+        RobotFileFault(key=prefix + name, got=repr(record[name]), expected=check.expected)
         for name, check in shape.items()
         if name in record and not check.holds(record[name])
     ]

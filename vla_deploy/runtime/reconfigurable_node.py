@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from platforms.profile import profile_from
-from platforms.profile_source import Source
+from platforms.profile_source import ProfileSource
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.node import Adaptable, NeedsRestart, Node, Slowable
 from vla_deploy.runtime.rate_monitor import RateMonitor, TrialMonitor
@@ -125,11 +125,11 @@ class ReconfigurableNode:
 
     def _on_prepare(self, message: Mapping[str, Any]) -> None:
         self._abandon()
-        source = Source.of_values(message["profile"], message["values"])
+        source = ProfileSource.of_values(message["profile"], message["values"])
         future = self._executor.submit(self._prepare, source, self._tier)
         self._change = _Change(change_id=message["change_id"], future=future)
 
-    def _prepare(self, source: Source, tier: int) -> tuple[Profile, Any]:
+    def _prepare(self, source: ProfileSource, tier: int) -> tuple[Profile, Any]:
         profile = profile_from(source)
         known = self._host.obstacles(self._profile)
         new = [text for text in self._host.obstacles(profile) if text not in known]

@@ -1,6 +1,6 @@
 """Judge each control tick: pure functions from measurements to a verdict, no I/O."""
 
-from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, Rule
+from vla_deploy.safety.causes import RULES, Cause, CauseRule, Latch, Reaction
 from vla_deploy.safety.inputs import DriveSample, SafetyInputs, SafetyLimits
 from vla_deploy.safety.judge import CLEAR, ResetOutcome, SafetyState, Verdict, evaluate
 from vla_deploy.safety.surroundings import (
@@ -19,6 +19,7 @@ __all__ = [
     "NOTHING_KNOWN",
     "RULES",
     "Cause",
+    "CauseRule",
     "Clearance",
     "Direction",
     "DriveSample",
@@ -27,7 +28,6 @@ __all__ = [
     "Latch",
     "Reaction",
     "ResetOutcome",
-    "Rule",
     "SafetyInputs",
     "SafetyLimits",
     "SafetyState",

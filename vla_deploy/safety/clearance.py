@@ -48,7 +48,7 @@ class JointMotion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stopping:
+class StoppingMotion:
     """Carry from where and to where the joints come to rest; how long the slowest one takes."""
 
     start: Floats
@@ -56,7 +56,7 @@ class Stopping:
     time_s: float
 
 
-def stopping(motion: JointMotion, bounds: JointBounds) -> Stopping:
+def stopping(motion: JointMotion, bounds: JointBounds) -> StoppingMotion:
     """Return where the joints come to rest if they brake after the reaction time.
 
     The way of a jerk-limited stop is v^2 / 2a, and v / 2 times what it takes to begin braking.
@@ -74,7 +74,7 @@ def stopping(motion: JointMotion, bounds: JointBounds) -> Stopping:
     low, high = np.minimum(bounds.lower, start), np.maximum(bounds.upper, start)
     slowest_s = float(np.where(moving, onset_s + braking_s, 0.0).max())
     position = _within(start + way, low, high)
-    return Stopping(start=start, position=position, time_s=bounds.reaction_s + slowest_s)
+    return StoppingMotion(start=start, position=position, time_s=bounds.reaction_s + slowest_s)
 
 
 def _within(values: Floats, low: Floats, high: Floats) -> Floats:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
-from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, Rule
+from vla_deploy.safety.causes import RULES, Cause, CauseRule, Latch, Reaction
 from vla_deploy.safety.findings import Finding
 from vla_deploy.safety.inputs import SafetyInputs, SafetyLimits
 from vla_deploy.safety.surroundings import Direction
@@ -133,7 +133,7 @@ def _reset(
     return (), ResetOutcome.DONE
 
 
-def _verdict(rule: Rule, finding: Finding, energised: bool) -> Verdict:
+def _verdict(rule: CauseRule, finding: Finding, energised: bool) -> Verdict:
     return Verdict(
         reaction=rule.reaction,
         cause=rule.cause,

@@ -8,8 +8,8 @@ from vla_deploy.safety.surroundings import Direction, KeepOut
 from vla_deploy.safety.zones import (
     NEARER_SHARE,
     PROBES,
+    BaseMotion,
     Footprint,
-    Motion,
     Points,
     braking_m,
     moved,
@@ -25,7 +25,7 @@ def seen_from(polygon: Points, x_m: float, y_m: float, yaw_rad: float) -> Points
 
 
 def judge_keep_out(
-    areas: Mapping[str, Points], footprint: Footprint, motion: Motion, reaction_s: float
+    areas: Mapping[str, Points], footprint: Footprint, motion: BaseMotion, reaction_s: float
 ) -> KeepOut | None:
     """Return the area that the footprint is deepest in, now or where the base can stand still.
 

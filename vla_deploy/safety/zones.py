@@ -53,7 +53,7 @@ class Footprint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class BaseMotion:
     """Carry how the base moves and how hard it can brake."""
 
     v_m_s: float
@@ -67,7 +67,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trigger:
+class ZoneMemory:
     """Carry a zone's memory between two evaluations; both counts are of samples in a row."""
 
     hits: int = 0
@@ -76,7 +76,7 @@ class Trigger:
     blocked: tuple[Direction, ...] = ()
 
 
-IDLE = Trigger()
+IDLE = ZoneMemory()
 
 
 def inside(points: Points, polygon: Points) -> Mask:
@@ -114,13 +114,13 @@ def moved(points: Points, forward_m: float, turn_rad: float) -> Points:
     return turned
 
 
-def braking_m(motion: Motion, reaction_s: float) -> float:
+def braking_m(motion: BaseMotion, reaction_s: float) -> float:
     """Return the way from noticing something to standstill."""
     speed = abs(motion.v_m_s)
     return speed * reaction_s + speed**2 / (2.0 * motion.deceleration_m_s2)
 
 
-def stretched(zone: Zone, motion: Motion) -> Points:
+def stretched(zone: Zone, motion: BaseMotion) -> Points:
     """Return the zone's polygon, grown along the motion by the way to standstill if it asks so."""
     polygon = np.array(zone.polygon_m, dtype=np.float64)
     if zone.reaction_s is None or abs(motion.v_m_s) < _STANDING_M_S:
@@ -147,7 +147,7 @@ def directions_towards(points: Points, footprint: Footprint) -> tuple[Direction,
 
 
 def time_to_collision(
-    points: Points, footprint: Footprint, motion: Motion, horizon_s: float
+    points: Points, footprint: Footprint, motion: BaseMotion, horizon_s: float
 ) -> float:
     """Return when the base, going on as it does, reaches a point; infinite beyond the horizon.
 
@@ -168,13 +168,13 @@ def time_to_collision(
 
 def judge_zone(
     zone: Zone,
-    trigger: Trigger,
+    trigger: ZoneMemory,
     points: Points,
     footprint: Footprint,
-    motion: Motion,
+    motion: BaseMotion,
     *,
     fresh: bool,
-) -> tuple[Trigger, ZoneFinding | None]:
+) -> tuple[ZoneMemory, ZoneFinding | None]:
     """Return the zone's next memory and what it asks for, None while it is idle.
 
     Only `fresh` points count towards setting the zone off or ending it.
@@ -195,29 +195,29 @@ def judge_zone(
     return trigger, _finding(zone, trigger, found, footprint, motion, collision_s)
 
 
-def _advance(zone: Zone, trigger: Trigger, is_hit: bool, fresh: bool) -> Trigger:
+def _advance(zone: Zone, trigger: ZoneMemory, is_hit: bool, fresh: bool) -> ZoneMemory:
     if not fresh:
         return trigger
     if is_hit:
         hits = min(trigger.hits + 1, zone.trigger_count)
         active = trigger.active or hits >= zone.trigger_count
-        return Trigger(hits=hits, active=active, blocked=trigger.blocked)
+        return ZoneMemory(hits=hits, active=active, blocked=trigger.blocked)
     misses = trigger.misses + 1
     if not trigger.active or misses >= zone.release_count:
         return IDLE
-    return Trigger(misses=misses, active=True, blocked=trigger.blocked)
+    return ZoneMemory(misses=misses, active=True, blocked=trigger.blocked)
 
 
-def _remember(trigger: Trigger, blocked: tuple[Direction, ...]) -> Trigger:
-    return Trigger(hits=trigger.hits, misses=trigger.misses, active=True, blocked=blocked)
+def _remember(trigger: ZoneMemory, blocked: tuple[Direction, ...]) -> ZoneMemory:
+    return ZoneMemory(hits=trigger.hits, misses=trigger.misses, active=True, blocked=blocked)
 
 
 def _finding(
     zone: Zone,
-    trigger: Trigger,
+    trigger: ZoneMemory,
     found: Points,
     footprint: Footprint,
-    motion: Motion,
+    motion: BaseMotion,
     collision_s: float,
 ) -> ZoneFinding:
     ratio, measured, limit = zone.speed_ratio, collision_s, zone.time_before_collision_s

@@ -7,7 +7,7 @@ from typing import Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import Task
 from vla_deploy.analysis.feasibility import judge_action
-from vla_deploy.analysis.question import Question
+from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.planning.plan import Action
 from vla_deploy.skills.context import Held, SkillContext
@@ -38,7 +38,9 @@ class Adviser:
         world, robot = self._context.link.snapshot(), self._here()
         if world is None or robot is None:
             return ""
-        question = Question(world=replace(world, robot=robot), holding=_kinds(self._context.hands))
+        question = SceneQuestion(
+            world=replace(world, robot=robot), holding=_kinds(self._context.hands)
+        )
         return in_words(judge_action(action, question, self._abilities))
 
     def _here(self) -> Viewpoint | None:

@@ -28,7 +28,7 @@ SAME_WIDTH_M = 0.012
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Touch:
+class FingerTouch:
     """Say what the fingers feel: their opening, how far short of the goal, and their effort."""
 
     opening_m: float
@@ -48,11 +48,11 @@ def opening_of(context: SkillContext, hand: str) -> float:
     return float(context.link.positions[index]) * described.opening_ratio
 
 
-def feel(context: SkillContext, hand: str, goal_opening_m: float) -> Touch:
+def feel(context: SkillContext, hand: str, goal_opening_m: float) -> FingerTouch:
     """Return what a hand's fingers feel now."""
     index = context.robot.joint_index[context.robot.hands[hand].gripper]
     opening_m = opening_of(context, hand)
-    return Touch(
+    return FingerTouch(
         opening_m=opening_m,
         short_of_goal_m=opening_m - goal_opening_m,
         effort_ratio=abs(float(context.link.efforts[index])),

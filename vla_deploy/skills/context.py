@@ -12,7 +12,7 @@ from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.errors import NotPossible
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.ros_goals import RosGoals
 
 Skill = Generator[None, None, None]
@@ -47,7 +47,7 @@ class SkillContext:
     """
 
     robot: RobotDescription
-    link: RobotLink
+    link: SkillLink
     planner: PathPlanner
     arms: Mapping[str, ArmKinematics]
     say: Callable[[str], None]

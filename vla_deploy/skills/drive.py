@@ -12,8 +12,8 @@ from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.navigation.follower import (
     AT_REST,
     DriveLimits,
+    FollowerPhase,
     PathFollower,
-    Phase,
     Twist,
     wrap_angle,
 )
@@ -136,7 +136,7 @@ def follow(
     patience = _Patience(context)
     context.way_m = points
     try:
-        while follower.phase is not Phase.ARRIVED and not until():
+        while follower.phase is not FollowerPhase.ARRIVED and not until():
             pose = context.link.pose
             twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
             hindrance = _hindrance(context, twist, _distance(pose, points[-1]))

@@ -12,7 +12,7 @@ from vla_deploy.ipc.claims import obstacles
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.plan import Action, Plan, execution_order
 from vla_deploy.planning.recovery.setback import FailureCause
-from vla_deploy.planning.symbolic.state import State
+from vla_deploy.planning.symbolic.state import SymbolicState
 from vla_deploy.skills.context import Rest, Skill, SkillContext
 from vla_deploy.skills.errors import (
     EffectMissing,
@@ -83,7 +83,7 @@ class _Branch:
     resume_ns: int = 0
     done_ns: int = 0
     unmet_ns: int = 0
-    before: State = field(default_factory=State)
+    before: SymbolicState = field(default_factory=SymbolicState)
 
 
 class PlanExecution:

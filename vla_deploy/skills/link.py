@@ -25,7 +25,7 @@ JOINT_AGE_S = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionResult:
+class EndedMotion:
     """Tell how a motion ended."""
 
     status: str
@@ -38,7 +38,7 @@ def _direction(twist: Twist) -> Direction:
     return Direction.TURN_LEFT if twist.w_rad_s > 0.0 else Direction.TURN_RIGHT
 
 
-class RobotLink:
+class SkillLink:
     """Read the robot's state once per step and send it motions."""
 
     def __init__(self, space: SharedSpace, clock: Clock, robot: RobotDescription) -> None:
@@ -56,13 +56,13 @@ class RobotLink:
         self.acting = ""
         """Whose motions are sent now: one of several actions that go on side by side."""
         self._active: dict[int, str] = {}
-        self._ended: dict[int, MotionResult] = {}
+        self._ended: dict[int, EndedMotion] = {}
         self._driver: str | None = None
 
     def refresh(self) -> None:
         """Take in the motions that have ended."""
         for event in self._results_in.drain():
-            ended = MotionResult(
+            ended = EndedMotion(
                 status=str(event.payload["status"]), reason=str(event.payload["reason"])
             )
             motion_id = int(event.payload["motion_id"])
@@ -279,7 +279,7 @@ class RobotLink:
         self._commands.publish({"kind": "cancel", "motion_id": motion_id})
         self._active.pop(motion_id, None)
 
-    def ended(self, motion_id: int) -> MotionResult | None:
+    def ended(self, motion_id: int) -> EndedMotion | None:
         """Return how a motion ended, once, or None while it runs."""
         return self._ended.pop(motion_id, None)
 

@@ -28,7 +28,7 @@ from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.recovery import Recovery
 from vla_deploy.skills.resources import body_of
 from vla_deploy.skills.ros_goals import RosGoals
@@ -84,7 +84,7 @@ class ExecutorNode:
         """Load the map, build the kinematics, open the topics."""
         self._skills = SkillContext(
             robot=self._robot,
-            link=RobotLink(self._space, self._clock, self._robot),
+            link=SkillLink(self._space, self._clock, self._robot),
             planner=base_planner(self._robot),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,

@@ -42,7 +42,7 @@ ANOTHER_LINE = math.sin(math.radians(40.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class GraspChoice:
     """Hold the hand, the grasp, the joint positions above it and what will then be held."""
 
     hand: str
@@ -77,12 +77,12 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from carry(context)
 
 
-def _grasp(context: SkillContext, choice: Choice, query: Query) -> Skill:
+def _grasp(context: SkillContext, choice: GraspChoice, query: Query) -> Skill:
     yield from _approach(context, choice)
     yield from _take(context, choice, query)
 
 
-def _approach(context: SkillContext, choice: Choice) -> Skill:
+def _approach(context: SkillContext, choice: GraspChoice) -> Skill:
     """Bring the open fingers around the object; where one comes down on it, raise the hand again.
 
     Raises:
@@ -99,7 +99,7 @@ def _approach(context: SkillContext, choice: Choice) -> Skill:
         raise
 
 
-def _take(context: SkillContext, choice: Choice, query: Query) -> Skill:
+def _take(context: SkillContext, choice: GraspChoice, query: Query) -> Skill:
     """Close, feel, lift, feel again; open when nothing is held."""
     grasp, hand = choice.grasp, choice.hand
     goal_m = max(grasp.width_m - 2 * SQUEEZE_M, 0.004)
@@ -148,7 +148,9 @@ def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
     return free
 
 
-def _choose(context: SkillContext, query: Query, hands: list[str], met: Sequence[float]) -> Choice:
+def _choose(
+    context: SkillContext, query: Query, hands: list[str], met: Sequence[float]
+) -> GraspChoice:
     """Return the plainest of the reachable grasps, of the hand on the object's side.
 
     `met` are the yaws at which fingers came down on it: others are taken if there are any.
@@ -185,15 +187,15 @@ def _choose(context: SkillContext, query: Query, hands: list[str], met: Sequence
 
 
 def _plainest(
-    context: SkillContext, choices: list[Choice], seen: Mapping[str, Any], met: Sequence[float]
-) -> Choice:
+    context: SkillContext, choices: list[GraspChoice], seen: Mapping[str, Any], met: Sequence[float]
+) -> GraspChoice:
     """Return the one that leaves most room to what stands around, then the one that moves least.
 
     One that closes along another line than those that have met the object goes before both.
     """
     now = context.link.setpoints
 
-    def cost(one: Choice) -> tuple[bool, float, float]:
+    def cost(one: GraspChoice) -> tuple[bool, float, float]:
         along = any(abs(math.sin(one.grasp.yaw_rad - yaw_rad)) < ANOTHER_LINE for yaw_rad in met)
         rounded_m = round(crowding_m(context, one.grasp, seen), 2)
         return along, rounded_m, float(np.abs(one.above - now).max())
@@ -203,7 +205,7 @@ def _plainest(
 
 def _solve(
     context: SkillContext, hand: str, grasp: Grasp, seen: Mapping[str, Any], reasons: list[str]
-) -> Choice | None:
+) -> GraspChoice | None:
     solved = _above(context, hand, grasp, reasons)
     if solved is None:
         return None
@@ -214,7 +216,7 @@ def _solve(
         width_m=grasp.width_m,
         below_grip_m=grasp.below_grip_m,
     )
-    return Choice(hand=hand, grasp=grasp, above=above, above_m=above_m, held=held)
+    return GraspChoice(hand=hand, grasp=grasp, above=above, above_m=above_m, held=held)
 
 
 def _above(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from vla_deploy.planning.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
-from vla_deploy.planning.plan import Action, Priority
+from vla_deploy.planning.plan import Action, ActionPriority
 from vla_deploy.robots import RobotDescription
 
 ARMS: Final = "arms"
@@ -12,10 +12,10 @@ ONE_ARM: Final = "arm"
 SENSES: Final = ("camera", "speaker")
 # Whoever waits longer than the longest skill takes waits for something that will not end.
 WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
-PRIORITIES: Final[Mapping[Priority, int]] = {
-    Priority.HIGH: 2,
-    Priority.MEDIUM: 1,
-    Priority.LOW: 0,
+PRIORITIES: Final[Mapping[ActionPriority, int]] = {
+    ActionPriority.HIGH: 2,
+    ActionPriority.MEDIUM: 1,
+    ActionPriority.LOW: 0,
 }
 
 

@@ -18,7 +18,7 @@ from vla_deploy.ipc.ros_goals import (
     GoalAnswer,
     GoalRequest,
     GoalState,
-    GoalUnreadable,
+    RosGoalUnreadable,
     read_answer,
 )
 
@@ -72,7 +72,7 @@ class RosGoals:
         for event in self._answers.drain():
             try:
                 self._note(read_answer(event.payload))
-            except GoalUnreadable as error:  # of a gateway that has other words than we
+            except RosGoalUnreadable as error:  # of a gateway that has other words than we
                 self._lose_all(str(error))
         sample = self._status.latest()
         for goal in list(self._goals.values()):

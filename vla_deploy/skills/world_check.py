@@ -14,7 +14,7 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import parse_object, world_of
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
-from vla_deploy.planning.symbolic.state import Pose, State, state_of
+from vla_deploy.planning.symbolic.state import Pose, SymbolicState, state_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
@@ -49,11 +49,11 @@ class WorldCheck:
         )
         return next(broken, "")
 
-    def state(self, action: Action) -> State:
+    def state(self, action: Action) -> SymbolicState:
         """Return what is known now, to be held against what an action changes."""
         return self._now(action)[1]
 
-    def missing_effect(self, action: Action, before: State, done_ns: int) -> Answer:
+    def missing_effect(self, action: Action, before: SymbolicState, done_ns: int) -> Answer:
         """Return what the world shows instead of an action's effect; `done_ns` is when it ended.
 
         While perception is silent nothing is shown, and nothing waited for.
@@ -64,7 +64,7 @@ class WorldCheck:
         setting, now = self._now(action)
         return MET if setting.scene is None else look(now, setting, before, done_ns)
 
-    def _now(self, action: Action) -> tuple[Setting, State]:
+    def _now(self, action: Action) -> tuple[Setting, SymbolicState]:
         scene, here = self._context.link.snapshot(), self._here()
         felt = scene.hands if scene is not None else {}
         holding = {
@@ -83,7 +83,7 @@ class WorldCheck:
         return pose.x_m, pose.y_m, pose.yaw_rad
 
 
-def is_held(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
+def is_held(now: SymbolicState, setting: Setting, before: SymbolicState, done_ns: int) -> Answer:
     """Do the fingers feel what was taken, and no other of its kind, as far as the scene knows?"""
     del before, done_ns
     scene, query = setting.scene, _query(setting)
@@ -99,7 +99,7 @@ def is_held(now: State, setting: Setting, before: State, done_ns: int) -> Answer
     return f"no hand feels the {query}" + "".join(f", but {one.key}" for one in alike)
 
 
-def is_put(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
+def is_put(now: SymbolicState, setting: Setting, before: SymbolicState, done_ns: int) -> Answer:
     """Does what the hand held lie where it should, if it has been seen since?"""
     del now
     destination, scene = setting.subject("destination"), setting.scene
@@ -119,7 +119,7 @@ def is_put(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
     return f"the {put} lies {off_m:.2f} m from the {container}" if off_m > PUT_WITHIN_M else None
 
 
-def is_found(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
+def is_found(now: SymbolicState, setting: Setting, before: SymbolicState, done_ns: int) -> Answer:
     """Does perception know the thing?"""
     del now, before, done_ns
     query = _query(setting)
@@ -128,7 +128,9 @@ def is_found(now: State, setting: Setting, before: State, done_ns: int) -> Answe
     return MET if query.among(setting.scene) else f"perception knows no {query}"
 
 
-def has_arrived(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
+def has_arrived(
+    now: SymbolicState, setting: Setting, before: SymbolicState, done_ns: int
+) -> Answer:
     """Does the robot stand at its goal?"""
     del before, done_ns
     place = setting.place("place")
@@ -146,7 +148,7 @@ def _query(setting: Setting) -> Query | None:
         return None
 
 
-Look = Callable[[State, Setting, State, int], Answer]
+Look = Callable[[SymbolicState, Setting, SymbolicState, int], Answer]
 EFFECTS: Final[Mapping[str, Look]] = MappingProxyType(
     {"pick_up": is_held, "place": is_put, "find_object": is_found, "navigate_to": has_arrived}
 )

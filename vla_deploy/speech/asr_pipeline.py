@@ -10,7 +10,7 @@ from vla_deploy.speech.endpointing import Endpointer, Phrase, VadEventKind
 from vla_deploy.speech.sound import Playing, SoundBlock
 from vla_deploy.speech.transcript import Transcript
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
-from vla_deploy.speech.verdict import Judgement, Verdict, judge, stops
+from vla_deploy.speech.verdict import PhraseJudgement, PhraseVerdict, judge, stops
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
 
@@ -23,7 +23,7 @@ class HeardPhrase:
 
     phrase: Phrase
     transcript: Transcript | None
-    judgement: Judgement
+    judgement: PhraseJudgement
 
     @property
     def confidence(self) -> float:
@@ -116,7 +116,7 @@ class AsrPipeline:
             return
         if self._stops(phrase, transcript):
             self._stopped_ns = phrase.began_ns
-            stop = Judgement(verdict=Verdict.STOP)
+            stop = PhraseJudgement(verdict=PhraseVerdict.STOP)
             yield HeardPhrase(phrase=phrase, transcript=transcript, judgement=stop)
         elif self.endpointer.is_open and is_unfinished(transcript.text):
             self.endpointer.wait_longer()
@@ -124,13 +124,15 @@ class AsrPipeline:
     def _judged(self, phrase: Phrase, transcript: Transcript | None, trouble: str) -> HeardPhrase:
         """Return what becomes of a phrase that has ended."""
         if transcript is None:
-            judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble)
+            judgement = PhraseJudgement(verdict=PhraseVerdict.REJECTED, reason=trouble)
         elif phrase.began_ns == self._stopped_ns:
-            judgement = Judgement(verdict=Verdict.REJECTED, reason=STOPPED)
+            judgement = PhraseJudgement(verdict=PhraseVerdict.REJECTED, reason=STOPPED)
         elif self._stops(phrase, transcript):
-            judgement = Judgement(verdict=Verdict.STOP)
+            judgement = PhraseJudgement(verdict=PhraseVerdict.STOP)
         elif trouble:
-            judgement = Judgement(verdict=Verdict.REJECTED, reason=trouble, ask_again=True)
+            judgement = PhraseJudgement(
+                verdict=PhraseVerdict.REJECTED, reason=trouble, ask_again=True
+            )
         else:
             least = self.endpointer.settings.least_confidence
             judgement = judge(transcript, phrase.own_words, least)

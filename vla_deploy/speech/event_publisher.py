@@ -10,7 +10,7 @@ from drivers.latency import LatencyHistogram
 from vla_deploy.ipc import Announcer, SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.speech.asr_pipeline import HeardPhrase
-from vla_deploy.speech.verdict import Verdict
+from vla_deploy.speech.verdict import PhraseVerdict
 
 SOURCE: Final = "voice"
 ASK_AGAIN: Final = "Sorry, I did not understand that. Please say it again."
@@ -44,13 +44,13 @@ class SpeechEvents:
         """Publish what becomes of a phrase; a stop goes first."""
         now_ns, judgement = self._clock.now_ns(), heard.judgement
         verdict = judgement.verdict
-        if verdict is Verdict.STOP:
+        if verdict is PhraseVerdict.STOP:
             self._stop.press(f'heard "{heard.text}"')
         self._counts[verdict] += 1
-        if verdict is Verdict.ACCEPTED:
+        if verdict is PhraseVerdict.ACCEPTED:
             self._pause_ns, self._ask_from_ns = FIRST_PAUSE_NS, 0
             self._command(heard)
-        elif verdict is Verdict.DOUBTED:
+        elif verdict is PhraseVerdict.DOUBTED:
             self._command(heard, doubted=True, ask_again=self._may_ask(now_ns))
         elif judgement.ask_again and self._may_ask(now_ns):
             self._voice.say(ASK_AGAIN)
@@ -70,7 +70,7 @@ class SpeechEvents:
     def document(self) -> dict[str, Any]:
         """Return counts and the time from the end of speech to its words, for `speech_status`."""
         return {
-            **{str(verdict): self._counts[verdict] for verdict in Verdict},
+            **{str(verdict): self._counts[verdict] for verdict in PhraseVerdict},
             "end_to_text_p50_s": self._latency.percentile_ns(0.5) / NS_PER_S,
             "end_to_text_p95_s": self._latency.percentile_ns(0.95) / NS_PER_S,
         }

@@ -23,7 +23,7 @@ from vla_deploy.speech.page_microphone import PageMicrophone
 from vla_deploy.speech.sound import Playing, SoundBlock
 from vla_deploy.speech.stop_words.listener import StopWords
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
-from vla_deploy.speech.verdict import Judgement, Verdict
+from vla_deploy.speech.verdict import PhraseJudgement, PhraseVerdict
 from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.speech.words import words_of
@@ -218,12 +218,12 @@ class SpeechNode:
 
     def _after_listeners(self, heard: HeardPhrase) -> HeardPhrase:
         """Keep a phrase in which a listener has heard a stop from being a command."""
-        if heard.judgement.verdict is Verdict.STOP:
+        if heard.judgement.verdict is PhraseVerdict.STOP:
             return heard
         for listener in self._listeners:
             reason = listener.refuses(heard.phrase.began_ns, heard.phrase.ended_ns)
             if reason:
-                judgement = Judgement(verdict=Verdict.REJECTED, reason=reason)
+                judgement = PhraseJudgement(verdict=PhraseVerdict.REJECTED, reason=reason)
                 return replace(heard, judgement=judgement)
         return heard
 

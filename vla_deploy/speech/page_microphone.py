@@ -14,7 +14,7 @@ import numpy as np
 from drivers.audio.base import AudioFormat
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import BadPayload, RecordReader
-from vla_deploy.ipc.page_sound import PageSound, Step, unpacked
+from vla_deploy.ipc.page_sound import PageSound, SoundStep, unpacked
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.microphone import Resampler
 from vla_deploy.speech.sound import FRAME, Framer, Sound, SoundBlock, count_of, duration_ns
@@ -60,15 +60,15 @@ class PageMicrophone:
         self._heard_ns = self._clock.now_ns()
         if len(sound.samples):
             yield from self._frames(self._resampler.feed(sound.samples[:, None]))
-        if sound.step is Step.ENDED:
+        if sound.step is SoundStep.ENDED:
             yield from self._frames(np.zeros(count_of(silence_s + TAIL_S), np.float32))
             self._resampler = None
-        elif sound.step is Step.CUT:
+        elif sound.step is SoundStep.CUT:
             yield from self._cut_off()
 
     def _begin(self, sound: PageSound) -> None:
         self._turn, self._end_ns = sound.turn, 0
-        if sound.step is not Step.SOUND:
+        if sound.step is not SoundStep.SOUND:
             return  # the end of a turn of which nothing came
         try:
             self._resampler = Resampler(AudioFormat(rate_hz=sound.rate_hz))

@@ -10,11 +10,11 @@ from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
 from vla_deploy.inference.file_check import check_parts
-from vla_deploy.inference.manifest import Context, Whisper
+from vla_deploy.inference.manifest import EncoderContext, Whisper
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.providers import CPU, CUDA
 from vla_deploy.inference.stats import resident_mb
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.executors import low_priority_thread
 from vla_deploy.runtime.one_line import one_line
 from vla_deploy.speech.errors import import_extra
@@ -40,7 +40,7 @@ class Recogniser:
 
     def __init__(
         self,
-        model: Model,
+        model: StoredModel,
         declared: Whisper,
         whisper: Any,
         clock: Clock,
@@ -88,7 +88,9 @@ class Recogniser:
         self.claim.release()
 
 
-def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Clock) -> Recogniser:
+def open_recogniser(
+    model: StoredModel, choice: ModelChoice, *, beam: int, clock: Clock
+) -> Recogniser:
     """Open a model as a profile's choice asks, and warm it up.
 
     Raises:
@@ -108,7 +110,7 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     try:
         whisper = runtime.WhisperRuntime(
             model.folder,
-            trimmed=declared.context == Context.TRIMMED,
+            trimmed=declared.context == EncoderContext.TRIMMED,
             device=_DEVICES[provider],
             compute_type=_COMPUTE[provider, choice.precision],
             cpu_threads=min(choice.threads, len(os.sched_getaffinity(0))),

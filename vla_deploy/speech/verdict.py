@@ -28,7 +28,7 @@ DOUBT_RATIO: Final = 0.5
 OWN_VOICE: Final = "the robot heard itself"
 
 
-class Verdict(StrEnum):
+class PhraseVerdict(StrEnum):
     """Name what becomes of what was heard."""
 
     ACCEPTED = "accepted"
@@ -38,10 +38,10 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class PhraseJudgement:
     """Say what becomes of a phrase, why, and whether asking again may help."""
 
-    verdict: Verdict
+    verdict: PhraseVerdict
     reason: str = ""
     ask_again: bool = False
 
@@ -59,18 +59,20 @@ def stops(text: str, confidence: float, own_words: str = "", names: Set[str] = f
     return holds_stop(text) and confidence >= STOP_WITHIN_CONFIDENCE
 
 
-def judge(transcript: Transcript, own_words: str, least_confidence: float) -> Judgement:
+def judge(transcript: Transcript, own_words: str, least_confidence: float) -> PhraseJudgement:
     """Return what becomes of words that are no stop, while the robot was saying `own_words`."""
     for why, ask_again in _REFUSALS:
         reason = why(transcript, own_words)
         if reason:
-            return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=ask_again)
+            return PhraseJudgement(
+                verdict=PhraseVerdict.REJECTED, reason=reason, ask_again=ask_again
+            )
     sure, least = transcript.confidence, least_confidence
     if sure >= least:
-        return Judgement(verdict=Verdict.ACCEPTED)
-    verdict = Verdict.DOUBTED if sure >= DOUBT_RATIO * least else Verdict.REJECTED
+        return PhraseJudgement(verdict=PhraseVerdict.ACCEPTED)
+    verdict = PhraseVerdict.DOUBTED if sure >= DOUBT_RATIO * least else PhraseVerdict.REJECTED
     reason = f"understood by {sure:.0%}, at least {least:.0%} is needed"
-    return Judgement(verdict=verdict, reason=reason, ask_again=True)
+    return PhraseJudgement(verdict=verdict, reason=reason, ask_again=True)
 
 
 def _without_words(transcript: Transcript, _: str) -> str:

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Mapping
 
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.lifecycle import Record, State
+from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
 from vla_deploy.supervisor.table import GivingUp, ProcessSpec
 
 _log = logging.getLogger(__name__)
@@ -22,11 +22,11 @@ class Consequences:
         self._table = table
         self._known: set[str] = set()
 
-    def take(self, records: Mapping[str, Record], space: SharedSpace) -> None:
+    def take(self, records: Mapping[str, ProcessRecord], space: SharedSpace) -> None:
         """Act on every process that is newly given up."""
         for spec in self._table:
             record = records[spec.name]
-            if record.state is State.GIVEN_UP and spec.name not in self._known:
+            if record.state is ProcessState.GIVEN_UP and spec.name not in self._known:
                 self._known.add(spec.name)
                 self._take(spec, f"{spec.name} was given up: {record.reason}", space)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import TOPICS, Kind, SharedSpace
+from vla_deploy.ipc import TOPICS, SharedSpace, TopicKind
 from vla_deploy.runtime.logs import LOGS_DIR
-from vla_deploy.supervisor.lifecycle import RUNNING, Record, State
+from vla_deploy.supervisor.lifecycle import RUNNING, ProcessRecord, ProcessState
 from vla_deploy.supervisor.log_files import as_line, last_output, read_log
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.state_folder import BoundedFolder
@@ -20,7 +20,7 @@ KEEP = 50
 LAST_LINES = 40
 _TRACEBACK_LINES = 400  # the interpreter tells up to 100 frames of each thread
 _TRACEBACK_STARTS = ("Fatal Python error", "Traceback (most recent call last)", "Current thread")
-_ENDED = frozenset({State.BACKOFF, State.GIVEN_UP})
+_ENDED = frozenset({ProcessState.BACKOFF, ProcessState.GIVEN_UP})
 _log = logging.getLogger(__name__)
 
 
@@ -49,13 +49,13 @@ class CrashReports:
             "profile": options.profile,
             "twin": options.twin,
         }
-        cells = [topic.name for topic in TOPICS if topic.kind is Kind.CELL]
+        cells = [topic.name for topic in TOPICS if topic.kind is TopicKind.CELL]
         self._cells = {name: space.cell_reader(name) for name in cells}
 
     def note(
         self,
-        before: Mapping[str, Record],
-        after: Mapping[str, Record],
+        before: Mapping[str, ProcessRecord],
+        after: Mapping[str, ProcessRecord],
         started: Mapping[str, tuple[int, int]],
     ) -> None:
         """Write a report for each process that has just failed.
@@ -69,7 +69,9 @@ class CrashReports:
                 pid, started_ns = started[name]
                 self._write(name, self._report(name, record, pid, started_ns))
 
-    def _report(self, name: str, record: Record, pid: int, started_ns: int) -> dict[str, Any]:
+    def _report(
+        self, name: str, record: ProcessRecord, pid: int, started_ns: int
+    ) -> dict[str, Any]:
         now_ns = self._clock.now_ns()
         lines = [line for line in read_log(self._logs, name) if line["pid"] == pid]
         output = last_output(self._logs, name, _TRACEBACK_LINES)
@@ -82,7 +84,7 @@ class CrashReports:
             "exit_code": record.exit_code,
             "signal": signal_name(record.exit_code),
             "reason": record.reason,
-            "given_up": record.state is State.GIVEN_UP,
+            "given_up": record.state is ProcessState.GIVEN_UP,
             "uptime_s": round((now_ns - started_ns) / NS_PER_S, 3),
             "restarts": record.restarts,
             "traceback": traceback_of(lines, output),

@@ -14,7 +14,7 @@ from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.runtime.twin_members import MEMBERSHIPS
-from vla_deploy.supervisor.lifecycle import Act, Action, Seen
+from vla_deploy.supervisor.lifecycle import Action, ProcessAct, ProcessSeen
 from vla_deploy.supervisor.liveness import Liveness, Vital
 from vla_deploy.supervisor.log_files import OUTPUT_SUFFIX
 from vla_deploy.supervisor.notify import hide_from_children
@@ -67,17 +67,17 @@ class Crew:
         hide_from_children(self._environment)
         if not journal_stream(os.environ, _STDERR):
             self._environment.pop("JOURNAL_STREAM", None)
-        self._do: Mapping[Act, Callable[[str], None]] = {
-            Act.SPAWN: self._spawn,
-            Act.TERMINATE: lambda name: self._signal(name, ChildProcess.terminate),
-            Act.ABORT: lambda name: self._signal(name, ChildProcess.abort),
-            Act.KILL: lambda name: self._signal(name, ChildProcess.kill),
+        self._do: Mapping[ProcessAct, Callable[[str], None]] = {
+            ProcessAct.SPAWN: self._spawn,
+            ProcessAct.TERMINATE: lambda name: self._signal(name, ChildProcess.terminate),
+            ProcessAct.ABORT: lambda name: self._signal(name, ChildProcess.abort),
+            ProcessAct.KILL: lambda name: self._signal(name, ChildProcess.kill),
         }
 
-    def observe(self) -> dict[str, Seen]:
+    def observe(self) -> dict[str, ProcessSeen]:
         """Report every child that was ever started, or could not be."""
         seen = {name: self._see(name, child) for name, child in self._children.items()}
-        return seen | {name: Seen(refused=why) for name, why in self._refused.items()}
+        return seen | {name: ProcessSeen(refused=why) for name, why in self._refused.items()}
 
     def perform(self, actions: Sequence[Action]) -> None:
         """Do what was decided, in order."""
@@ -118,17 +118,17 @@ class Crew:
             child.kill()
         end_leftovers(self._run_dir.name)
 
-    def _see(self, name: str, child: ChildProcess) -> Seen:
+    def _see(self, name: str, child: ChildProcess) -> ProcessSeen:
         exit_code = child.exit_code()
         if exit_code is not None:
             self._sweep_after(name)
-            return Seen(exit_code=exit_code)
+            return ProcessSeen(exit_code=exit_code)
         ready = self._readiness[name].is_ready(child.pid)
         if ready and name not in self._ready:
             self._ready.add(name)
             self._liveness[name].begin()
         silence = self._liveness[name].silence(child.pid) if name in self._ready else ""
-        return Seen(ready=ready, silence=silence)
+        return ProcessSeen(ready=ready, silence=silence)
 
     def _sweep_after(self, name: str) -> None:
         """End, once, what an ended child has left outside its process group."""

@@ -23,7 +23,7 @@ class HealthLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ticks:
+class TickCount:
     """Count control's ticks at a moment; control's pid tells its instances apart."""
 
     now_ns: int
@@ -46,7 +46,7 @@ class Health:
         self._clock = clock
         self._rate_hz = control_rate_hz
         self._status = space.cell_reader("control_status")
-        self._history: deque[Ticks] = deque()
+        self._history: deque[TickCount] = deque()
         self._looked_ns: int | None = None
 
     def troubles(self) -> tuple[str, ...]:
@@ -66,7 +66,7 @@ class Health:
             return (f"control: control_status: age {age_s:.2f} s, limit {limit_s:g} s",)
         status = sample.document()
         self._note(
-            Ticks(
+            TickCount(
                 now_ns=now_ns,
                 pid=sample.writer_pid,
                 tick=int(status["tick"]),
@@ -79,7 +79,7 @@ class Health:
             *bus_troubles(status),
         )
 
-    def _note(self, ticks: Ticks) -> None:
+    def _note(self, ticks: TickCount) -> None:
         if self._history and self._history[-1].pid != ticks.pid:
             self._history.clear()
         self._history.append(ticks)
@@ -93,7 +93,9 @@ def loop_troubles(gap_s: float, limits: HealthLimits) -> Iterator[str]:
         yield f"supervisor: held up for {gap_s:.1f} s, limit {limits.loop_age_s:g} s"
 
 
-def tick_troubles(first: Ticks, last: Ticks, rate_hz: float, limits: HealthLimits) -> Iterator[str]:
+def tick_troubles(
+    first: TickCount, last: TickCount, rate_hz: float, limits: HealthLimits
+) -> Iterator[str]:
     """Tell whether control ticks too seldom or too often late, once there is a whole window."""
     if last.now_ns - first.now_ns < WINDOW_NS:
         return

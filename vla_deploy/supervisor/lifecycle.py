@@ -13,7 +13,7 @@ ABORT_GRACE_NS = NS_PER_S
 """How long a process that hangs may take to write down where it hung, before it is killed."""
 
 
-class State(Enum):
+class ProcessState(Enum):
     """Name where a process stands."""
 
     OFF = "off"
@@ -27,7 +27,7 @@ class State(Enum):
     STOPPED = "stopped"
 
 
-_SETTLED = (State.READY.value, State.OFF.value)
+_SETTLED = (ProcessState.READY.value, ProcessState.OFF.value)
 
 
 def is_settled(table: Mapping[str, Any]) -> bool:
@@ -35,7 +35,7 @@ def is_settled(table: Mapping[str, Any]) -> bool:
     return bool(table["processes"]) and all(row["state"] in _SETTLED for row in table["processes"])
 
 
-class Act(Enum):
+class ProcessAct(Enum):
     """Name what is to be done to a process; ABORT lets it tell where it hangs, then it ends."""
 
     SPAWN = "spawn"
@@ -45,14 +45,14 @@ class Act(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Record:
+class ProcessRecord:
     """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop.
 
     `failures` counts since it last ran stably; `failed_ns` are the last failures' times, stable
     runs or not.
     """
 
-    state: State = State.WAITING
+    state: ProcessState = ProcessState.WAITING
     until_ns: int = 0
     ready_ns: int = 0
     was_ready: bool = False
@@ -64,7 +64,7 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class ProcessSeen:
     """Report what was observed of one process; `exit_code` is None while it runs.
 
     `silence` tells which topic it has not written for longer than the table allows, `refused` why
@@ -82,24 +82,26 @@ class Seen:
         return self.exit_code is not None or bool(self.refused)
 
 
-Step = tuple[Record, Act | None]
-Action = tuple[Act, str]
-RUNNING = frozenset({State.STARTING, State.READY, State.ABORTING, State.STOPPING})
+Step = tuple[ProcessRecord, ProcessAct | None]
+Action = tuple[ProcessAct, str]
+RUNNING = frozenset(
+    {ProcessState.STARTING, ProcessState.READY, ProcessState.ABORTING, ProcessState.STOPPING}
+)
 
 
 def reconcile(
     table: Sequence[ProcessSpec],
-    records: Mapping[str, Record],
-    seen: Mapping[str, Seen],
+    records: Mapping[str, ProcessRecord],
+    seen: Mapping[str, ProcessSeen],
     *,
     unwanted: Mapping[str, str],
     now_ns: int,
-) -> tuple[dict[str, Record], tuple[Action, ...]]:
+) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
     """Return the new records and what is to be done, in order.
 
     `unwanted` tells why a process shall not run; the last of them in the table stops first.
     """
-    stopped, stops = _end(table, records, seen, unwanted, State.OFF, now_ns)
+    stopped, stops = _end(table, records, seen, unwanted, ProcessState.OFF, now_ns)
     after = dict(stopped)
     actions = list(stops)
     may_go = all_before_work = True
@@ -108,7 +110,7 @@ def reconcile(
         if spec.name in unwanted:
             continue
         record, act = _run_step(
-            spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
+            spec, after[spec.name], seen.get(spec.name, ProcessSeen()), may_go=may_go, now_ns=now_ns
         )
         after[spec.name] = record
         if act is not None:
@@ -119,33 +121,37 @@ def reconcile(
 
 def wind_down(
     table: Sequence[ProcessSpec],
-    records: Mapping[str, Record],
-    seen: Mapping[str, Seen],
+    records: Mapping[str, ProcessRecord],
+    seen: Mapping[str, ProcessSeen],
     *,
     now_ns: int,
-) -> tuple[dict[str, Record], tuple[Action, ...]]:
+) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
     """Return the new records and what is to be done to stop everything, the last first."""
     everyone = dict.fromkeys(records, "")
-    return _end(table, records, seen, everyone, State.STOPPED, now_ns)
+    return _end(table, records, seen, everyone, ProcessState.STOPPED, now_ns)
 
 
 def _end(
     table: Sequence[ProcessSpec],
-    records: Mapping[str, Record],
-    seen: Mapping[str, Seen],
+    records: Mapping[str, ProcessRecord],
+    seen: Mapping[str, ProcessSeen],
     unwanted: Mapping[str, str],
-    end: State,
+    end: ProcessState,
     now_ns: int,
-) -> tuple[dict[str, Record], tuple[Action, ...]]:
+) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
     after = dict(records)
     actions: list[Action] = []
     may_go = all_after_ended = True
     for spec in reversed(table):
         if spec.name in unwanted:
             record, act = _stop_step(
-                spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
+                spec,
+                after[spec.name],
+                seen.get(spec.name, ProcessSeen()),
+                may_go=may_go,
+                now_ns=now_ns,
             )
-            gone_for_good = record.state is State.GIVEN_UP and end is State.OFF
+            gone_for_good = record.state is ProcessState.GIVEN_UP and end is ProcessState.OFF
             if record.state not in RUNNING and not gone_for_good:
                 record = replace(record, state=end, reason=unwanted[spec.name] or record.reason)
             after[spec.name] = record
@@ -156,46 +162,54 @@ def _end(
     return after, tuple(actions)
 
 
-def _lets_others_go(spec: ProcessSpec, record: Record) -> bool:
+def _lets_others_go(spec: ProcessSpec, record: ProcessRecord) -> bool:
     """Tell whether those after it may start: not when it never worked at all, unless they can do
     without it."""
     dispensable = record.was_ready or spec.giving_up is GivingUp.CARRY_ON
-    return record.state is State.READY or (record.state is State.GIVEN_UP and dispensable)
+    return record.state is ProcessState.READY or (
+        record.state is ProcessState.GIVEN_UP and dispensable
+    )
 
 
-def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:
-    if record.state is State.STOPPING:  # wanted again while it stops: it ends, then starts anew
+def _run_step(
+    spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, *, may_go: bool, now_ns: int
+) -> Step:
+    if (
+        record.state is ProcessState.STOPPING
+    ):  # wanted again while it stops: it ends, then starts anew
         return _stop_step(spec, record, seen, may_go=True, now_ns=now_ns)
     if record.state in RUNNING:
         return _watch(spec, record, seen, now_ns)
-    if not may_go or record.state is State.GIVEN_UP or now_ns < record.until_ns:
+    if not may_go or record.state is ProcessState.GIVEN_UP or now_ns < record.until_ns:
         return record, None
     started = replace(
         record,
-        state=State.STARTING,
+        state=ProcessState.STARTING,
         until_ns=now_ns + round(spec.ready_timeout_s * NS_PER_S),
-        restarts=record.restarts + (record.state is State.BACKOFF),
-        reason=record.reason if record.state is State.BACKOFF else "",
+        restarts=record.restarts + (record.state is ProcessState.BACKOFF),
+        reason=record.reason if record.state is ProcessState.BACKOFF else "",
     )
-    return started, Act.SPAWN
+    return started, ProcessAct.SPAWN
 
 
-def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
+def _watch(spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, now_ns: int) -> Step:
     if seen.ended:
         return _failed(spec, record, seen, now_ns), None
-    if record.state is State.ABORTING:
-        return record, Act.KILL if now_ns >= record.until_ns else None
-    if record.state is State.READY:
+    if record.state is ProcessState.ABORTING:
+        return record, ProcessAct.KILL if now_ns >= record.until_ns else None
+    if record.state is ProcessState.READY:
         return _watch_ready(spec, record, seen, now_ns)
     if seen.ready:
-        ready = replace(record, state=State.READY, ready_ns=now_ns, was_ready=True, reason="")
+        ready = replace(
+            record, state=ProcessState.READY, ready_ns=now_ns, was_ready=True, reason=""
+        )
         return ready, None
     if now_ns >= record.until_ns:
         return abort(record, f"not ready within {spec.ready_timeout_s:g} s", now_ns)
     return record, None
 
 
-def _watch_ready(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
+def _watch_ready(spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, now_ns: int) -> Step:
     if seen.silence:
         return abort(record, seen.silence, now_ns)
     if record.failures and now_ns - record.ready_ns >= spec.restart.stable_s * NS_PER_S:
@@ -203,31 +217,35 @@ def _watch_ready(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> 
     return record, None
 
 
-def abort(record: Record, reason: str, now_ns: int) -> Step:
+def abort(record: ProcessRecord, reason: str, now_ns: int) -> Step:
     """End a running process for a reason; it is started again like one that has failed."""
     until_ns = now_ns + ABORT_GRACE_NS
-    return replace(record, state=State.ABORTING, until_ns=until_ns, reason=reason), Act.ABORT
+    return replace(
+        record, state=ProcessState.ABORTING, until_ns=until_ns, reason=reason
+    ), ProcessAct.ABORT
 
 
-def _failed(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Record:
+def _failed(
+    spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, now_ns: int
+) -> ProcessRecord:
     policy, failures = spec.restart, record.failures + 1
-    why = record.reason if record.state is State.ABORTING else _end_in_words(seen)
+    why = record.reason if record.state is ProcessState.ABORTING else _end_in_words(seen)
     failed_ns = (*record.failed_ns, now_ns)[-policy.most_in_window - 1 :]
     failed = replace(
         record, failures=failures, failed_ns=failed_ns, exit_code=seen.exit_code, reason=why
     )
     # What the file or the wiring says will not change by trying again before it ever worked.
     if seen.exit_code == EXIT_CONFIGURATION and not record.was_ready:
-        return replace(failed, state=State.GIVEN_UP)
+        return replace(failed, state=ProcessState.GIVEN_UP)
     if failures > policy.max_restarts:
         why = f"{why}; given up after {failures} failures, never {policy.stable_s:g} s in order"
-        return replace(failed, state=State.GIVEN_UP, reason=why)
+        return replace(failed, state=ProcessState.GIVEN_UP, reason=why)
     spanned_ns = now_ns - failed_ns[0]
     if len(failed_ns) > policy.most_in_window and spanned_ns <= policy.window_s * NS_PER_S:
         why = f"{why}; given up after {len(failed_ns)} failures in {spanned_ns / NS_PER_S:.0f} s"
-        return replace(failed, state=State.GIVEN_UP, reason=why)
+        return replace(failed, state=ProcessState.GIVEN_UP, reason=why)
     until_ns = now_ns + round(delay_s(policy, failures) * NS_PER_S)
-    return replace(failed, state=State.BACKOFF, until_ns=until_ns)
+    return replace(failed, state=ProcessState.BACKOFF, until_ns=until_ns)
 
 
 def delay_s(policy: RestartPolicy, failures: int) -> float:
@@ -243,24 +261,28 @@ def give_up_s(spec: ProcessSpec) -> float:
     return (policy.max_restarts + 1) * once_s + pauses_s
 
 
-def _end_in_words(seen: Seen) -> str:
+def _end_in_words(seen: ProcessSeen) -> str:
     if seen.exit_code is None:
         return f"could not be started: {seen.refused}"
     return describe_exit(seen.exit_code)
 
 
-def _stop_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:
+def _stop_step(
+    spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, *, may_go: bool, now_ns: int
+) -> Step:
     if record.state not in RUNNING:
         return record, None
     if seen.ended:
-        ended = replace(record, state=State.WAITING, exit_code=seen.exit_code, until_ns=now_ns)
+        ended = replace(
+            record, state=ProcessState.WAITING, exit_code=seen.exit_code, until_ns=now_ns
+        )
         return ended, None
-    if record.state is State.STOPPING:
-        return record, Act.KILL if now_ns >= record.until_ns else None
+    if record.state is ProcessState.STOPPING:
+        return record, ProcessAct.KILL if now_ns >= record.until_ns else None
     if not may_go:
         return record, None
     until_ns = now_ns + round(spec.stop_timeout_s * NS_PER_S)
-    return replace(record, state=State.STOPPING, until_ns=until_ns), Act.TERMINATE
+    return replace(record, state=ProcessState.STOPPING, until_ns=until_ns), ProcessAct.TERMINATE
 
 
 def describe_exit(exit_code: int) -> str:

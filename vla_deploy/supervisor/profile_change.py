@@ -16,7 +16,7 @@ VALIDATE_S: Final = 2.0
 ROLLBACK_S: Final = 5.0
 
 
-class Phase(StrEnum):
+class ChangePhase(StrEnum):
     """Name where a change stands; the words of `profile_change` are among them."""
 
     PREPARE = "prepare"
@@ -27,7 +27,7 @@ class Phase(StrEnum):
     ROLLBACK = "rollback"
 
 
-class Outcome(StrEnum):
+class ChangeOutcome(StrEnum):
     """Name how a request ended."""
 
     KEPT = "kept"
@@ -45,7 +45,7 @@ class Member:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class ProfileRequest:
     """Ask for a profile."""
 
     request_id: str
@@ -54,7 +54,7 @@ class Request:
     dry_run: bool = False
 
     @classmethod
-    def of(cls, payload: Mapping[str, Any]) -> "Request":
+    def of(cls, payload: Mapping[str, Any]) -> "ProfileRequest":
         """Read a request from its topic."""
         return cls(
             request_id=str(payload.get("request_id", "")),
@@ -65,15 +65,15 @@ class Request:
 
 
 @dataclass(slots=True, kw_only=True)
-class Change:
+class ProfileChange:
     """Follow one change through its phases."""
 
     change_id: int
-    request: Request
+    request: ProfileRequest
     target: Profile
     values: Mapping[str, Any]
     pids: dict[str, int]
-    phase: Phase = Phase.PREPARE
+    phase: ChangePhase = ChangePhase.PREPARE
     began_ns: int = 0
     deadline_ns: int = 0
     committed: bool = False
@@ -97,7 +97,7 @@ class Change:
         """Return who said no in this phase, and why."""
         return {name: answer["reason"] for name, answer in self.answers.items() if not answer["ok"]}
 
-    def enter(self, phase: Phase, now_ns: int, limit_ns: int) -> None:
+    def enter(self, phase: ChangePhase, now_ns: int, limit_ns: int) -> None:
         """Begin a phase."""
         self.phase = phase
         self.deadline_ns = now_ns + limit_ns

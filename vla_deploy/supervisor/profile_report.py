@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profile_change import Change, Outcome, Request
+from vla_deploy.supervisor.profile_change import ChangeOutcome, ProfileChange, ProfileRequest
 
 _PERIOD_NS: Final = NS_PER_S // 2
 _MOST_CHARACTERS: Final = 2000
@@ -23,9 +23,15 @@ class ProfileReport:
         self._last: dict[str, Any] = {}
         self._due_ns = 0
 
-    def conclude(self, request: Request, outcome: Outcome, reason: str, took_s: float) -> None:
+    def conclude(
+        self, request: ProfileRequest, outcome: ChangeOutcome, reason: str, took_s: float
+    ) -> None:
         """Say how a request ended."""
-        level = logging.INFO if outcome in (Outcome.KEPT, Outcome.WOULD_WORK) else logging.WARNING
+        level = (
+            logging.INFO
+            if outcome in (ChangeOutcome.KEPT, ChangeOutcome.WOULD_WORK)
+            else logging.WARNING
+        )
         _log.log(level, "profile %s: %s%s", request.profile, outcome, reason and f" ({reason})")
         self._last = {
             "request_id": request.request_id,
@@ -36,7 +42,7 @@ class ProfileReport:
         }
         self._due_ns = 0
 
-    def tell(self, profile: str, change: Change | None, fault: str) -> None:
+    def tell(self, profile: str, change: ProfileChange | None, fault: str) -> None:
         """Publish at a steady pace, and at once after an end.
 
         `fault` tells why the profile is not the chosen one; "" where it is.

@@ -14,11 +14,17 @@ from platforms.profile import profile_from
 from platforms.profile_source import read_source
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor import profile_change
-from vla_deploy.supervisor.profile_change import Change, Member, Outcome, Phase, Request
+from vla_deploy.supervisor.profile_change import (
+    ChangeOutcome,
+    ChangePhase,
+    Member,
+    ProfileChange,
+    ProfileRequest,
+)
 from vla_deploy.supervisor.profile_choice import ProfileChoice
 from vla_deploy.supervisor.profile_members import CONTROL, Allegiance
 from vla_deploy.supervisor.profile_report import ProfileReport
-from vla_deploy.supervisor.profile_trial import Trial
+from vla_deploy.supervisor.profile_trial import ProfileTrial
 
 _MB: Final = 1_000_000
 _DISARMED: Final = "disarmed"
@@ -63,17 +69,19 @@ class ProfileSwitch:
         self._changes = space.ring_writer("profile_change")
         self._answers = space.ring_reader("profile_answer", from_start=False)
         self._report = ProfileReport(space, clock, begun_with=name)
-        self._trial = Trial(space, clock)
+        self._trial = ProfileTrial(space, clock)
         self._ids = itertools.count(1)
-        self._change: Change | None = None
+        self._change: ProfileChange | None = None
         self._allegiance = Allegiance()
-        self._phases: Mapping[Phase, Callable[[Change, Mapping[str, Member]], None]] = {
-            Phase.PREPARE: self._preparing,
-            Phase.SET_POWER: self._setting_power,
-            Phase.COMMIT: self._committing,
-            Phase.WATCH: self._watching,
-            Phase.VALIDATE: self._validating,
-            Phase.ROLLBACK: self._rolling_back,
+        self._phases: Mapping[
+            ChangePhase, Callable[[ProfileChange, Mapping[str, Member]], None]
+        ] = {
+            ChangePhase.PREPARE: self._preparing,
+            ChangePhase.SET_POWER: self._setting_power,
+            ChangePhase.COMMIT: self._committing,
+            ChangePhase.WATCH: self._watching,
+            ChangePhase.VALIDATE: self._validating,
+            ChangePhase.ROLLBACK: self._rolling_back,
         }
 
     def step(self, members: Mapping[str, Member], absent: Mapping[str, str]) -> tuple[str, ...]:
@@ -82,7 +90,7 @@ class ProfileSwitch:
         `members` are ready and follow profiles, `absent` are on their way up, with their state.
         """
         for event in self._requests.drain():
-            self._take(Request.of(event.payload), members, absent)
+            self._take(ProfileRequest.of(event.payload), members, absent)
         answers = [event.payload for event in self._answers.drain()]
         change = self._change
         if change is None:
@@ -104,7 +112,7 @@ class ProfileSwitch:
     # --- a request ----------------------------------------------------------------------------
 
     def _take(
-        self, request: Request, members: Mapping[str, Member], absent: Mapping[str, str]
+        self, request: ProfileRequest, members: Mapping[str, Member], absent: Mapping[str, str]
     ) -> None:
         try:
             source = read_source(request.profile)
@@ -113,11 +121,11 @@ class ProfileSwitch:
             self._power.check(target.power_mode)
             _refuse_small_computer(target)
         except ProfileError as error:
-            self._report.conclude(request, Outcome.REFUSED, "; ".join(error.faults), 0.0)
+            self._report.conclude(request, ChangeOutcome.REFUSED, "; ".join(error.faults), 0.0)
             return
         now_ns = self._clock.now_ns()
         self._trial.begin()
-        change = Change(
+        change = ProfileChange(
             change_id=next(self._ids),
             request=request,
             target=target,
@@ -139,7 +147,7 @@ class ProfileSwitch:
 
     # --- phases -------------------------------------------------------------------------------
 
-    def _preparing(self, change: Change, _: Mapping[str, Member]) -> None:
+    def _preparing(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
         if self._is_waiting(change):
             return
         refusals = self._settle_restarts(change)
@@ -150,7 +158,7 @@ class ProfileSwitch:
         else:
             self._set_power(change)
 
-    def _settle_restarts(self, change: Change) -> dict[str, str]:
+    def _settle_restarts(self, change: ProfileChange) -> dict[str, str]:
         """Set aside who may be restarted, and return the refusals that remain."""
         refusals = dict(change.refusals)
         for name, reason in change.refusals.items():
@@ -165,12 +173,12 @@ class ProfileSwitch:
                 del refusals[name]
         return refusals
 
-    def _set_power(self, change: Change) -> None:
-        change.enter(Phase.SET_POWER, self._clock.now_ns(), _ns(profile_change.SET_POWER_S))
+    def _set_power(self, change: ProfileChange) -> None:
+        change.enter(ChangePhase.SET_POWER, self._clock.now_ns(), _ns(profile_change.SET_POWER_S))
         change.power_before = self._power.current() if change.target.power_mode else ""
         self._power_set = self._executor.submit(self._power.set, change.target.power_mode)
 
-    def _setting_power(self, change: Change, _: Mapping[str, Member]) -> None:
+    def _setting_power(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
         assert self._power_set is not None
         if not self._power_set.done():
             if self._clock.now_ns() >= change.deadline_ns:
@@ -182,14 +190,14 @@ class ProfileSwitch:
             return
         self._commit(change)
 
-    def _commit(self, change: Change) -> None:
+    def _commit(self, change: ProfileChange) -> None:
         change.committed = True
         self._put_in_force(change.request.profile, change.target)
         limit_s = profile_change.RESTART_S if change.restarts else profile_change.COMMIT_S
-        change.enter(Phase.COMMIT, self._clock.now_ns(), _ns(limit_s))
+        change.enter(ChangePhase.COMMIT, self._clock.now_ns(), _ns(limit_s))
         self._publish(change, "commit")
 
-    def _committing(self, change: Change, members: Mapping[str, Member]) -> None:
+    def _committing(self, change: ProfileChange, members: Mapping[str, Member]) -> None:
         back = {
             name
             for name in change.restarts
@@ -204,17 +212,19 @@ class ProfileSwitch:
         self._trial.begin()
         self._watch(change, restarted, again=[])
 
-    def _watch(self, change: Change, restarted: Mapping[str, float], again: list[str]) -> None:
-        change.enter(Phase.WATCH, self._clock.now_ns(), self._watch_ns)
+    def _watch(
+        self, change: ProfileChange, restarted: Mapping[str, float], again: list[str]
+    ) -> None:
+        change.enter(ChangePhase.WATCH, self._clock.now_ns(), self._watch_ns)
         self._publish(change, "watch", restarted=restarted, again=again)
 
-    def _watching(self, change: Change, _: Mapping[str, Member]) -> None:
+    def _watching(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
         if self._clock.now_ns() >= change.deadline_ns:
             limit_ns = _ns(profile_change.VALIDATE_S)
-            change.enter(Phase.VALIDATE, self._clock.now_ns(), limit_ns)
+            change.enter(ChangePhase.VALIDATE, self._clock.now_ns(), limit_ns)
             self._publish(change, "validate")
 
-    def _validating(self, change: Change, _: Mapping[str, Member]) -> None:
+    def _validating(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
         if self._is_waiting(change):
             return
         faults = [*self._trial.faults(change.target)]
@@ -229,7 +239,7 @@ class ProfileSwitch:
             return
         self._keep(change)
 
-    def _keep(self, change: Change) -> None:
+    def _keep(self, change: ProfileChange) -> None:
         try:
             self._choice.save(change.request.profile)
         except OSError as error:
@@ -239,9 +249,9 @@ class ProfileSwitch:
         self._kept, self._kept_profile = self.profile, self.in_force
         self.fault = ""
         self._allegiance.adopt(change.pids)
-        self._end(change, Outcome.KEPT, "")
+        self._end(change, ChangeOutcome.KEPT, "")
 
-    def _rolling_back(self, change: Change, _: Mapping[str, Member]) -> None:
+    def _rolling_back(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
         power_due = self._power_set is not None and not self._power_set.done()
         late = self._clock.now_ns() >= change.deadline_ns
         if (change.silent or power_due) and not late:
@@ -254,12 +264,12 @@ class ProfileSwitch:
             reason += f"; {self._power_set.result()}"
         self._power_set = None
         if change.request.dry_run and not reason:
-            self._end(change, Outcome.WOULD_WORK, _restart_note(change))
+            self._end(change, ChangeOutcome.WOULD_WORK, _restart_note(change))
         else:
-            outcome = Outcome.ROLLED_BACK if change.committed else Outcome.REFUSED
+            outcome = ChangeOutcome.ROLLED_BACK if change.committed else ChangeOutcome.REFUSED
             self._end(change, outcome, reason)
 
-    def _go_back(self, change: Change, failure: str) -> None:
+    def _go_back(self, change: ProfileChange, failure: str) -> None:
         change.failure = failure
         self._put_in_force(self._kept, self._kept_profile)
         self._power_set = (
@@ -267,7 +277,7 @@ class ProfileSwitch:
             if change.power_before
             else None
         )
-        change.enter(Phase.ROLLBACK, self._clock.now_ns(), _ns(profile_change.ROLLBACK_S))
+        change.enter(ChangePhase.ROLLBACK, self._clock.now_ns(), _ns(profile_change.ROLLBACK_S))
         self._publish(change, "rollback")
 
     def _put_in_force(self, name: str, profile: Profile) -> None:
@@ -275,7 +285,7 @@ class ProfileSwitch:
         if self._on_change is not None:
             self._on_change(profile)
 
-    def _is_waiting(self, change: Change, restarting: tuple[str, ...] = ()) -> bool:
+    def _is_waiting(self, change: ProfileChange, restarting: tuple[str, ...] = ()) -> bool:
         """Tell whether answers may still come; when it is too late for them, go back."""
         missing = (*change.silent, *restarting)
         if not missing:
@@ -286,7 +296,7 @@ class ProfileSwitch:
 
     # --- processes that come and go -----------------------------------------------------------
 
-    def _look_for_dead(self, change: Change, members: Mapping[str, Member]) -> None:
+    def _look_for_dead(self, change: ProfileChange, members: Mapping[str, Member]) -> None:
         ended_for_it = change.restarts.keys() if change.committed else frozenset()
         dead = [
             name
@@ -297,11 +307,11 @@ class ProfileSwitch:
             return
         for name in dead:
             del change.pids[name]
-        if change.phase is not Phase.ROLLBACK:
+        if change.phase is not ChangePhase.ROLLBACK:
             self._go_back(change, f"{', '.join(dead)} ended meanwhile")
 
-    def _to_restart(self, change: Change, members: Mapping[str, Member]) -> tuple[str, ...]:
-        if change.phase is not Phase.COMMIT:
+    def _to_restart(self, change: ProfileChange, members: Mapping[str, Member]) -> tuple[str, ...]:
+        if change.phase is not ChangePhase.COMMIT:
             return ()
         return tuple(
             name
@@ -311,13 +321,13 @@ class ProfileSwitch:
 
     # --- tell ---------------------------------------------------------------------------------
 
-    def _publish(self, change: Change, phase: str, **more: object) -> None:
+    def _publish(self, change: ProfileChange, phase: str, **more: object) -> None:
         profile = change.request.profile
         self._changes.publish(
             {"change_id": change.change_id, "phase": phase, "profile": profile, **more}
         )
 
-    def _end(self, change: Change, outcome: Outcome, reason: str) -> None:
+    def _end(self, change: ProfileChange, outcome: ChangeOutcome, reason: str) -> None:
         self._change = None
         took_s = (self._clock.now_ns() - change.began_ns) / NS_PER_S
         self._report.conclude(change.request, outcome, reason, took_s)
@@ -338,5 +348,5 @@ def _listed(refusals: Mapping[str, str]) -> str:
     return "; ".join(f"{name}: {reason}" for name, reason in refusals.items())
 
 
-def _restart_note(change: Change) -> str:
+def _restart_note(change: ProfileChange) -> str:
     return f"with a restart of {', '.join(sorted(change.restarts))}" if change.restarts else ""

@@ -11,7 +11,7 @@ _MAX_LATE_RATIO: Final = 0.05
 _OLD_STATUS_S: Final = 1.0
 
 
-class Trial:
+class ProfileTrial:
     """Compare what control and the processes tell with what they told before the change."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:

@@ -6,9 +6,9 @@ from typing import Any
 
 from drivers.clock import Clock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.budgets.sampler import Snapshot
+from vla_deploy.supervisor.budgets.sampler import UsageSnapshot
 from vla_deploy.supervisor.crew import Crew
-from vla_deploy.supervisor.lifecycle import Record
+from vla_deploy.supervisor.lifecycle import ProcessRecord
 from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.options import RunOptions
 
@@ -16,7 +16,7 @@ _SUPERVISOR = "supervisor"
 _UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None, "cpu_s": None}
 
 
-class Report:
+class ProcessTableWriter:
     """Write the `process_table` cell."""
 
     def __init__(self, run_id: str, options: RunOptions, space: SharedSpace, clock: Clock) -> None:
@@ -31,11 +31,11 @@ class Report:
 
     def publish(
         self,
-        records: Mapping[str, Record],
+        records: Mapping[str, ProcessRecord],
         crew: Crew,
         vitals: Mapping[str, tuple[Vital, ...]],
         refusal: str,
-        snapshot: Snapshot | None,
+        snapshot: UsageSnapshot | None,
     ) -> None:
         """Publish the table with what was measured; `refusal` is why no command is taken."""
         self._head["profile"] = crew.profile
@@ -60,7 +60,7 @@ class Report:
         )
 
 
-def _usages(snapshot: Snapshot) -> dict[str, dict[str, float]]:
+def _usages(snapshot: UsageSnapshot) -> dict[str, dict[str, float]]:
     return {
         name: {
             "memory_mb": round(usage.memory_mb, 1),
@@ -74,7 +74,7 @@ def _usages(snapshot: Snapshot) -> dict[str, dict[str, float]]:
 
 def _row(
     name: str,
-    record: Record,
+    record: ProcessRecord,
     pids: Mapping[str, int],
     crew: Crew,
     vitals: tuple[Vital, ...],

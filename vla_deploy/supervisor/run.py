@@ -30,7 +30,7 @@ from vla_deploy.supervisor.power_at_start import set_at_start
 from vla_deploy.supervisor.profile_choice import choice_of
 from vla_deploy.supervisor.profile_switch import ProfileSwitch
 from vla_deploy.supervisor.readiness import readiness_of
-from vla_deploy.supervisor.report import Report
+from vla_deploy.supervisor.report import ProcessTableWriter
 from vla_deploy.supervisor.runtime import Runtime, default_base
 from vla_deploy.supervisor.serial_workers import SerialWorkers
 from vla_deploy.supervisor.table import ProcessSpec
@@ -88,7 +88,7 @@ class Run:
             clock,
             ros,
         )
-        self.report = Report(self.runtime.run_id, options, self.space, clock)
+        self.report = ProcessTableWriter(self.runtime.run_id, options, self.space, clock)
         self.budgets = open_keeper(
             profile,
             self.space,

@@ -2,23 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 
-from vla_deploy.supervisor.lifecycle import Record, State
+from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
 
 DEGRADED = "degraded"
 LATE = "not in time"
-_SETTLED = frozenset({State.READY, State.OFF})
-_TROUBLE = frozenset({State.ABORTING, State.BACKOFF, State.GIVEN_UP})
+_SETTLED = frozenset({ProcessState.READY, ProcessState.OFF})
+_TROUBLE = frozenset({ProcessState.ABORTING, ProcessState.BACKOFF, ProcessState.GIVEN_UP})
 
 
-def status_line(records: Mapping[str, Record], *, stopping: bool, fault: str = "") -> str:
+def status_line(records: Mapping[str, ProcessRecord], *, stopping: bool, fault: str = "") -> str:
     """Return who is not ready, and why, or that all are; then what else a person should mend."""
     return _processes(records, stopping=stopping) + (fault and f"; {fault}")
 
 
-def _processes(records: Mapping[str, Record], *, stopping: bool) -> str:
-    wanted = {name: record for name, record in records.items() if record.state is not State.OFF}
+def _processes(records: Mapping[str, ProcessRecord], *, stopping: bool) -> str:
+    wanted = {
+        name: record for name, record in records.items() if record.state is not ProcessState.OFF
+    }
     if stopping:
-        left = [name for name, record in wanted.items() if record.state is not State.STOPPED]
+        left = [name for name, record in wanted.items() if record.state is not ProcessState.STOPPED]
         return f"stopping: {', '.join(left) or 'nobody'} left"
     troubles = [
         f"{name} {record.state.value} ({record.reason})"

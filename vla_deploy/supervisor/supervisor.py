@@ -22,7 +22,14 @@ from vla_deploy.supervisor.errors import (
     SupervisorError,
 )
 from vla_deploy.supervisor.last_words import complaint, last_words
-from vla_deploy.supervisor.lifecycle import Action, Record, State, abort, reconcile, wind_down
+from vla_deploy.supervisor.lifecycle import (
+    Action,
+    ProcessRecord,
+    ProcessState,
+    abort,
+    reconcile,
+    wind_down,
+)
 from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.notify import NotifyTarget, own_target
 from vla_deploy.supervisor.options import RunOptions
@@ -35,8 +42,10 @@ from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
 _HELD_UP_NS = 3 * NS_PER_S  # longer than any load explains, shorter than any silence allowed
-_TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP, State.ABORTING})
-_ON_THE_WAY = frozenset({State.WAITING, State.STARTING, State.BACKOFF, State.ABORTING})
+_TROUBLE = frozenset({ProcessState.BACKOFF, ProcessState.GIVEN_UP, ProcessState.ABORTING})
+_ON_THE_WAY = frozenset(
+    {ProcessState.WAITING, ProcessState.STARTING, ProcessState.BACKOFF, ProcessState.ABORTING}
+)
 _MENDED_BY_A_PERSON: Mapping[int | None, type[StartFailed]] = {
     EXIT_CONFIGURATION: StartFailed,
     EXIT_DEVICE_ABSENT: DeviceAbsent,
@@ -67,7 +76,7 @@ class Supervisor:
         self._table = table
         self._given_clock = clock
         self._notify = own_target() if notify is None else notify
-        self._records = {spec.name: Record() for spec in table}
+        self._records = {spec.name: ProcessRecord() for spec in table}
         self._vitals: dict[str, tuple[Vital, ...]] = {}
         self._alarms: frozenset[str] = frozenset()
         self._consequences = Consequences(table)
@@ -168,7 +177,9 @@ class Supervisor:
         if power_off:
             _ask_power_off(self._run.runtime.run_dir)
         try:
-            while any(record.state is not State.STOPPED for record in self._records.values()):
+            while any(
+                record.state is not ProcessState.STOPPED for record in self._records.values()
+            ):
                 self._step(stopping=True)
                 self._pause()
         finally:
@@ -180,20 +191,23 @@ class Supervisor:
             self.step()
             for spec in self._table:
                 record = self._records[spec.name]
-                if record.state is State.GIVEN_UP and spec.giving_up is not GivingUp.CARRY_ON:
+                if (
+                    record.state is ProcessState.GIVEN_UP
+                    and spec.giving_up is not GivingUp.CARRY_ON
+                ):
                     raise self._failure(spec.name, record)
             if self._is_ready():
                 return
             self._pause()
 
     def _is_ready(self) -> bool:
-        settled = (State.READY, State.OFF)
+        settled = (ProcessState.READY, ProcessState.OFF)
         return all(
             self._records[spec.name].state in settled or spec.giving_up is GivingUp.CARRY_ON
             for spec in self._table
         )
 
-    def _failure(self, name: str, record: Record) -> StartFailed:
+    def _failure(self, name: str, record: ProcessRecord) -> StartFailed:
         kind = _MENDED_BY_A_PERSON.get(record.exit_code)
         if kind is not None:
             why = complaint(self.run_dir, name) or record.reason
@@ -223,7 +237,7 @@ class Supervisor:
 
     def _decide(
         self, *, stopping: bool, now_ns: int
-    ) -> tuple[dict[str, Record], tuple[Action, ...]]:
+    ) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
         run = self._started()
         seen = run.crew.observe()
         if stopping:
@@ -236,7 +250,7 @@ class Supervisor:
         """End those that the budgets want started anew."""
         actions: list[Action] = []
         for name, reason in run.budgets.step(run.crew.pids()).restart.items():
-            if self._records[name].state in (State.STARTING, State.READY):
+            if self._records[name].state in (ProcessState.STARTING, ProcessState.READY):
                 self._records[name], act = abort(self._records[name], reason, now_ns)
                 actions += [(act, name)] if act else []
         return actions
@@ -263,7 +277,7 @@ class Supervisor:
         members = {
             name: Member(pid=pids[name], started_under=run.crew.started_under[name])
             for name, state in states.items()
-            if state is State.READY and name in pids
+            if state is ProcessState.READY and name in pids
         }
         absent = {name: state.value for name, state in states.items() if state in _ON_THE_WAY}
         restarts = run.switch.step(members, absent)
@@ -280,7 +294,7 @@ class Supervisor:
             self._vitals = {
                 name: signs
                 for name, signs in vitals.items()
-                if self._records[name].state is State.READY
+                if self._records[name].state is ProcessState.READY
             }
             run.crew.bound_output()
             self._log_alarms()
@@ -337,7 +351,7 @@ def _ask_power_off(run_dir: Path) -> None:
         _log.warning("%s: arms keep holding: %s", run_dir, error)
 
 
-def _log_changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> bool:
+def _log_changes(before: Mapping[str, ProcessRecord], after: Mapping[str, ProcessRecord]) -> bool:
     changed = [name for name, record in after.items() if record.state is not before[name].state]
     for name in changed:
         record = after[name]

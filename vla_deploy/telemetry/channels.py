@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.ipc import BY_NAME, TOPICS, Field, Kind, Topic
+from vla_deploy.ipc import BY_NAME, TOPICS, PackedField, Topic, TopicKind
 from vla_deploy.ipc.layout import is_document, record_dtype
 from vla_deploy.telemetry.history import Kept
 from vla_deploy.telemetry.schemas.geometry import CAMERA, time_json
@@ -46,7 +46,7 @@ def channels_of(topic: Topic) -> tuple[Channel, ...]:
     """Return what a topic becomes in the file: one channel, two for images, none if private."""
     if topic.private:
         return ()
-    if topic.kind is Kind.FRAME:
+    if topic.kind is TopicKind.FRAME:
         return tuple(
             Channel(
                 topic=f"{topic.name}/{part}",
@@ -64,7 +64,7 @@ def value_text(channel: str, kept: Kept, wall_offset_ns: int) -> bytes:
     topic, _, part = channel.partition("/")
     if part:
         return image_text(kept.stamp_ns + wall_offset_ns, kept.payload, _IMAGE_FORMS[part])
-    is_cell = BY_NAME[topic].kind is Kind.CELL
+    is_cell = BY_NAME[topic].kind is TopicKind.CELL
     return cell_text(BY_NAME[topic], kept.payload) if is_cell else kept.payload
 
 
@@ -109,15 +109,15 @@ def tick_bytes(text: bytes) -> bytes:
 
 def _content(topic: Topic) -> dict[str, Any]:
     """Return what a message holds; documents and events are told in docs/architecture.md."""
-    if topic.kind is Kind.RECORD:
+    if topic.kind is TopicKind.RECORD:
         return {"properties": _TICK, "required": ["record"]}
-    if topic.kind is Kind.CELL and not is_document(topic):
+    if topic.kind is TopicKind.CELL and not is_document(topic):
         properties = {field.name: _property(field) for field in topic.fields}
         return {"properties": properties, "required": list(properties)}
     return {}
 
 
-def _property(field: Field) -> dict[str, Any]:
+def _property(field: PackedField) -> dict[str, Any]:
     kind = ["number", "null"] if field.dtype.startswith("f") else "integer"
     number = {"type": kind, "description": field.unit}
     if field.shape == 1:

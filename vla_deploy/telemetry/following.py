@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 
-from vla_deploy.ipc import TOPICS, CellReader, Kind, RingReader, SharedSpace
+from vla_deploy.ipc import TOPICS, CellReader, RingReader, SharedSpace, TopicKind
 from vla_deploy.telemetry.history import Kept
 
 Value = tuple[str, Kept]
@@ -23,9 +23,9 @@ class Following:
         self._rings: dict[str, RingReader] = {}
         self._sequences: dict[str, int] = {}
         for topic in TOPICS:
-            if topic.kind is Kind.CELL and wanted(topic.name):
+            if topic.kind is TopicKind.CELL and wanted(topic.name):
                 self._cells[topic.name] = space.cell_reader(topic.name)
-            elif topic.kind is Kind.RING and wanted(topic.name):
+            elif topic.kind is TopicKind.RING and wanted(topic.name):
                 self._rings[topic.name] = space.ring_reader(topic.name, from_start=from_start)
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import TOPICS, FrameReader, Kind, Record, SharedSpace
+from vla_deploy.ipc import TOPICS, FrameReader, Record, SharedSpace, TopicKind
 from vla_deploy.telemetry.channels import TICKS
 from vla_deploy.telemetry.following import Following, Value
 from vla_deploy.telemetry.history import KEPT_NS, History, Kept
@@ -27,7 +27,7 @@ class Memory:
         self._frames: dict[str, FrameReader] = {
             topic.name: space.frame_reader(topic.name)
             for topic in TOPICS
-            if topic.kind is Kind.FRAME
+            if topic.kind is TopicKind.FRAME
         }
         self._frames_due_ns = 0
 

@@ -4,7 +4,7 @@ Everything here is a value or a pure step. Perception keeps the state and tells 
 topic; planner, skills, page and command line read that into a `Snapshot` and ask.
 """
 
-from vla_deploy.world.access import Access, Body, access_to
+from vla_deploy.world.access import Body, GraspAccess, access_to
 from vla_deploy.world.document import read_snapshot
 from vla_deploy.world.errors import SceneUnreadable, UnknownWord, WorldError
 from vla_deploy.world.query import Query, find, parse_query
@@ -12,8 +12,8 @@ from vla_deploy.world.relations import Relation, relations_of
 from vla_deploy.world.thing import Snapshot, Thing, Viewpoint
 
 __all__ = [
-    "Access",
     "Body",
+    "GraspAccess",
     "Query",
     "Relation",
     "SceneUnreadable",

@@ -23,7 +23,7 @@ WALL_M: Final = 0.008
 UNSURE_M: Final = 0.06
 
 
-class Way(StrEnum):
+class GraspStand(StrEnum):
     """Say from where a thing is within the arms' reach."""
 
     HERE = "here"
@@ -79,10 +79,10 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Access:
+class GraspAccess:
     """Say whether and from where a thing can be taken."""
 
-    way: Way
+    way: GraspStand
     is_graspable: bool
     obstacles: tuple[Obstacle, ...]
 
@@ -101,15 +101,15 @@ class Access:
         }
 
 
-def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> Access:
+def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> GraspAccess:
     """Judge one thing; the obstacles are in the order in which one would clear them."""
     grasps, too_wide = _grasps(thing, body)
     way = _way(thing, snapshot.robot, body)
     found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps)]
     found += _in_corridor(thing, grasps, snapshot) if grasps else []
-    if way is Way.NONE:
+    if way is GraspStand.NONE:
         found.append(_bar(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
-    return Access(way=way, is_graspable=bool(grasps), obstacles=tuple(found))
+    return GraspAccess(way=way, is_graspable=bool(grasps), obstacles=tuple(found))
 
 
 def _general(thing: Thing, snapshot: Snapshot, body: Body) -> Iterator[Obstacle]:
@@ -147,13 +147,13 @@ def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
                        f"hands that point down reach {low_m:g} to {high_m:g} m")  # fmt: skip
 
 
-def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> Way:
+def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> GraspStand:
     if robot is not None and is_in_reach(_from(robot, thing)):
-        return Way.HERE
+        return GraspStand.HERE
     if body.is_free is None:
-        return Way.AFTER_DRIVING
+        return GraspStand.AFTER_DRIVING
     has_stand = next(stands_around(thing.position_m, body.is_free), None) is not None
-    return Way.AFTER_DRIVING if has_stand else Way.NONE
+    return GraspStand.AFTER_DRIVING if has_stand else GraspStand.NONE
 
 
 def _from(robot: Viewpoint, thing: Thing) -> tuple[float, float]:

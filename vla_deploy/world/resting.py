@@ -17,7 +17,7 @@ ON: Final = "on"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
+class RelationBounds:
     """Bound one relation.
 
     `inside_m` is how far the thing's middle must lie within the outline, `sunk_m` how far its
@@ -29,10 +29,10 @@ class Bounds:
     gap_m: float
 
 
-BEGIN: Final = Bounds(inside_m=0.0, sunk_m=0.015, gap_m=0.025)
-KEEP: Final = Bounds(inside_m=-0.03, sunk_m=-0.005, gap_m=0.045)
+BEGIN: Final = RelationBounds(inside_m=0.0, sunk_m=0.015, gap_m=0.025)
+KEEP: Final = RelationBounds(inside_m=-0.03, sunk_m=-0.005, gap_m=0.045)
 # Where a hand has just let go, only the hand's place is known.
-LET_GO: Final = Bounds(inside_m=0.0, sunk_m=0.0, gap_m=0.07)
+LET_GO: Final = RelationBounds(inside_m=0.0, sunk_m=0.0, gap_m=0.07)
 # The bottom of a container is not below its outside, within what a sight is wrong.
 BELOW_CONTAINER_M: Final = 0.03
 FLOOR_HEIGHT_M: Final = 0.0
@@ -42,7 +42,7 @@ def rest_of(
     thing: Thing,
     things: Iterable[Thing],
     surfaces: Sequence[Surface],
-    begin: Bounds = BEGIN,
+    begin: RelationBounds = BEGIN,
 ) -> Rest | None:
     """Return what a thing rests in or on; `thing.rests` is what it was held to rest in before.
 
@@ -60,7 +60,7 @@ def rest_of(
 
 
 def _containers(
-    thing: Thing, others: Iterable[Thing], begin: Bounds
+    thing: Thing, others: Iterable[Thing], begin: RelationBounds
 ) -> Iterable[tuple[int, float, Rest]]:
     for other in others:
         rest = Rest(IN, other.thing_id)
@@ -76,7 +76,7 @@ def _containers(
 
 
 def _supports(
-    thing: Thing, others: Iterable[Thing], surfaces: Sequence[Surface], begin: Bounds
+    thing: Thing, others: Iterable[Thing], surfaces: Sequence[Surface], begin: RelationBounds
 ) -> Iterable[tuple[int, float, Rest]]:
     plates = [
         (one.thing_id, one.top_m, depth_inside_m(thing.position_m, one))

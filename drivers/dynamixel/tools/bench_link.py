@@ -13,17 +13,17 @@ from drivers.dynamixel.codec import (
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import MODELS_BY_NUMBER, Model
+from drivers.dynamixel.control_table import MODELS_BY_NUMBER, ServoDatasheet
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent, WrongServo
-from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.link import PacketLink, ReplyPatience
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
 
 PING_ANSWER_BYTES: Final = 3
-ONE_TRY: Final = Patience(margin_s=0.02, attempts=1)
-THREE_TRIES: Final = Patience(margin_s=0.02, attempts=3)
+ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)
+THREE_TRIES: Final = ReplyPatience(margin_s=0.02, attempts=3)
 _BOOT_PATIENCE_S: Final = 3.0
 _BOOT_POLL_S: Final = 0.05
 
@@ -54,7 +54,7 @@ class FoundServo:
         )
 
     @property
-    def model(self) -> Model | None:
+    def model(self) -> ServoDatasheet | None:
         """Return its control table, None for a model that is not registered."""
         return MODELS_BY_NUMBER.get(self.model_number)
 
@@ -70,7 +70,7 @@ class BenchLink:
     def __init__(self, transport: ByteTransport, clock: Clock, baud: int) -> None:
         self.counters = BusCounters()
         self.baud = baud
-        self.link = Link(transport, clock, baud, self.counters)
+        self.link = PacketLink(transport, clock, baud, self.counters)
         self.registers = Registers(self.link)
         self._clock = clock
 
@@ -86,7 +86,7 @@ class BenchLink:
         """
         self.link.detect_echo(MAX_SERVO_ID, ONE_TRY.margin_s)
 
-    def ping(self, servo_id: int, patience: Patience = THREE_TRIES) -> FoundServo:
+    def ping(self, servo_id: int, patience: ReplyPatience = THREE_TRIES) -> FoundServo:
         """Return what a servo says of itself.
 
         Raises:

@@ -10,7 +10,7 @@ from typing import Final
 
 from drivers.dynamixel.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
 from drivers.dynamixel.errors import CorruptReply, ServoSilent
-from drivers.dynamixel.link import Patience
+from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.dynamixel.tools.bench_link import (
     ONE_TRY,
@@ -98,7 +98,7 @@ def _ask_everyone(link: BenchLink) -> tuple[list[FoundServo], int]:
 
 
 def _ask_each(
-    link: BenchLink, ids: Iterable[int], patience: Patience, progress: Progress
+    link: BenchLink, ids: Iterable[int], patience: ReplyPatience, progress: Progress
 ) -> tuple[list[FoundServo], list[int]]:
     found, clashes = [], []
     for servo_id in ids:

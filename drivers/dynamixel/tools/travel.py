@@ -50,7 +50,7 @@ class JointRange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mounting:
+class ServoMounting:
     """Hold how a servo sits on its joint, as in the robot file."""
 
     sign: int
@@ -144,14 +144,14 @@ def judge_sweep(
         )
 
 
-def mounting_of_sweep(expected: JointRange, first: int, travel: int) -> Mounting:
+def mounting_of_sweep(expected: JointRange, first: int, travel: int) -> ServoMounting:
     """Return the mounting of a joint swept from its lower to its upper end."""
     return mounting_at(expected, first + travel / 2, expected.middle, sign=1 if travel > 0 else -1)
 
 
 def mounting_at(
     expected: JointRange, position: float, value: float, *, sign: int | None = None
-) -> Mounting:
+) -> ServoMounting:
     """Return the mounting of a joint that has a known value at a position.
 
     A servo knows its position within one turn only: of all offsets a turn apart, the one that is
@@ -162,10 +162,10 @@ def mounting_at(
     angle = (position - CENTRE_PULSE) * PULSE_RAD
     offset = value - sign * expected.travel_per_rad * angle
     offset += round((expected.middle - offset) / turn) * turn
-    return Mounting(sign=sign, offset=offset)
+    return ServoMounting(sign=sign, offset=offset)
 
 
-def judge_reach(expected: JointRange, mounting: Mounting, low: float, high: float) -> None:
+def judge_reach(expected: JointRange, mounting: ServoMounting, low: float, high: float) -> None:
     """Refuse a mounting with which one turn of the servo does not cover the limits `low`..`high`.
 
     Raises:

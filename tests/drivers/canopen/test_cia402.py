@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from drivers.canopen.cia402 import (
     STATUSWORD_PATTERNS,
     ControlCommand,
-    Goal,
+    DriveGoal,
     PowerState,
     controlword_for,
     decode_statusword,
@@ -28,7 +28,7 @@ def test_patterns_exclude_each_other(word: int) -> None:
 
 @pytest.mark.parametrize("state", list(PowerState))
 def test_only_the_goal_enabled_ever_sends_an_enabling_command(state: PowerState) -> None:
-    for goal in set(Goal) - {Goal.ENABLED}:
+    for goal in set(DriveGoal) - {DriveGoal.ENABLED}:
         assert controlword_for(goal, state) in {
             ControlCommand.DISABLE_VOLTAGE,
             ControlCommand.QUICK_STOP,
@@ -37,7 +37,7 @@ def test_only_the_goal_enabled_ever_sends_an_enabling_command(state: PowerState)
 
 
 def test_a_fault_is_never_reset_on_the_way_to_enabled() -> None:
-    assert controlword_for(Goal.ENABLED, PowerState.FAULT) is ControlCommand.DISABLE_VOLTAGE
+    assert controlword_for(DriveGoal.ENABLED, PowerState.FAULT) is ControlCommand.DISABLE_VOLTAGE
 
 
 @pytest.mark.parametrize("state", list(STATE_BITS))

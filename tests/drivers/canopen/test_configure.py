@@ -8,7 +8,7 @@ import can
 import numpy as np
 import pytest
 
-from drivers.canopen import EDS_PATH, DriveSpec, OperatingMode, WheelDriveBus
+from drivers.canopen import EDS_PATH, DriveMode, DriveSpec, WheelDriveBus
 from drivers.canopen.eds import DriveDictionary
 from drivers.canopen.error_codes import CODE_RULES, CODE_TEXTS, GROUP_RULES, code_text, reset_rule
 from drivers.canopen.objects import (
@@ -23,7 +23,7 @@ from drivers.errors import DeviceMissing, WrongDevice
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 
-CYCLIC = OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY
+CYCLIC = DriveMode.CYCLIC_SYNCHRONOUS_VELOCITY
 LEFT = DriveSpec(node_id=1, joint="left")
 
 

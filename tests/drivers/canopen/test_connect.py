@@ -5,7 +5,7 @@ import pytest
 from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.canopen.objects import HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, IDENTITY
 from drivers.errors import NoReply, WrongDevice
-from sim_twin.can import MemoryBus, Mounting, WheelDrive
+from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 
 
@@ -51,7 +51,7 @@ def test_another_product_is_the_wrong_device() -> None:
 
 
 def test_another_encoder_is_the_wrong_device() -> None:
-    one = world(WheelDrive(1, Mounting(counts_per_rev=4096)))
+    one = world(WheelDrive(1, MotorMounting(counts_per_rev=4096)))
     bus = driver(one, LEFT)
     with pytest.raises(WrongDevice, match="encoder increments 0x608F:1 is 0x1000, expected 0x4000"):
         bus.connect()

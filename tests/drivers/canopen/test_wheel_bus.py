@@ -13,7 +13,7 @@ from drivers.canopen.objects import HEARTBEAT_PRODUCER, RPDO1
 from drivers.canopen.wheel_bus import HOST_NODE_ID
 from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
-from sim_twin.can import MemoryBus, Mounting, WheelDrive
+from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 
 TICK_NS = 4_000_000
@@ -26,7 +26,9 @@ class Bench(FreeWheelWorld[WheelDrive]):
     """Two drives, the right one mounted mirrored, and the driver."""
 
     def __init__(self) -> None:
-        super().__init__([FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, Mounting(sign=-1)))])
+        super().__init__(
+            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, MotorMounting(sign=-1)))]
+        )
         self.left, self.right = (wheel.drive for wheel in self.wheels)
         self.memory_bus = MemoryBus(self.wire)
         self.bus = WheelDriveBus(

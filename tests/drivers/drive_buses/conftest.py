@@ -9,7 +9,7 @@ from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.drive_bus import DriveBus, DriveState
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.odrive.codec import AxisError
-from sim_twin.can import MemoryBus, Mounting, WheelDrive
+from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive import ODriveAxis
 
@@ -63,7 +63,7 @@ class Cia402Bench(Bench):
 
     def __init__(self) -> None:
         self.world = FreeWheelWorld(
-            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, Mounting(sign=-1)))]
+            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, MotorMounting(sign=-1)))]
         )
         self.bus = self.on(self.world)
 
@@ -80,7 +80,7 @@ class ODriveBench(Bench):
     short_circuit = int(AxisError.DRV_FAULT)
 
     def __init__(self) -> None:
-        self.axes = [ODriveAxis(0), ODriveAxis(1, Mounting(sign=-1))]
+        self.axes = [ODriveAxis(0), ODriveAxis(1, MotorMounting(sign=-1))]
         self.world = FreeWheelWorld([FreeWheel(axis) for axis in self.axes])
         self.bus = self.on(self.world)
 

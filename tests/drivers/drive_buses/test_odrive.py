@@ -14,7 +14,7 @@ from drivers.odrive.codec import (
     MESSAGES,
     AxisError,
     AxisState,
-    Command,
+    OdriveCommand,
     can_id,
     decode,
     encode,
@@ -123,7 +123,7 @@ def test_an_axis_that_was_never_calibrated_says_what_to_do(
 def test_an_axis_without_an_sdo_answer_is_never_enabled(
     odrive: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(_REACTIONS, Command.RX_SDO, lambda *ignored: None)
+    monkeypatch.setitem(_REACTIONS, OdriveCommand.RX_SDO, lambda *ignored: None)
     with pytest.raises(NoReply, match="the watchdog cannot be verified"):
         odrive.bus.connect()
     odrive.bus.close()
@@ -154,8 +154,8 @@ def test_a_node_id_that_no_axis_can_have_is_refused(node_id: int) -> None:
         AxisSpec(node_id=node_id, joint="left")
 
 
-@pytest.mark.parametrize("command", list(Command))
-def test_every_message_takes_its_own_bytes_and_padding_only(command: Command) -> None:
+@pytest.mark.parametrize("command", list(OdriveCommand))
+def test_every_message_takes_its_own_bytes_and_padding_only(command: OdriveCommand) -> None:
     data = bytes(8)
     assert len(decode(command, data)) == len(MESSAGES[command].signals)
     with pytest.raises(ProtocolError, match="9 bytes"):
@@ -163,10 +163,10 @@ def test_every_message_takes_its_own_bytes_and_padding_only(command: Command) ->
 
 
 def test_units_are_revolutions_and_identifiers_carry_the_node() -> None:
-    assert encode(Command.SET_INPUT_VEL, 1.0, 0.0).hex() == "0000803f00000000"
-    assert can_id(3, Command.SET_AXIS_STATE) == 0x67
-    assert split_id(0x67) == (3, Command.SET_AXIS_STATE)
-    assert encode(Command.SET_AXIS_STATE, AxisState.CLOSED_LOOP_CONTROL) == b"\x08\0\0\0"
+    assert encode(OdriveCommand.SET_INPUT_VEL, 1.0, 0.0).hex() == "0000803f00000000"
+    assert can_id(3, OdriveCommand.SET_AXIS_STATE) == 0x67
+    assert split_id(0x67) == (3, OdriveCommand.SET_AXIS_STATE)
+    assert encode(OdriveCommand.SET_AXIS_STATE, AxisState.CLOSED_LOOP_CONTROL) == b"\x08\0\0\0"
 
 
 @pytest.mark.parametrize(

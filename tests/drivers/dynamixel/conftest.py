@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
+from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
 from drivers.dynamixel.codec import Instruction, PacketParser
 from drivers.errors import LinkLost
 from sim_twin.lines import MemoryLine
@@ -50,7 +50,7 @@ class Bench:
         servos: Sequence[EmulatedServoSpec] | None = None,
         options: FirmwareOptions | None = None,
         fast_sync: bool | None = True,
-        layout: Layout = Layout.DIRECT,
+        layout: BlockLayout = BlockLayout.DIRECT,
         health_every_cycles: int = 5,
     ) -> None:
         self.specs = list(specs) if specs is not None else make_specs(count)
@@ -223,7 +223,7 @@ class PacedBench:
         line = SleepingLine if sleeping else PacedLine
         self.line = line(self.clock, emulated, bauds=bauds, chunk_bytes=chunk_bytes)
         self.bank = self.line.bank
-        options = {"health_every_cycles": 1000, "layout": Layout.DIRECT} | options
+        options = {"health_every_cycles": 1000, "layout": BlockLayout.DIRECT} | options
         self.bus = DynamixelBus(self.line, self.clock, self.specs, baud=1_000_000, **options)
 
     def timed_read_ns(self) -> int:

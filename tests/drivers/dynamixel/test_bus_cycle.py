@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel import HardwareError, Layout, ServoSpec
+from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec
 from drivers.dynamixel.codec import Instruction
 from drivers.errors import LinkLost
 
@@ -294,7 +294,7 @@ def test_a_finger_on_a_rack_is_in_metres(make_bench: MakeBench) -> None:
     assert finger.to_joint(finger.to_pulse(0.035)) == pytest.approx(0.035, abs=1e-5)
 
 
-@pytest.mark.parametrize("layout", [Layout.DIRECT, Layout.INDIRECT])
+@pytest.mark.parametrize("layout", [BlockLayout.DIRECT, BlockLayout.INDIRECT])
 @pytest.mark.parametrize(
     "cycles",
     [
@@ -303,7 +303,7 @@ def test_a_finger_on_a_rack_is_in_metres(make_bench: MakeBench) -> None:
     ],
 )
 def test_no_cycle_with_stuffed_replies_is_lost(
-    make_bench: MakeBench, cycles: int, layout: Layout
+    make_bench: MakeBench, cycles: int, layout: BlockLayout
 ) -> None:
     bench = connected(make_bench, 16, fast_sync=False, layout=layout)
     random = np.random.default_rng(20_251)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel import HardwareError, Layout, ServoSpec, WatchdogState
+from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec, WatchdogState
 from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.dynamixel.errors import WrongServo
 from drivers.dynamixel.layout import DIRECT, block_of
@@ -20,7 +20,7 @@ MIXED = ("XM430-W350", "XL330-M288", "2XL430-W250", "XC330-T288")
 
 
 def connected(make_bench: MakeBench, count: int = 4, **options: Any) -> Any:
-    bench = make_bench(count, **{"layout": Layout.INDIRECT, "fast_sync": None} | options)
+    bench = make_bench(count, **{"layout": BlockLayout.INDIRECT, "fast_sync": None} | options)
     bench.bus.connect()
     bench.cycle()
     return bench
@@ -52,7 +52,7 @@ def test_one_read_brings_all_in_the_first_cycle_and_nothing_else_is_asked(
 
 def test_both_layouts_read_the_same_motion(make_bench: MakeBench) -> None:
     values = []
-    for layout in (Layout.DIRECT, Layout.INDIRECT):
+    for layout in (BlockLayout.DIRECT, BlockLayout.INDIRECT):
         bench = connected(make_bench, layout=layout)
         bench.rotors._damping[:] = 0.0
         bench.rotors.position_rad[:] = [0.5, -0.5, 1.0, -1.0]
@@ -180,14 +180,14 @@ def test_connecting_again_finds_the_map_and_writes_nothing(make_bench: MakeBench
 
 def test_the_block_is_chosen_by_model_firmware_and_layout() -> None:
     model = MODELS["XL330-M288"]
-    assert block_of(model, 52, Layout.AUTO).address == 208
-    assert block_of(model, 53, Layout.AUTO).address == 224
-    assert block_of(model, 53, Layout.DIRECT) is DIRECT
-    assert len(block_of(model, 53, Layout.INDIRECT).map_bytes) == 32
+    assert block_of(model, 52, BlockLayout.AUTO).address == 208
+    assert block_of(model, 53, BlockLayout.AUTO).address == 224
+    assert block_of(model, 53, BlockLayout.DIRECT) is DIRECT
+    assert len(block_of(model, 53, BlockLayout.INDIRECT).map_bytes) == 32
 
 
 def test_a_servo_with_too_few_slots_is_read_directly_or_refused() -> None:
     poor = replace(MODELS["XM430-W350"], indirect=((1, (IndirectBank(168, 224, 8),)),))
-    assert block_of(poor, 48, Layout.AUTO) is DIRECT
+    assert block_of(poor, 48, BlockLayout.AUTO) is DIRECT
     with pytest.raises(ValueError, match="has no 16 indirect slots; set the layout to direct"):
-        block_of(poor, 48, Layout.INDIRECT)
+        block_of(poor, 48, BlockLayout.INDIRECT)

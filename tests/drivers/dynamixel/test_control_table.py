@@ -7,15 +7,15 @@ from drivers.dynamixel.control_table import (
     MODELS,
     MODELS_BY_NUMBER,
     HardwareError,
-    Model,
     OperatingMode,
+    ServoDatasheet,
 )
 
 ALL_MODELS = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
 @ALL_MODELS
-def test_registers_do_not_overlap_and_are_found_by_address(model: Model) -> None:
+def test_registers_do_not_overlap_and_are_found_by_address(model: ServoDatasheet) -> None:
     end = 0
     for register in model.registers.values():
         assert register.address >= end
@@ -24,7 +24,7 @@ def test_registers_do_not_overlap_and_are_found_by_address(model: Model) -> None
 
 
 @ALL_MODELS
-def test_the_block_read_each_cycle_has_no_gap(model: Model) -> None:
+def test_the_block_read_each_cycle_has_no_gap(model: ServoDatasheet) -> None:
     effort = model.registers_by_address[126]
     assert effort.name == ("present_load" if model.current_unit_a is None else "present_current")
     assert effort.size == 2
@@ -34,12 +34,12 @@ def test_the_block_read_each_cycle_has_no_gap(model: Model) -> None:
 
 
 @ALL_MODELS
-def test_eeprom_ends_where_ram_begins(model: Model) -> None:
+def test_eeprom_ends_where_ram_begins(model: ServoDatasheet) -> None:
     assert all(register.eeprom == (register.address < 64) for register in model.registers.values())
 
 
 @ALL_MODELS
-def test_initial_values_are_in_range_and_limits_fit_the_bytes(model: Model) -> None:
+def test_initial_values_are_in_range_and_limits_fit_the_bytes(model: ServoDatasheet) -> None:
     for register in model.registers.values():
         limits = (register.minimum, register.initial, register.maximum)
         known = [value for value in limits if value is not None]

@@ -3,11 +3,11 @@
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
+from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
 from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent
-from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.link import PacketLink, ReplyPatience
 from sim_twin.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.server import FreeServos
@@ -97,7 +97,7 @@ def test_a_cycle_without_answers_costs_the_wire_time_and_two_milliseconds(
     clock = StillClock()
     line = SwitchedLine(clock, line_type(clock))
     bus = DynamixelBus(
-        line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, layout=Layout.DIRECT
+        line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, layout=BlockLayout.DIRECT
     )
     bus.connect()
     line.answering = False
@@ -111,7 +111,7 @@ def test_a_cycle_without_answers_costs_the_wire_time_and_two_milliseconds(
 
 def test_bytes_without_end_do_not_hold_the_bus() -> None:
     clock = StillClock()
-    link = Link(FloodedLine(clock), clock, 1_000_000, BusCounters())
+    link = PacketLink(FloodedLine(clock), clock, 1_000_000, BusCounters())
     link.send(b"request")
     assert link.counters.late == 16
     assert clock.time_ns - 5 * NS_PER_S < NS_PER_S
@@ -120,14 +120,14 @@ def test_bytes_without_end_do_not_hold_the_bus() -> None:
 def test_a_request_is_repeated_as_often_as_asked() -> None:
     clock = StillClock()
     line = SilentLine(clock)
-    link = Link(line, clock, 1_000_000, BusCounters())
+    link = PacketLink(line, clock, 1_000_000, BusCounters())
     with pytest.raises(ServoSilent, match="ping servo 1: no answer in 4 attempts"):
         link.request(
             1,
             Instruction.PING,
             b"",
             answer_bytes=3,
-            patience=Patience(margin_s=0.001, attempts=4),
+            patience=ReplyPatience(margin_s=0.001, attempts=4),
             name="ping servo 1",
         )
     assert line.written == 40

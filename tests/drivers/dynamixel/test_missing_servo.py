@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel import Layout
+from drivers.dynamixel import BlockLayout
 
 MakePaced = Callable[..., Any]
 BYTE_NS = 10_000
 READ_BYTES = {False: 30 + 16 * 21, True: 30 + 8 + 16 * 14}
-MORE_BYTES = {Layout.DIRECT: 0, Layout.INDIRECT: 16 * 6}
+MORE_BYTES = {BlockLayout.DIRECT: 0, BlockLayout.INDIRECT: 16 * 6}
 
 
 @pytest.mark.parametrize("sleeping", [False, True], ids=["watching", "sleeping"])
-@pytest.mark.parametrize("layout", [Layout.DIRECT, Layout.INDIRECT])
+@pytest.mark.parametrize("layout", [BlockLayout.DIRECT, BlockLayout.INDIRECT])
 @pytest.mark.parametrize("fast_sync", [False, True])
 @pytest.mark.parametrize("dead", [1, 2, 8, 15, 16])
 def test_the_other_fifteen_are_delivered_in_every_cycle_in_bounded_time(
-    make_paced: MakePaced, dead: int, fast_sync: bool, layout: Layout, sleeping: bool
+    make_paced: MakePaced, dead: int, fast_sync: bool, layout: BlockLayout, sleeping: bool
 ) -> None:
     bench = make_paced(fast_sync=fast_sync, layout=layout, health_every_cycles=5, sleeping=sleeping)
     bench.bus.connect()

@@ -1,11 +1,11 @@
 """Late ticks around a commit count by themselves; the computer's own stalls explain some."""
 
-from sim_twin.campaigns.commit_second import Look, commit_ns, explained, late_around
+from sim_twin.campaigns.commit_second import CommitLook, commit_ns, explained, late_around
 from sim_twin.stillness import Stall
 
 S = 1_000_000_000
 LOOKS = [
-    Look(now_ns=n * S // 10, late=0 if n < 22 else 3, phase="watch" if n >= 20 else "prepare")
+    CommitLook(now_ns=n * S // 10, late=0 if n < 22 else 3, phase="watch" if n >= 20 else "prepare")
     for n in range(60)
 ]
 

@@ -7,8 +7,8 @@ import pytest
 
 from sim_twin.campaigns import fault_matrix
 from sim_twin.campaigns.fault_matrix import Cell, cells, play
-from sim_twin.campaigns.phases import NotSet, Phase, Stage
-from sim_twin.campaigns.report import Case
+from sim_twin.campaigns.phases import NotSet, Phase, PhaseStage
+from sim_twin.campaigns.report import CampaignCase
 from sim_twin.campaigns.separation import Separation
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import faults_of
@@ -69,17 +69,17 @@ def test_whoever_comes_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.Monkey
 
 
 def test_a_stage_that_cannot_be_set_fails_its_case_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(stage: Stage, phase: Phase) -> None:
+    def refuse(stage: PhaseStage, phase: Phase) -> None:
         raise NotSet(f"{phase.value}: stopped")
 
-    monkeypatch.setattr(Stage, "begin", refuse)
+    monkeypatch.setattr(PhaseStage, "begin", refuse)
     case = play(CELLS["servo.left_elbow/off/idle"])
     assert case.failures == ("the stage could not be set: idle: stopped",)
 
 
 def test_a_case_that_never_stopped_has_no_way_to_rest_in_the_sum() -> None:
-    def case(name: str, rest_s: float | None, gap_m: float | None) -> Case:
-        return Case(name=name, figures={"rest_s": rest_s, "gap_m": gap_m})
+    def case(name: str, rest_s: float | None, gap_m: float | None) -> CampaignCase:
+        return CampaignCase(name=name, figures={"rest_s": rest_s, "gap_m": gap_m})
 
     cases = (case("a/driving", None, 0.04), case("b/driving", 0.4, None), case("c/idle", 0.1, 0.13))
     summary = fault_matrix._summary(cases)
@@ -91,7 +91,7 @@ def test_a_case_that_never_stopped_has_no_way_to_rest_in_the_sum() -> None:
 def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
     stack.add_senses()
-    stage = Stage(stack)
+    stage = PhaseStage(stack)
     stage.begin(Phase.DRIVING)
     engine = stack.lockstep.twin.engine
     separation = Separation(engine.model, engine.data)
@@ -104,7 +104,7 @@ def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
 def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
     stack.add_senses()
-    stage = Stage(stack)
+    stage = PhaseStage(stack)
     stage.begin(Phase.CARRYING)
     assert stage.holds_payload
     before_m = stack.lockstep.truth()["robot"]["x_m"], stack.lockstep.truth()["robot"]["y_m"]

@@ -9,7 +9,7 @@ from sim_twin.campaigns.kill_rules import (
     RULES,
     SIGNALS,
     WITH_A_FULL_HAND,
-    Moment,
+    KillMoment,
     injections,
 )
 
@@ -43,7 +43,7 @@ def test_the_same_seed_draws_the_same_and_another_one_others() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
     drawn = injections(20, seed, latest_s=3.0)
-    carrying = {(one.process, one.signal) for one in drawn if one.moment is Moment.CARRYING}
+    carrying = {(one.process, one.signal) for one in drawn if one.moment is KillMoment.CARRYING}
     pairs = {(one.process, one.signal) for one in drawn}
     assert len(pairs) == 20
     assert pairs >= set(GRAVEST)

@@ -8,16 +8,18 @@ import pytest
 
 from sim_twin.campaigns import __main__ as campaigns
 from sim_twin.campaigns import kills
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 
-REPORT = Report(campaign="faults", cases=(Case(name="servo_bus/off/idle", failures=("fell",)),))
+REPORT = CampaignReport(
+    campaign="faults", cases=(CampaignCase(name="servo_bus/off/idle", failures=("fell",)),)
+)
 
 
 @pytest.fixture
 def played(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
 
-    def play(options: argparse.Namespace, _tell: Callable[[str], None]) -> Report:
+    def play(options: argparse.Namespace, _tell: Callable[[str], None]) -> CampaignReport:
         names.append(options.campaign)
         return REPORT
 
@@ -77,10 +79,10 @@ def test_a_junit_file_that_cannot_be_is_refused_before_anything_is_played(
 def test_the_report_is_told_before_its_file_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def full(_report: Report, _path: Path) -> None:
+    def full(_report: CampaignReport, _path: Path) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr(Report, "write_junit", full)
+    monkeypatch.setattr(CampaignReport, "write_junit", full)
     with pytest.raises(OSError, match="no space left"):
         campaigns.main(["faults", "--junit", str(tmp_path / "x.xml")])
     assert "1 cases, 1 failed" in capsys.readouterr().out

@@ -6,14 +6,14 @@ from pathlib import Path
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from platforms.probes import open_probes
-from sim_twin.campaigns.pressed_scene import PROFILE, Scene
+from sim_twin.campaigns.pressed_scene import PROFILE, PressedScene
 from sim_twin.campaigns.troubles import TROUBLES
 from vla_deploy.supervisor.budgets.emergency import Emergencies, critical_trips_c
 
 
-def scene_in(folder: Path) -> Scene:
+def scene_in(folder: Path) -> PressedScene:
     """Return a scene without a robot."""
-    scene = Scene(MonotonicClock(), 0, small_disk=False, shifted_clock=False)
+    scene = PressedScene(MonotonicClock(), 0, small_disk=False, shifted_clock=False)
     scene.folder = folder
     scene.lay_out_board()
     return scene

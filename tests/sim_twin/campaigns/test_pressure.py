@@ -7,13 +7,13 @@ from dataclasses import replace
 import pytest
 
 from sim_twin.campaigns import pressure
-from sim_twin.campaigns.pressure_judge import Seen, judge, steps_of
-from sim_twin.campaigns.ticks import Ticks
+from sim_twin.campaigns.pressure_judge import TroubleSeen, judge, steps_of
+from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.campaigns.troubles import TROUBLES
 
 HOG = next(trouble for trouble in TROUBLES if trouble.name == "memory_hog")
-QUIET = Ticks(ticks=1000, late=2)
-GOOD = Seen(
+QUIET = TickWatch(ticks=1000, late=2)
+GOOD = TroubleSeen(
     taken=HOG.steps,
     undone=tuple(reversed(HOG.steps)),
     metrics_over=frozenset({"memory_mb"}),
@@ -49,9 +49,9 @@ def test_what_is_as_declared_has_no_fault() -> None:
         ({"steps_s": HOG.steps_s + 0.1}, "the last step"),
         ({"service_s": math.nan}, "full service"),
         ({"service_s": HOG.service_s + 0.1}, "full service"),
-        ({"during": Ticks(ticks=1000, late=13)}, "late during it"),
-        ({"after": Ticks(ticks=1000, late=13)}, "late after it"),
-        ({"during": Ticks(ticks=0, late=0)}, "late during it"),
+        ({"during": TickWatch(ticks=1000, late=13)}, "late during it"),
+        ({"after": TickWatch(ticks=1000, late=13)}, "late after it"),
+        ({"during": TickWatch(ticks=0, late=0)}, "late during it"),
         (
             {"states": {"armed": "", "protective_stop": "zone_stop"}},
             "control was protective_stop (zone_stop)",
@@ -68,9 +68,9 @@ def test_what_is_not_as_declared_is_told(changes: dict[str, object], word: str) 
 
 
 def test_a_computer_that_was_late_before_is_allowed_twice_that() -> None:
-    busy = Ticks(ticks=1000, late=100)
-    assert not faults(before=busy, during=Ticks(ticks=1000, late=200))
-    assert faults(before=busy, during=Ticks(ticks=1000, late=201))
+    busy = TickWatch(ticks=1000, late=100)
+    assert not faults(before=busy, during=TickWatch(ticks=1000, late=200))
+    assert faults(before=busy, during=TickWatch(ticks=1000, late=201))
 
 
 def test_steps_are_told_with_their_process_in_their_order() -> None:

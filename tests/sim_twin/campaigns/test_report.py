@@ -4,12 +4,14 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 
-GOOD = Case(name="servo_bus/off/idle", figures={"rest_s": 0.5}, seconds=3.5)
-BAD = Case(name="drive/stuck/driving", failures=("fall red_cup: 2, limit 1", "moved on"))
-SKIPPED = Case(name="disk_full", skipped="no small disk can be mounted")
-REPORT = Report(campaign="faults", cases=(GOOD, BAD, SKIPPED), summary={"longest_rest_s": 0.5})
+GOOD = CampaignCase(name="servo_bus/off/idle", figures={"rest_s": 0.5}, seconds=3.5)
+BAD = CampaignCase(name="drive/stuck/driving", failures=("fall red_cup: 2, limit 1", "moved on"))
+SKIPPED = CampaignCase(name="disk_full", skipped="no small disk can be mounted")
+REPORT = CampaignReport(
+    campaign="faults", cases=(GOOD, BAD, SKIPPED), summary={"longest_rest_s": 0.5}
+)
 
 
 def test_the_document_counts_and_carries_every_case() -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from sim_twin.campaigns.soak import (
     LEAST_JOBS_RATIO,
-    Sample,
     Soak,
+    SoakSample,
     fill_cache_of_small_arrays,
     growth,
     jobs_case,
@@ -38,10 +38,10 @@ def test_small_arrays_of_any_size_take_nothing_more_once_the_cache_is_full() -> 
     assert abs(_used_bytes() - before_bytes) < 4096
 
 
-def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample]:
+def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[SoakSample]:
     noise = np.random.default_rng(1).normal(0.0, 0.05, count)
     return [
-        Sample(
+        SoakSample(
             wall_h=n / count,
             sim_h=3.0 * n / count,
             memory_mib=200.0 + min(n, 5) * 10.0 + mib_per_h * 3.0 * n / count + noise[n],

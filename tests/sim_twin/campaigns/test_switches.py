@@ -11,20 +11,20 @@ from platforms import ProfileError, load_profile
 from sim_twin.campaigns import switches
 from sim_twin.campaigns.switch_judge import (
     MOST_MIB_PER_SWITCH,
-    Seen,
+    SwitchSeen,
     judge,
     memory_case,
     slopes,
     ticks_case,
 )
 from sim_twin.campaigns.switch_profiles import BAD, GOOD
-from sim_twin.campaigns.ticks import Ticks
+from sim_twin.campaigns.ticks import TickWatch
 
-KEPT = Seen(
+KEPT = SwitchSeen(
     outcome="kept",
     reason="",
     seconds=4.0,
-    ticks=Ticks(ticks=450, late=0),
+    ticks=TickWatch(ticks=450, late=0),
     least_rate_hz=100.0,
     moved_rad=1.0,
     states=frozenset({"armed"}),
@@ -32,7 +32,7 @@ KEPT = Seen(
 )
 
 
-def history(mib_per_switch: float, count: int = 100) -> list[Seen]:
+def history(mib_per_switch: float, count: int = 100) -> list[SwitchSeen]:
     noise = np.random.default_rng(1).normal(0.0, 0.1, count)
     return [
         replace(
@@ -56,7 +56,7 @@ def test_a_switch_that_is_kept_in_motion_has_no_fault() -> None:
         ({"outcome": "rolled back", "reason": "control: late"}, "rolled back (control: late)"),
         ({"states": frozenset({"armed", "stopped"})}, "control was stopped"),
         ({"states": frozenset()}, "control was never looked at"),
-        ({"ticks": Ticks(ticks=359, late=0)}, "359 ticks in 4.0 s, expected 360"),
+        ({"ticks": TickWatch(ticks=359, late=0)}, "359 ticks in 4.0 s, expected 360"),
         ({"moved_rad": 0.0}, "moved 0.000 rad"),
         ({"late_at_commit": 1}, "1 ticks late in the second around the commit"),
         ({"late_at_commit": 3, "explained_at_commit": 2}, "the computer explains 2"),
@@ -99,9 +99,9 @@ def test_too_few_switches_give_a_slope_and_say_that_it_is_not_judged() -> None:
 
 
 def test_late_ticks_are_judged_over_all_switches_against_those_before() -> None:
-    before = Ticks(ticks=1000, late=10)
-    few = [replace(KEPT, ticks=Ticks(ticks=500, late=n)) for n in (20, 0)]
-    many = [replace(KEPT, ticks=Ticks(ticks=500, late=n)) for n in (20, 1)]
+    before = TickWatch(ticks=1000, late=10)
+    few = [replace(KEPT, ticks=TickWatch(ticks=500, late=n)) for n in (20, 0)]
+    many = [replace(KEPT, ticks=TickWatch(ticks=500, late=n)) for n in (20, 1)]
     assert not ticks_case(before, few).failures
     assert ticks_case(before, many).failures == ("2.10% of the ticks late, limit 2.00%",)
 

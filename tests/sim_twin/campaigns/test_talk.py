@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.campaigns.talk import Talk
+from sim_twin.campaigns.talk import CommandTalk
 from vla_deploy.ipc import SharedSpace
 
 
@@ -31,7 +31,7 @@ class Room:
         self._events = self.space.ring_writer("task_event")
         writer = self.space.ring_writer("utterance")
         reader = self.space.ring_reader("task_event", from_start=False)
-        self.talk = Talk(writer, reader, self.clock)
+        self.talk = CommandTalk(writer, reader, self.clock)
 
     def say(self, text: str) -> str:
         self.talk.say(text)

@@ -13,9 +13,9 @@ from drivers.odrive.codec import (
     MESSAGES,
     AxisError,
     AxisState,
-    Command,
     ControlMode,
     InputMode,
+    OdriveCommand,
     SdoOpcode,
 )
 from drivers.odrive.endpoints import (
@@ -31,16 +31,16 @@ from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 NODE_ID = 3
 ENDPOINTS = read_endpoints(EMULATED_ENDPOINTS).endpoints
 TELLING = (
-    Command.GET_VERSION,
-    Command.HEARTBEAT,
-    Command.GET_ERROR,
-    Command.ADDRESS,
-    Command.GET_ENCODER_ESTIMATES,
-    Command.GET_IQ,
-    Command.GET_TEMPERATURE,
-    Command.GET_BUS_VOLTAGE_CURRENT,
-    Command.GET_TORQUES,
-    Command.GET_POWERS,
+    OdriveCommand.GET_VERSION,
+    OdriveCommand.HEARTBEAT,
+    OdriveCommand.GET_ERROR,
+    OdriveCommand.ADDRESS,
+    OdriveCommand.GET_ENCODER_ESTIMATES,
+    OdriveCommand.GET_IQ,
+    OdriveCommand.GET_TEMPERATURE,
+    OdriveCommand.GET_BUS_VOLTAGE_CURRENT,
+    OdriveCommand.GET_TORQUES,
+    OdriveCommand.GET_POWERS,
 )
 
 
@@ -100,7 +100,7 @@ class Host:
     def write(self, name: str, value: float) -> None:
         endpoint = ENDPOINTS[name]
         head = bytes((SdoOpcode.WRITE,)) + endpoint.number.to_bytes(2, "little") + b"\0"
-        self.send(Command.RX_SDO, head + endpoint.encode(value))
+        self.send(OdriveCommand.RX_SDO, head + endpoint.encode(value))
 
     def enable(self, velocity_rev_s: float = 0.0) -> None:
         self.tell("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
@@ -120,7 +120,7 @@ def host(dbc: Database) -> Iterator[Host]:
 
 
 @pytest.mark.parametrize("command", TELLING)
-def test_what_the_axis_tells_decodes_by_the_dbc(host: Host, command: Command) -> None:
+def test_what_the_axis_tells_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
     host.enable(1.0)
     host.pass_time(0.3)
     answer = host.ask(MESSAGES[command].name)
@@ -130,7 +130,7 @@ def test_what_the_axis_tells_decodes_by_the_dbc(host: Host, command: Command) ->
 
 def test_our_message_table_has_the_names_of_the_dbc(dbc: Database) -> None:
     for message in dbc.messages:
-        ours = MESSAGES[Command(message.frame_id)]
+        ours = MESSAGES[OdriveCommand(message.frame_id)]
         assert message.name == ours.name
         assert tuple(signal.name for signal in message.signals) == ours.signals
 
@@ -139,8 +139,8 @@ def test_heartbeats_and_estimates_come_at_their_rates(host: Host) -> None:
     host.heard("Heartbeat")
     host.pass_time(1.0)
     frames = [frame.arbitration_id & 0x1F for frame in iter(host.bus.recv, None)]
-    assert 10 <= frames.count(Command.HEARTBEAT) <= 11
-    assert 99 <= frames.count(Command.GET_ENCODER_ESTIMATES) <= 101
+    assert 10 <= frames.count(OdriveCommand.HEARTBEAT) <= 11
+    assert 99 <= frames.count(OdriveCommand.GET_ENCODER_ESTIMATES) <= 101
 
 
 def test_velocity_control_follows_and_tells_position_and_speed(host: Host) -> None:
@@ -225,7 +225,7 @@ def test_any_message_feeds_the_watchdog_and_silence_trips_it(host: Host) -> None
     host.enable(1.0)
     for _ in range(5):
         host.pass_time(0.08)
-        host.send(Command.GET_IQ, remote=True)
+        host.send(OdriveCommand.GET_IQ, remote=True)
     assert host.axis.axis_state is AxisState.CLOSED_LOOP_CONTROL
     host.pass_time(0.11)
     error = host.ask("Get_Error")
@@ -252,11 +252,11 @@ def test_a_reboot_disarms_and_forgets_what_was_not_saved(host: Host) -> None:
     host.tell("Reboot", Action=0)
     assert host.axis.axis_state is AxisState.IDLE
     number = ENDPOINTS[WATCHDOG_TIMEOUT].number.to_bytes(2, "little")
-    host.send(Command.RX_SDO, b"\0" + number + bytes(5))
+    host.send(OdriveCommand.RX_SDO, b"\0" + number + bytes(5))
     (answer,) = [
         bytes(frame.data)
         for frame in iter(host.bus.recv, None)
-        if frame.arbitration_id == NODE_ID << 5 | Command.TX_SDO
+        if frame.arbitration_id == NODE_ID << 5 | OdriveCommand.TX_SDO
     ]
     assert ENDPOINTS[WATCHDOG_TIMEOUT].decode(answer[4:]) == 3.0
 

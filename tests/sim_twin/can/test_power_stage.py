@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
+from sim_twin.can.power_stage import MotorSpec, PowerStage, ShaftEncoder, Trip
 
 SPEC = MotorSpec()
 STEP_S = 0.002
@@ -99,7 +99,7 @@ def test_a_stage_that_is_not_strained_never_trips(supply_v: float, torque_nm: fl
 
 
 def test_the_encoder_counts_whole_steps_and_reads_zero_without_edges() -> None:
-    encoder = Encoder(1000)
+    encoder = ShaftEncoder(1000)
     encoder.measure(1.0, 0.0)
     encoder.measure(1.0 + 2.4 * math.tau / 1000, 0.01)
     assert encoder.travelled == 2

@@ -13,7 +13,14 @@ from drivers.canopen import EDS_PATH
 from drivers.errors import WrongDevice
 from drivers.odrive import EMULATED_ENDPOINTS
 from platforms import load_profile
-from sim_twin.can import EmulatedDrive, MemoryBus, Mounting, ODriveAxis, WheelDrive, robot_drives
+from sim_twin.can import (
+    EmulatedDrive,
+    MemoryBus,
+    MotorMounting,
+    ODriveAxis,
+    WheelDrive,
+    robot_drives,
+)
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.power_stage import MotorSpec
 from vla_deploy.control.wheels import Wheels
@@ -109,11 +116,11 @@ def test_a_gear_changes_neither_the_torque_nor_the_speed_of_the_wheel(
     assert geared.current_limit_a == pytest.approx(hub.current_limit_a)
     no_load = [spec.supply_v / spec.torque_nm_per_a for spec in (hub, geared)]
     assert no_load[1] == pytest.approx(8.0 * no_load[0])
-    assert kind(1, Mounting(gear_ratio=8.0))._stage.spec == geared
+    assert kind(1, MotorMounting(gear_ratio=8.0))._stage.spec == geared
 
 
 def test_the_encoder_counts_the_motors_turns() -> None:
-    drive = WheelDrive(1, Mounting(counts_per_rev=1000, gear_ratio=5.0, sign=-1))
+    drive = WheelDrive(1, MotorMounting(counts_per_rev=1000, gear_ratio=5.0, sign=-1))
     drive.advance(0, 0.0, 0.0)
     drive.advance(2_000_000, math.tau, 0.0)
     assert drive._objects.get(0x6064) == -5000

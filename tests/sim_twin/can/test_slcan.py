@@ -15,7 +15,7 @@ from drivers.can_serial import SerialCanBus
 from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
-from sim_twin.can import Mounting, WheelDrive
+from sim_twin.can import MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.slcan import SlcanAdapter
 from sim_twin.pty_line import PtyLine
@@ -29,7 +29,7 @@ class AdapterWorld(FreeWheelWorld[WheelDrive]):
 
     def __init__(self, path: Path) -> None:
         super().__init__(
-            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, Mounting(sign=-1)))],
+            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, MotorMounting(sign=-1)))],
             time.monotonic_ns(),
         )
         self.line = PtyLine(SlcanAdapter(self.wire), path)

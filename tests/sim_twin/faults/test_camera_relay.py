@@ -5,7 +5,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from drivers.camera.protocol import Command, Intrinsics, encode_request
+from drivers.camera.protocol import CameraCommand, Intrinsics, encode_request
 from sim_twin.faults.camera_relay import NO_FAULTS, CameraBench, CameraFaults, faults_in_force
 from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
@@ -29,7 +29,7 @@ class Bench:
         self.line = line
         self.twin_side = FaultInjector(cast("Any", bench))
         self.camera_side = CameraFaults(bench)
-        self.device.receive(encode_request(Command.START, 10.0))
+        self.device.receive(encode_request(CameraCommand.START, 10.0))
 
     def frame(self) -> bytes:
         self.time_ns += PERIOD_NS

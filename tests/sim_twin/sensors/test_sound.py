@@ -6,7 +6,7 @@ import pytest
 from drivers.audio.base import AudioFormat, Samples
 from drivers.audio.pcm_protocol import PcmParser
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
-from sim_twin.errors import ModelMismatch
+from sim_twin.errors import TwinModelMismatch
 from sim_twin.lockstep import Lockstep
 from sim_twin.sensors.sound import MicrophoneDevice
 
@@ -76,5 +76,5 @@ def test_the_robot_hears_the_room_and_the_test_hears_the_robot(lockstep: Lockste
 
 def test_a_robot_without_a_device_has_none_in_the_twin(lockstep: Lockstep) -> None:
     lockstep.twin.streamed_devices.clear()
-    with pytest.raises(ModelMismatch, match="needs a microphone in the robot file"):
+    with pytest.raises(TwinModelMismatch, match="needs a microphone in the robot file"):
         _ = lockstep.twin.microphone

@@ -10,10 +10,10 @@ from training.detector import training  # noqa: E402
 from training.detector.classes import CLASSES  # noqa: E402
 from training.detector.dataset import Shard, shard_path  # noqa: E402
 from training.detector.network import CentreNet  # noqa: E402
-from training.detector.settings import Settings  # noqa: E402
+from training.detector.settings import DetectorSettings  # noqa: E402
 from training.detector.training import STATE, WEIGHTS, train  # noqa: E402
 
-SETTINGS = Settings(
+SETTINGS = DetectorSettings(
     name="test",
     shards=(("train", 3),),
     epochs=3,

@@ -16,7 +16,7 @@ from training.planner.going_on import NEW_SHARE, mean  # noqa: E402
 from training.planner.settings import SIZES  # noqa: E402
 from training.planner.training import train  # noqa: E402
 from vla_deploy.inference.language_model import LanguageModel  # noqa: E402
-from vla_deploy.inference.manifest import Language, Use  # noqa: E402
+from vla_deploy.inference.manifest import Language, LanguageUse  # noqa: E402
 from vla_deploy.inference.opening import PLAIN_CHOICE  # noqa: E402
 
 
@@ -26,7 +26,7 @@ def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells
     settings = dataclasses.replace(SIZES["tiny"], budget_s=1.5)
     network = train(tmp_path, settings)
     export(tmp_path, tmp_path / "model", settings.shape)
-    language = Language(use=Use.COMMAND_PARSER, most_tokens=160)
+    language = Language(use=LanguageUse.COMMAND_PARSER, most_tokens=160)
     model = LanguageModel(tmp_path / "model", language, PLAIN_CHOICE)
     command = Composer().example(Random(2)).command
     prompt = model.tokenizer.encode(

@@ -2,12 +2,12 @@ import numpy as np
 
 from training.speech.calibration import fit
 from training.speech.judging import Read
-from training.voices.clip import Clip
+from training.voices.clip import SpokenClip
 from vla_deploy.speech.transcript import Transcript, confidence
 
 
 def _read(text: str, log_probability: float) -> Read:
-    clip = Clip(text="red cup", engine="none", voice="", samples=np.zeros(1, np.float32))
+    clip = SpokenClip(text="red cup", engine="none", voice="", samples=np.zeros(1, np.float32))
     reading = Transcript(
         text=text,
         log_probability=log_probability,

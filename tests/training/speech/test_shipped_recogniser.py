@@ -12,9 +12,9 @@ from training.speech.sentences import normal
 from training.speech.shipping import BEAM, CARD, LEAST_CONFIDENCE, SHIPPED
 from training.speech.trials import heard, noises_alone
 from training.voices.cast import Speaker, say
-from training.voices.clip import Clip, Style
+from training.voices.clip import SpokenClip, Style
 from vla_deploy.inference.manifest_file import read_manifest
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.whispers import PLAIN_CHOICE
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 from vla_deploy.speech.transcript import confidence
@@ -27,13 +27,13 @@ COMMANDS = ("pick up the red cup and put it in the box", "go to the kitchen", "s
 
 @pytest.fixture(scope="module")
 def recogniser() -> Iterator[Recogniser]:
-    model = Model(manifest=read_manifest(SHIPPED), folder=SHIPPED, is_embedded=True)
+    model = StoredModel(manifest=read_manifest(SHIPPED), folder=SHIPPED, is_embedded=True)
     opened = open_recogniser(model, PLAIN_CHOICE, beam=BEAM, clock=MonotonicClock())
     yield opened
     opened.close()
 
 
-def by_espeak(text: str, seed: int, snr_db: float) -> Clip:
+def by_espeak(text: str, seed: int, snr_db: float) -> SpokenClip:
     """Return a text as eSpeak says it, heard in noise; the test is skipped where there is none."""
     try:
         ctypes.CDLL("libespeak-ng.so.1")

@@ -10,14 +10,14 @@ torch = pytest.importorskip("torch")
 
 from training.speech.sizes import SIZES  # noqa: E402
 from training.speech.training import BEFORE_FALL, WEIGHTS, train  # noqa: E402
-from training.voices.clip import Clip, Sound  # noqa: E402
+from training.voices.clip import Sound, SpokenClip  # noqa: E402
 from training.voices.clip_store import write_shard  # noqa: E402
 
 
-def _clips() -> list[Clip]:
+def _clips() -> list[SpokenClip]:
     random = np.random.default_rng(0)
     return [
-        Clip(
+        SpokenClip(
             text=text,
             engine="none",
             voice="noise",

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from training.stop_words.timing import sounding, word_times
-from training.voices.clip import RATE_HZ, Clip, Sound
+from training.voices.clip import RATE_HZ, Sound, SpokenClip
 
 
-def clip(text: str, phones: str = "", duration_s: float = 1.0) -> Clip:
+def clip(text: str, phones: str = "", duration_s: float = 1.0) -> SpokenClip:
     samples = np.zeros(round(duration_s * RATE_HZ), np.float32)
     samples[RATE_HZ // 10 : -RATE_HZ // 5] = 0.2
     sounds = tuple(
         Sound(phone=phone, began_s=0.1 * number) for number, phone in enumerate(phones.split())
     )
-    return Clip(text=text, engine="e", voice="v", samples=samples, sounds=sounds)
+    return SpokenClip(text=text, engine="e", voice="v", samples=samples, sounds=sounds)
 
 
 def test_a_word_lasts_from_its_first_sound_to_the_one_after_it() -> None:

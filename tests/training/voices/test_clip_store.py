@@ -3,12 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from training.voices.clip import Clip, Sound
+from training.voices.clip import Sound, SpokenClip
 from training.voices.clip_store import read_shard, shards, write_shard
 
 
-def _clip(text: str, count: int) -> Clip:
-    return Clip(
+def _clip(text: str, count: int) -> SpokenClip:
+    return SpokenClip(
         text=text,
         engine="espeak",
         voice="en",
@@ -27,7 +27,7 @@ def test_clips_come_back_as_they_were_stored(tmp_path: Path) -> None:
 
 
 def test_a_shard_that_was_broken_off_is_not_read_and_is_written_anew(tmp_path: Path) -> None:
-    def broken() -> "list[Clip]":
+    def broken() -> "list[SpokenClip]":
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -10,7 +10,7 @@ import pytest
 
 from training.voices import espeak, flite, kokoro, rhvoice
 from training.voices.cast import HELD_OUT_VARIANTS, ROBOTIC_VARIANTS, VARIANTS, Speaker, say
-from training.voices.clip import Clip, Style
+from training.voices.clip import SpokenClip, Style
 from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.phones import SILENCE
 
@@ -33,7 +33,7 @@ ENGINES = [
 ]
 
 
-def _phones(clip: Clip) -> list[str]:
+def _phones(clip: SpokenClip) -> list[str]:
     return [one.phone for one in clip.sounds if one.phone != SILENCE]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Question, question_of
+from vla_deploy.analysis.question import SceneQuestion, question_of
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Viewpoint
 
@@ -65,7 +65,7 @@ def thing() -> Callable[..., dict[str, Any]]:
 
 
 @pytest.fixture(scope="session")
-def ask() -> Callable[..., Question]:
+def ask() -> Callable[..., SceneQuestion]:
     """Return a question about things of the scene document."""
 
     def ask(
@@ -75,7 +75,7 @@ def ask() -> Callable[..., Question]:
         holding: dict[str, str | None] | None = None,
         image: np.ndarray | None = None,
         bystanders: tuple[dict[str, Any], ...] = (),
-    ) -> Question:
+    ) -> SceneQuestion:
         scene = {
             "stamp_ns": NOW_NS,
             "objects": list(things),

@@ -4,7 +4,7 @@ import pytest
 
 from vla_deploy.analysis.claims import ClaimedObject, ClaimedRelation, ClaimedTask, SceneClaims
 from vla_deploy.analysis.cross_check import weighed
-from vla_deploy.analysis.document import Feasible, Source
+from vla_deploy.analysis.document import EvidenceSource, Feasible
 
 
 def claim(name: str, **changes) -> ClaimedObject:
@@ -46,7 +46,10 @@ def by_id(analysis):
 
 def test_a_thing_not_recognised_gets_the_model_s_name_and_no_more_confidence_than_either(weigh):
     named = by_id(weigh(claim("remote control", id="object_1", colour="grey", confidence=0.6)))
-    assert (named["object_1"].name, named["object_1"].source) == ("remote control", Source.BOTH)
+    assert (named["object_1"].name, named["object_1"].source) == (
+        "remote control",
+        EvidenceSource.BOTH,
+    )
     assert named["object_1"].confidence == 0.6
     assert named["object_1"].graspable
 
@@ -54,18 +57,18 @@ def test_a_thing_not_recognised_gets_the_model_s_name_and_no_more_confidence_tha
 @pytest.mark.parametrize("name", ["cup", "coffee mug", "Red Mug"])
 def test_an_agreeing_name_is_vouched_for_by_both(weigh, name):
     cup = by_id(weigh(claim(name, id="cup_1")))["cup_1"]
-    assert (cup.name, cup.source, cup.confidence) == ("cup", Source.BOTH, 0.9)
+    assert (cup.name, cup.source, cup.confidence) == ("cup", EvidenceSource.BOTH, 0.9)
 
 
 def test_a_contradicting_name_costs_confidence_and_changes_nothing_else(weigh):
     cup = by_id(weigh(claim("bottle", id="cup_1")))["cup_1"]
-    assert (cup.name, cup.source, cup.confidence) == ("cup", Source.GEOMETRY, 0.45)
+    assert (cup.name, cup.source, cup.confidence) == ("cup", EvidenceSource.GEOMETRY, 0.45)
 
 
 def test_a_thing_that_was_not_measured_can_never_be_taken(weigh):
     extra = weigh(claim("golden key", side="left", confidence=1.0)).objects[-1]
     assert (extra.id, extra.graspable, extra.accessible) == (None, False, False)
-    assert (extra.source, extra.confidence) == (Source.MODEL, 0.3)
+    assert (extra.source, extra.confidence) == (EvidenceSource.MODEL, 0.3)
 
 
 @pytest.mark.parametrize("false_id", ["cup_7", "door_1", ""])
@@ -88,7 +91,7 @@ def test_an_id_claimed_twice_counts_once(weigh):
 def test_a_claim_without_id_is_matched_by_what_it_is_and_where(weigh):
     analysis = weigh(claim("mug"))
     assert len(analysis.objects) == 2
-    assert by_id(analysis)["cup_1"].source is Source.BOTH
+    assert by_id(analysis)["cup_1"].source is EvidenceSource.BOTH
 
 
 def test_relations_are_taken_only_where_nothing_was_measured(weigh):
@@ -99,7 +102,7 @@ def test_relations_are_taken_only_where_nothing_was_measured(weigh):
         )
     )  # fmt: skip
     analysis = weigh(claim("poster", side="left"), relations=relations)
-    added = [one for one in analysis.relations if one.source is Source.MODEL]
+    added = [one for one in analysis.relations if one.source is EvidenceSource.MODEL]
     assert [(one.subject, one.relation, one.other) for one in added] == [("poster", "in", "cup_1")]
 
 

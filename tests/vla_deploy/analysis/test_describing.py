@@ -1,6 +1,6 @@
 import pytest
 
-from vla_deploy.analysis.document import Distance, Side, Size, Source
+from vla_deploy.analysis.document import Distance, EvidenceSource, Side, SizeClass
 from vla_deploy.analysis.geometric import NO_POSE
 
 
@@ -14,9 +14,9 @@ def test_things_are_told_as_the_robot_sees_them(geometric, ask, thing):
     assert (told["cup_1"].side, told["cup_1"].distance) == (Side.CENTRE, Distance.NEAR)
     # The robot looks south: what lies to the east is on its left.
     assert (told["bottle_1"].side, told["box_1"].side) == (Side.LEFT, Side.RIGHT)
-    assert (told["cup_1"].size, told["box_1"].size) == (Size.SMALL, Size.MEDIUM)
+    assert (told["cup_1"].size, told["box_1"].size) == (SizeClass.SMALL, SizeClass.MEDIUM)
     assert (told["cup_1"].graspable, told["box_1"].graspable) == (True, False)
-    assert {one.source for one in told.values()} == {Source.GEOMETRY}
+    assert {one.source for one in told.values()} == {EvidenceSource.GEOMETRY}
     assert told["cup_1"].confidence == pytest.approx(0.9)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from vla_deploy.analysis.claims import SceneClaims
-from vla_deploy.analysis.document import Feasible, Source
+from vla_deploy.analysis.document import EvidenceSource, Feasible
 from vla_deploy.analysis.prompt import TEMPLATE, chat_about
 from vla_deploy.analysis.served import ServedAnalyser
 from vla_deploy.model_servers.exchange import Exchange
@@ -73,7 +73,7 @@ def test_a_model_names_what_was_measured(loopback, analyser, question):
     analysis = analyser().analyse(question)
     assert (analysis.analyser, analysis.notes) == ("server bench", ())
     named = analysis.objects[0]
-    assert (named.id, named.name, named.source) == ("object_1", "screwdriver", Source.BOTH)
+    assert (named.id, named.name, named.source) == ("object_1", "screwdriver", EvidenceSource.BOTH)
     content = loopback.heard[0].body["messages"][-1]["content"]
     jpeg = base64.b64decode(content[0]["image_url"]["url"].partition(",")[2])
     assert jpeg.startswith(b"\xff\xd8")

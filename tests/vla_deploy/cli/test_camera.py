@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.cli.camera_images import from_robot
 from vla_deploy.cli.main import main
-from vla_deploy.perception.camera_tools.board import Board
+from vla_deploy.perception.camera_tools.board import CalibrationBoard
 from vla_deploy.perception.lens import rays_of
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.robots.model import RobotModel, full_positions
 
 Array = NDArray[np.float64]
-BOARD = Board(square_m=0.055)
+BOARD = CalibrationBoard(square_m=0.055)
 LENS = Intrinsics(
     width=320, height=240, fx=221.0, fy=222.5, cx=157.0, cy=122.5, distortion=(-0.2, 0.05, 0, 0, 0)
 )

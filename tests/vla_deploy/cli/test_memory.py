@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.memory import Episode, LastSeen, MemoryStore, Outcome
+from vla_deploy.memory import Episode, EpisodeOutcome, LastSeen, MemoryStore
 from vla_deploy.memory.episode import unix_s
 
 Run = Callable[..., tuple[int, str]]
@@ -28,7 +28,9 @@ def memory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
         seen_s=told_s,
     )
     commands = ("go to the kitchen", "bring me the bottle")
-    episodes = [Episode(told_s=told_s, command=one, outcome=Outcome.SUCCEEDED) for one in commands]
+    episodes = [
+        Episode(told_s=told_s, command=one, outcome=EpisodeOutcome.SUCCEEDED) for one in commands
+    ]
     store.add(episodes, [keys])
     store.close()
 

@@ -7,7 +7,7 @@ import pytest
 from vla_deploy.control.commands import (
     Cancel,
     CommandRefused,
-    Goal,
+    JointGoal,
     Waypoints,
     motion_id_of,
     parse_command,
@@ -31,7 +31,7 @@ POINTS: dict[str, Any] = {
 
 def test_a_goal_names_its_joints_by_index() -> None:
     goal = parse_command({**GOAL, "effort_ratio": {"gripper": 0.25}}, INDEX)
-    assert isinstance(goal, Goal)
+    assert isinstance(goal, JointGoal)
     assert (goal.motion_id, goal.speed_ratio, goal.effort_ratio) == (4, 0.5, {2: 0.25})
     assert goal.axes.tolist() == [1, 2]
     assert goal.target.tolist() == [1.0, 0.02]

@@ -9,7 +9,7 @@ from vla_deploy.control.operator_desk import (
     LATCHED_BEFORE,
     LOST,
     MOST_WAITING,
-    Act,
+    OperatorAct,
     OperatorDesk,
 )
 from vla_deploy.ipc import RingWriter, SharedSpace
@@ -32,7 +32,11 @@ def test_acts_are_handed_out_one_by_one_in_order(ring: tuple[OperatorDesk, RingW
     ask(writer, "reset", "arm")
     desk.listen()
     assert desk.estop_source is None
-    assert [desk.next_act(), desk.next_act(), desk.next_act()] == [Act.RESET, Act.ARM, None]
+    assert [desk.next_act(), desk.next_act(), desk.next_act()] == [
+        OperatorAct.RESET,
+        OperatorAct.ARM,
+        None,
+    ]
 
 
 def test_an_estop_acts_for_one_tick_and_drops_what_came_before(
@@ -42,7 +46,7 @@ def test_an_estop_acts_for_one_tick_and_drops_what_came_before(
     ask(writer, "arm", "estop", "reset")
     desk.listen()
     assert desk.estop_source == "page"
-    assert [desk.next_act(), desk.next_act()] == [Act.RESET, None]
+    assert [desk.next_act(), desk.next_act()] == [OperatorAct.RESET, None]
     desk.listen()
     assert desk.estop_source is None
 
@@ -77,7 +81,10 @@ def test_whoever_floods_the_desk_delays_nobody_for_long(
         ask(writer, "arm")
         desk.listen()
     assert desk.complaint == f"arm from page was dropped: {MOST_WAITING} acts wait already"
-    assert [desk.next_act() for _ in range(MOST_WAITING + 1)] == [*[Act.ARM] * MOST_WAITING, None]
+    assert [desk.next_act() for _ in range(MOST_WAITING + 1)] == [
+        *[OperatorAct.ARM] * MOST_WAITING,
+        None,
+    ]
 
 
 def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorDesk, RingWriter]) -> None:
@@ -142,4 +149,4 @@ def test_a_long_history_that_control_had_seen_is_no_loss(tmp_path: Path) -> None
     ask(space.ring_writer("operator"), "arm")
     desk.listen()
     assert desk.estop_source is None
-    assert desk.next_act() is Act.ARM
+    assert desk.next_act() is OperatorAct.ARM

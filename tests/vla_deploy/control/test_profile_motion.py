@@ -8,7 +8,7 @@ import ruckig
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.control.axes import AxisLimits, AxisState, Floats
+from vla_deploy.control.axes import AxesState, AxisLimits, Floats
 from vla_deploy.control.profile_motion import MotionProfile, plan_motion, plan_stop
 
 LIMITS = AxisLimits(
@@ -16,11 +16,11 @@ LIMITS = AxisLimits(
 )
 
 
-def state(position: Any, velocity: Any = 0.0, acceleration: Any = 0.0) -> AxisState:
+def state(position: Any, velocity: Any = 0.0, acceleration: Any = 0.0) -> AxesState:
     p, v, a = np.broadcast_arrays(
         np.atleast_1d(np.asarray(position, dtype=float)), velocity, acceleration
     )
-    return AxisState(position=p.copy(), velocity=v.astype(float), acceleration=a.astype(float))
+    return AxesState(position=p.copy(), velocity=v.astype(float), acceleration=a.astype(float))
 
 
 def single(velocity: float, acceleration: float, jerk: float) -> AxisLimits:
@@ -29,7 +29,7 @@ def single(velocity: float, acceleration: float, jerk: float) -> AxisLimits:
     )
 
 
-def ruckig_duration_s(start: AxisState, target: float, limits: AxisLimits) -> float:
+def ruckig_duration_s(start: AxesState, target: float, limits: AxisLimits) -> float:
     problem = ruckig.InputParameter(1)
     problem.current_position = start.position.tolist()
     problem.current_velocity = start.velocity.tolist()
@@ -62,7 +62,7 @@ distance = st.floats(min_value=-4.0, max_value=4.0).filter(lambda d: d == 0.0 or
 ratio = st.floats(min_value=-0.95, max_value=0.95)
 
 
-def moving_start(limits: AxisLimits, speed: float, pull: float) -> AxisState:
+def moving_start(limits: AxisLimits, speed: float, pull: float) -> AxesState:
     start = state(0.3, speed * limits.velocity[0], pull * limits.acceleration[0])
     v, a = float(start.velocity[0]), float(start.acceleration[0])
     assume(abs(v + a * abs(a) / (2.0 * limits.jerk[0])) <= limits.velocity[0])

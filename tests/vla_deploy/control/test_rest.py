@@ -5,18 +5,18 @@ from typing import Any as Rig  # the class in conftest.py, which no test can imp
 
 import pytest
 
-from vla_deploy.control.rest import TURN_ON_NS, Rest
+from vla_deploy.control.rest import TURN_ON_NS, Standstill
 from vla_deploy.control.wheels import Wheels
 
 
 def test_rest_is_reached_at_once_where_the_wheels_stand() -> None:
-    rest = Rest()
+    rest = Standstill()
     assert not rest.reached(0, setpoints_rest=False, wheels_still=True)
     assert rest.reached(1, setpoints_rest=True, wheels_still=True)
 
 
 def test_wheels_that_turn_on_hold_rest_up_for_a_bounded_time() -> None:
-    rest = Rest()
+    rest = Standstill()
     turning: dict[str, Any] = {"setpoints_rest": True, "wheels_still": False}
     assert not rest.reached(5, **turning)
     assert not rest.reached(5 + TURN_ON_NS - 1, **turning)
@@ -24,7 +24,7 @@ def test_wheels_that_turn_on_hold_rest_up_for_a_bounded_time() -> None:
 
 
 def test_the_time_counts_anew_after_each_motion() -> None:
-    rest = Rest()
+    rest = Standstill()
     assert not rest.reached(0, setpoints_rest=True, wheels_still=False)
     assert not rest.reached(TURN_ON_NS, setpoints_rest=False, wheels_still=False)
     assert not rest.reached(TURN_ON_NS + 1, setpoints_rest=True, wheels_still=False)

@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.control.axes import AxisLimits, AxisState
+from vla_deploy.control.axes import AxesState, AxisLimits
 from vla_deploy.control.trajectory import Trajectory, TrajectoryRefused, plan_trajectory
 
 JOINTS = ("shoulder", "elbow")
 LIMITS = AxisLimits(velocity=np.full(2, 2.0), acceleration=np.full(2, 8.0), jerk=np.full(2, 80.0))
-REST = AxisState(position=np.zeros(2), velocity=np.zeros(2), acceleration=np.zeros(2))
+REST = AxesState(position=np.zeros(2), velocity=np.zeros(2), acceleration=np.zeros(2))
 TIMES = [0.0, 1.0, 2.0, 3.5]
 POINTS = [[0.0, 0.0], [0.4, -0.2], [0.8, 0.1], [1.0, 0.5]]
 
 
-def plan(times: Any = TIMES, points: Any = POINTS, start: AxisState = REST) -> Trajectory:
+def plan(times: Any = TIMES, points: Any = POINTS, start: AxesState = REST) -> Trajectory:
     return plan_trajectory(
         JOINTS,
         np.array(times, dtype=float),
@@ -42,7 +42,7 @@ def test_velocity_and_acceleration_are_continuous_at_the_points() -> None:
 
 
 def test_it_starts_with_the_present_velocity_and_ends_at_rest() -> None:
-    moving = AxisState(
+    moving = AxesState(
         position=np.array([0.01, -0.01]), velocity=np.array([0.3, 0.0]), acceleration=np.zeros(2)
     )
     trajectory = plan(start=moving)

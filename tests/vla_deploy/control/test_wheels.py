@@ -9,7 +9,7 @@ import pytest
 from drivers.errors import DeviceMissing, WrongDevice
 from drivers.odrive import EMULATED_ENDPOINTS
 from platforms import load_profile
-from sim_twin.can import MemoryBus, Mounting, WheelDrive
+from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive import ODriveAxis
@@ -25,7 +25,9 @@ class Bench:
 
     def __init__(self, protocol: str) -> None:
         kind = DRIVES[protocol]
-        self.world = FreeWheelWorld([FreeWheel(kind(1)), FreeWheel(kind(2, Mounting(sign=-1)))])
+        self.world = FreeWheelWorld(
+            [FreeWheel(kind(1)), FreeWheel(kind(2, MotorMounting(sign=-1)))]
+        )
         self.missing = False
         butler = load_robot("butler")
         wiring = replace(butler.can_bus, protocol=protocol, endpoints_path=EMULATED_ENDPOINTS)

@@ -7,8 +7,8 @@ import pytest
 
 from platforms import ModelChoice, ProcessSettings, load_profile
 from platforms.board import identify
-from platforms.tree import Missing, Tree
-from vla_deploy.doctor import Context, Finding
+from platforms.tree import Tree, ValueMissing
+from vla_deploy.doctor import DoctorContext, DoctorFinding
 from vla_deploy.doctor.context import UNLIMITED, Rights
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import load_robot
@@ -85,11 +85,11 @@ class Computer:
 
     def ask(self, command: Sequence[str]) -> str:
         if command[0] not in self.answers:
-            raise Missing(f"`{command[0]}` is not installed")
+            raise ValueMissing(f"`{command[0]}` is not installed")
         return self.answers[command[0]]
 
-    def context(self, profile: str = "desktop", *, robot: str | None = None) -> Context:
-        return Context(
+    def context(self, profile: str = "desktop", *, robot: str | None = None) -> DoctorContext:
+        return DoctorContext(
             tree=Tree(self.root),
             is_live=True,
             board=identify(self.root),
@@ -107,7 +107,7 @@ def computer(tmp_path: Path) -> Computer:
     return Computer(tmp_path)
 
 
-def without_rights(context: Context) -> Context:
+def without_rights(context: DoctorContext) -> DoctorContext:
     return replace(
         context,
         rights=Rights(
@@ -122,10 +122,10 @@ def without_rights(context: Context) -> Context:
 
 
 @pytest.fixture
-def stripped() -> Callable[[Context], Context]:
+def stripped() -> Callable[[DoctorContext], DoctorContext]:
     return without_rights
 
 
-def one(findings: Sequence[Finding]) -> Finding:
+def one(findings: Sequence[DoctorFinding]) -> DoctorFinding:
     assert len(findings) == 1
     return findings[0]

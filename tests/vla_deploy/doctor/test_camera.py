@@ -1,14 +1,14 @@
 from dataclasses import replace
 
 from vla_deploy.doctor.camera import camera_calibration
-from vla_deploy.doctor.finding import Level
+from vla_deploy.doctor.finding import FindingLevel
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.description import LensCalibration, Mounting
+from vla_deploy.robots.description import CameraMounting, LensCalibration
 
 
 def test_a_camera_that_was_never_measured_is_told_with_the_command(computer) -> None:
     findings = list(camera_calibration(computer.context(robot="butler")))
-    assert [one.level for one in findings] == [Level.WARN, Level.WARN]
+    assert [one.level for one in findings] == [FindingLevel.WARN, FindingLevel.WARN]
     assert [one.remedy.split()[2] for one in findings] == ["calibrate", "hand-eye"]
     assert list(camera_calibration(computer.context())) == []
 
@@ -23,7 +23,7 @@ def test_a_measured_camera_is_told_with_date_and_error(computer) -> None:
         made_at="2026-11-22",
         tool="",
     )
-    mounting = Mounting(
+    mounting = CameraMounting(
         site=robot.camera.site,
         model=robot.camera.model,
         focal_px=robot.camera.focal_px,
@@ -35,7 +35,7 @@ def test_a_measured_camera_is_told_with_date_and_error(computer) -> None:
     camera = replace(robot.camera, lens=lens, mounting=mounting)
     context = replace(computer.context(), robot=replace(robot, camera=camera))
     first, second = camera_calibration(context)
-    assert (first.level, second.level) == (Level.OK, Level.OK)
+    assert (first.level, second.level) == (FindingLevel.OK, FindingLevel.OK)
     assert "2026-11-22" in first.measured
     assert "0.21 px" in first.measured
     assert "5.0 mm" in second.measured

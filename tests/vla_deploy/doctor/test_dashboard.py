@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from vla_deploy.doctor import dashboard as check
-from vla_deploy.doctor.finding import Level
+from vla_deploy.doctor.finding import FindingLevel
 from vla_deploy.runtime.state_dir import config_dir_of
 
 
@@ -34,17 +34,17 @@ def ports():
 def test_a_taken_port_is_told_with_the_command_that_finds_who_has_it(findings, ports):
     found = findings(f"port = {ports[0]}\nstop_port = {ports[1]}")
     for name, port in zip(("dashboard, page", "dashboard, stop door"), ports, strict=True):
-        assert found[name].level is Level.WARN
+        assert found[name].level is FindingLevel.WARN
         assert found[name].remedy == f"sudo ss -ltnp 'sport = :{port}'"
 
 
 def test_faults_of_the_file_are_told(findings):
     found = findings("port = 0")["dashboard"]
-    assert (found.level, "expected a port" in found.measured) == (Level.FAIL, True)
+    assert (found.level, "expected a port" in found.measured) == (FindingLevel.FAIL, True)
 
 
 def test_passwords_in_the_clear_are_warned_of_where_others_reach_the_page(findings):
-    assert findings('host = "0.0.0.0"')["dashboard, TLS"].level is Level.WARN
+    assert findings('host = "0.0.0.0"')["dashboard, TLS"].level is FindingLevel.WARN
     assert "dashboard, TLS" not in findings('host = "127.0.0.1"')
 
 
@@ -52,4 +52,4 @@ def test_a_certificate_that_cannot_be_read_is_told(findings, tmp_path):
     (tmp_path / "cert.pem").touch()
     text = f'tls_certificate = "{tmp_path}/cert.pem"\ntls_key = "{tmp_path}/key.pem"'
     found = findings(text)["dashboard, TLS"]
-    assert (found.level, "key.pem: No such file" in found.measured) == (Level.FAIL, True)
+    assert (found.level, "key.pem: No such file" in found.measured) == (FindingLevel.FAIL, True)

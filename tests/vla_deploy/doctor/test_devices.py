@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.doctor import Level
+from vla_deploy.doctor import FindingLevel
 from vla_deploy.doctor.devices import can_link, device_files, latency_timers, sound
 from vla_deploy.robots import load_robot
 
@@ -15,16 +15,19 @@ TIMER = "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
 
 def test_without_a_robot_its_devices_are_not_judged(computer) -> None:
     (finding,) = device_files(computer.context())
-    assert (finding.level, finding.remedy) == (Level.MISSING, "vla-deploy doctor --robot butler")
+    assert (finding.level, finding.remedy) == (
+        FindingLevel.MISSING,
+        "vla-deploy doctor --robot butler",
+    )
     assert list(can_link(computer.context())) == []
 
 
 def test_a_device_that_is_there_is_fine_and_others_fail(computer) -> None:
     computer.write(SERVOS)
     levels = {one.name: one.level for one in device_files(computer.context(robot="butler"))}
-    assert levels.pop("servos") is Level.OK
+    assert levels.pop("servos") is FindingLevel.OK
     assert levels
-    assert set(levels.values()) == {Level.FAIL}
+    assert set(levels.values()) == {FindingLevel.FAIL}
 
 
 def in_group(name: str) -> Any:
@@ -41,20 +44,25 @@ def test_a_device_that_we_may_not_open_names_its_group(computer, monkeypatch) ->
 
     monkeypatch.setattr(os, "access", only_there)
     findings = {one.name: one for one in device_files(computer.context(robot="butler"))}
-    assert findings["servos"].level is Level.FAIL
+    assert findings["servos"].level is FindingLevel.FAIL
     assert findings["servos"].remedy.startswith("sudo usermod -aG dialout $USER")
     assert findings["estop"].remedy.startswith("sudo usermod -aG input $USER")
 
 
 @pytest.mark.parametrize(
     ("text", "level"),
-    [("1\n", Level.OK), ("2\n", Level.WARN), ("16\n", Level.FAIL), ("soon\n", Level.MISSING)],
+    [
+        ("1\n", FindingLevel.OK),
+        ("2\n", FindingLevel.WARN),
+        ("16\n", FindingLevel.FAIL),
+        ("soon\n", FindingLevel.MISSING),
+    ],
 )
 def test_the_latency_timer_is_judged_by_the_control_period(computer, text, level) -> None:
     computer.write(TIMER, text)
     (finding,) = latency_timers(computer.context())
     assert finding.level is level
-    if level in (Level.WARN, Level.FAIL):
+    if level in (FindingLevel.WARN, FindingLevel.FAIL):
         assert finding.remedy == f"echo 1 | sudo tee {TIMER}"
 
 
@@ -84,17 +92,17 @@ def link(**changes: Any) -> str:
 @pytest.mark.parametrize(
     ("answer", "level", "words"),
     [
-        (link(), Level.OK, "ERROR-ACTIVE at 1000000 bit/s"),
-        (link(kind="vcan"), Level.OK, "virtual"),
-        (link(bittiming={"bitrate": 500_000}), Level.FAIL, "500000 bit/s, expected 1000000"),
-        (link(state="ERROR-PASSIVE"), Level.WARN, "ERROR-PASSIVE"),
-        (link(state="BUS-OFF"), Level.WARN, "BUS-OFF"),
-        (link().replace('"UP", ', ""), Level.FAIL, "can0 is down"),
-        ("[]", Level.MISSING, "tells nothing of can0"),
-        ("[{}]", Level.MISSING, "tells nothing of can0"),
-        ("[[]]", Level.MISSING, "tells nothing of can0"),
-        ("not json", Level.MISSING, "tells nothing of can0"),
-        ('[{"linkinfo": [], "flags": 3}]', Level.MISSING, "tells nothing of can0"),
+        (link(), FindingLevel.OK, "ERROR-ACTIVE at 1000000 bit/s"),
+        (link(kind="vcan"), FindingLevel.OK, "virtual"),
+        (link(bittiming={"bitrate": 500_000}), FindingLevel.FAIL, "500000 bit/s, expected 1000000"),
+        (link(state="ERROR-PASSIVE"), FindingLevel.WARN, "ERROR-PASSIVE"),
+        (link(state="BUS-OFF"), FindingLevel.WARN, "BUS-OFF"),
+        (link().replace('"UP", ', ""), FindingLevel.FAIL, "can0 is down"),
+        ("[]", FindingLevel.MISSING, "tells nothing of can0"),
+        ("[{}]", FindingLevel.MISSING, "tells nothing of can0"),
+        ("[[]]", FindingLevel.MISSING, "tells nothing of can0"),
+        ("not json", FindingLevel.MISSING, "tells nothing of can0"),
+        ('[{"linkinfo": [], "flags": 3}]', FindingLevel.MISSING, "tells nothing of can0"),
     ],
 )
 def test_the_can_link_is_judged_by_state_and_bit_rate(computer, answer, level, words) -> None:
@@ -103,17 +111,17 @@ def test_the_can_link_is_judged_by_state_and_bit_rate(computer, answer, level, w
     (finding,) = can_link(computer.context(robot="butler"))
     assert finding.level is level
     assert words in finding.measured
-    if level in (Level.WARN, Level.FAIL):
+    if level in (FindingLevel.WARN, FindingLevel.FAIL):
         assert "ip link set can0 up type can bitrate 1000000" in finding.remedy
 
 
 def test_a_can_link_that_is_not_there_fails(computer) -> None:
     (finding,) = can_link(computer.context(robot="butler"))
-    assert (finding.level, finding.measured) == (Level.FAIL, "there is no link can0")
+    assert (finding.level, finding.measured) == (FindingLevel.FAIL, "there is no link can0")
     assert finding.remedy == "ip -details link   # is it plugged in?"
 
 
 def test_sound_cards_are_found_by_their_name(computer) -> None:
     computer.write("/proc/asound/cards", " 1 [Array]: USB-Audio - ReSpeaker 4 Mic Array\n")
     levels = {one.name: one.level for one in sound(computer.context(robot="butler"))}
-    assert levels == {"microphone": Level.OK, "speaker": Level.WARN}
+    assert levels == {"microphone": FindingLevel.OK, "speaker": FindingLevel.WARN}

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from platforms import load_profile
-from platforms.tree import Missing
+from platforms.tree import ValueMissing
 from vla_deploy.cli.main import main
 from vla_deploy.doctor import (
     CHECKS,
-    Finding,
-    Level,
+    DoctorFinding,
+    FindingLevel,
     Section,
     as_document,
     as_text,
@@ -36,7 +36,7 @@ COLUMNS = 100
 BoardTree = Callable[[str], Path]
 
 
-def all_findings(sections: tuple[Section, ...]) -> list[Finding]:
+def all_findings(sections: tuple[Section, ...]) -> list[DoctorFinding]:
     return [finding for section in sections for finding in section.findings]
 
 
@@ -57,7 +57,7 @@ def test_every_trouble_has_a_remedy_and_every_line_fits(board_tree: BoardTree, t
     sections = examined(board_tree(tree))
     for finding in all_findings(sections):
         assert finding.measured
-        assert finding.remedy or finding.level in (Level.OK, Level.MISSING)
+        assert finding.remedy or finding.level in (FindingLevel.OK, FindingLevel.MISSING)
     for line in as_text(sections).splitlines():
         assert len(line) <= COLUMNS
 
@@ -65,7 +65,7 @@ def test_every_trouble_has_a_remedy_and_every_line_fits(board_tree: BoardTree, t
 def test_an_empty_root_is_examined(tmp_path: Path) -> None:
     findings = all_findings(examined(tmp_path))
     assert len(findings) >= len(CHECKS) - 2
-    assert sum(finding.level is Level.MISSING for finding in findings) > len(CHECKS) / 2
+    assert sum(finding.level is FindingLevel.MISSING for finding in findings) > len(CHECKS) / 2
 
 
 @pytest.mark.parametrize("garbage", GARBAGE)
@@ -95,33 +95,35 @@ def test_files_that_are_folders_or_gone_are_examined(board_tree: BoardTree, seed
 def test_a_check_that_breaks_does_not_end_the_examination(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(_: object) -> Iterator[Finding]:
+    def broken(_: object) -> Iterator[DoctorFinding]:
         raise ZeroDivisionError("no such number")
         yield
 
     checks = (Check("Power", "fan", broken), *CHECKS)
     monkeypatch.setattr(table, "CHECKS", checks)
     first, *others = all_findings(examined(tmp_path))
-    assert (first.name, first.level) == ("fan", Level.WARN)
+    assert (first.name, first.level) == ("fan", FindingLevel.WARN)
     assert first.measured == "the check itself broke: ZeroDivisionError: no such number"
     assert len(others) >= len(CHECKS) - 2
 
 
-def sections_of(*levels: Level) -> tuple[Section, ...]:
+def sections_of(*levels: FindingLevel) -> tuple[Section, ...]:
     findings = tuple(
-        Finding(name=f"check {number}", level=level, measured="1 W", remedy="true   # a comment")
+        DoctorFinding(
+            name=f"check {number}", level=level, measured="1 W", remedy="true   # a comment"
+        )
         for number, level in enumerate(levels)
     )
     return (Section(topic="Power", findings=findings),)
 
 
 def test_only_a_failure_makes_the_examination_fail() -> None:
-    assert succeeded(sections_of(Level.OK, Level.WARN, Level.MISSING))
-    assert not succeeded(sections_of(Level.OK, Level.FAIL))
+    assert succeeded(sections_of(FindingLevel.OK, FindingLevel.WARN, FindingLevel.MISSING))
+    assert not succeeded(sections_of(FindingLevel.OK, FindingLevel.FAIL))
 
 
 def test_the_document_holds_every_finding_and_the_counts() -> None:
-    document = as_document(sections_of(Level.OK, Level.FAIL, Level.FAIL))
+    document = as_document(sections_of(FindingLevel.OK, FindingLevel.FAIL, FindingLevel.FAIL))
     assert document["ok"] is False
     assert document["counts"] == {"ok": 1, "warn": 0, "fail": 2, "missing": 0}
     assert document["findings"][1] == {
@@ -135,8 +137,10 @@ def test_the_document_holds_every_finding_and_the_counts() -> None:
 
 def test_a_long_remedy_is_kept_whole_and_its_comment_moves_below() -> None:
     remedy = "x" * 90 + "   # and then"
-    (section,) = sections_of(Level.WARN)
-    finding = Finding(name="name", level=Level.WARN, measured="long " * 40, remedy=remedy)
+    (section,) = sections_of(FindingLevel.WARN)
+    finding = DoctorFinding(
+        name="name", level=FindingLevel.WARN, measured="long " * 40, remedy=remedy
+    )
     lines = as_text((Section(topic=section.topic, findings=(finding,)),)).splitlines()
     assert any(line.endswith("x" * 90) for line in lines)
     assert any(line.strip() == "and then" for line in lines)
@@ -196,9 +200,9 @@ def test_the_readings_are_printed_for_people_and_as_json(
 
 
 def test_a_command_that_fails_or_is_not_there_is_missing() -> None:
-    with pytest.raises(Missing, match="no-such-command"):
+    with pytest.raises(ValueMissing, match="no-such-command"):
         ask_command(("no-such-command",))
-    with pytest.raises(Missing, match="says: broken"):
+    with pytest.raises(ValueMissing, match="says: broken"):
         ask_command((sys.executable, "-c", "raise SystemExit('broken')"))
     assert ask_command((sys.executable, "-c", "print(7)")) == "7\n"
 

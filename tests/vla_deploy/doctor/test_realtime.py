@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from platforms.tree import Missing
-from vla_deploy.doctor import Level
+from platforms.tree import ValueMissing
+from vla_deploy.doctor import FindingLevel
 from vla_deploy.doctor import realtime as checks
 from vla_deploy.doctor.context import UNLIMITED
 
-PROFILES = (("desktop", Level.WARN), ("robot", Level.FAIL))
+PROFILES = (("desktop", FindingLevel.WARN), ("robot", FindingLevel.FAIL))
 MS = 1_000_000
 
 
@@ -30,16 +30,16 @@ def test_granted_rights_are_fine(computer) -> None:
     context = computer.context("robot")
     (fifo,) = checks.fifo(context)
     (lock,) = checks.memory_lock(context)
-    assert (fifo.level, lock.level) == (Level.OK, Level.OK)
+    assert (fifo.level, lock.level) == (FindingLevel.OK, FindingLevel.OK)
 
 
 @pytest.mark.parametrize(
     ("limit", "may_lock_all", "level"),
     [
-        (512 << 20, False, Level.OK),
-        ((512 << 20) - 1, False, Level.FAIL),
-        (0, True, Level.OK),
-        (UNLIMITED, False, Level.OK),
+        (512 << 20, False, FindingLevel.OK),
+        ((512 << 20) - 1, False, FindingLevel.FAIL),
+        (0, True, FindingLevel.OK),
+        (UNLIMITED, False, FindingLevel.OK),
     ],
 )
 def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_all, level) -> None:
@@ -49,7 +49,9 @@ def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_
     assert finding.level is level
 
 
-@pytest.mark.parametrize(("allowed", "level"), [(True, Level.OK), (False, Level.WARN)])
+@pytest.mark.parametrize(
+    ("allowed", "level"), [(True, FindingLevel.OK), (False, FindingLevel.WARN)]
+)
 def test_serial_data_waits_where_kernel_workers_may_not_be_raised(computer, allowed, level) -> None:
     context = computer.context("robot")
     rights = replace(context.rights, may_raise_others=allowed)
@@ -60,9 +62,9 @@ def test_serial_data_waits_where_kernel_workers_may_not_be_raised(computer, allo
 @pytest.mark.parametrize(
     ("version", "profile", "level"),
     [
-        ("Linux version 5.15.148-rt SMP PREEMPT_RT", "robot", Level.OK),
-        ("Linux version 5.15.148-tegra SMP PREEMPT", "robot", Level.WARN),
-        ("Linux version 6.8.0 SMP PREEMPT_DYNAMIC", "desktop", Level.OK),
+        ("Linux version 5.15.148-rt SMP PREEMPT_RT", "robot", FindingLevel.OK),
+        ("Linux version 5.15.148-tegra SMP PREEMPT", "robot", FindingLevel.WARN),
+        ("Linux version 6.8.0 SMP PREEMPT_DYNAMIC", "desktop", FindingLevel.OK),
     ],
 )
 def test_preempt_rt_matters_where_the_profile_is_real_time(
@@ -76,9 +78,9 @@ def test_preempt_rt_matters_where_the_profile_is_real_time(
 @pytest.mark.parametrize(
     ("runtime_us", "level", "words"),
     [
-        ("950000", Level.OK, "95 %"),
-        ("-1", Level.OK, "no limit"),
-        ("0", Level.FAIL, "no real-time process may run"),
+        ("950000", FindingLevel.OK, "95 %"),
+        ("-1", FindingLevel.OK, "no limit"),
+        ("0", FindingLevel.FAIL, "no real-time process may run"),
     ],
 )
 def test_the_real_time_share_is_told(computer, runtime_us, level, words) -> None:
@@ -89,7 +91,9 @@ def test_the_real_time_share_is_told(computer, runtime_us, level, words) -> None
     assert words in finding.measured
 
 
-@pytest.mark.parametrize(("runtime_ns", "level"), [("50000000", Level.WARN), ("0", Level.OK)])
+@pytest.mark.parametrize(
+    ("runtime_ns", "level"), [("50000000", FindingLevel.WARN), ("0", FindingLevel.OK)]
+)
 def test_a_fair_server_that_may_hold_control_up_is_told(computer, runtime_ns, level) -> None:
     for core in ("cpu0", "cpu1"):
         computer.write(f"{checks.FAIR_SERVER}/{core}/runtime", "0")
@@ -100,7 +104,7 @@ def test_a_fair_server_that_may_hold_control_up_is_told(computer, runtime_ns, le
 
 
 def test_a_kernel_that_hides_its_fair_server_is_not_judged(computer) -> None:
-    with pytest.raises(Missing, match="fair_server/cpu0/runtime"):
+    with pytest.raises(ValueMissing, match="fair_server/cpu0/runtime"):
         list(checks.fair_server(computer.context("robot")))
 
 
@@ -117,30 +121,34 @@ def test_group_scheduling_is_found_wherever_the_kernel_tells_it(
 ) -> None:
     computer.write("/proc/sys/kernel/osrelease", "5.15.148-tegra\n")
     (before,) = checks.group_scheduling(stripped(computer.context()))
-    assert before.level is Level.MISSING
+    assert before.level is FindingLevel.MISSING
     computer.write(path).write_bytes(content)
     (finding,) = checks.group_scheduling(stripped(computer.context()))
-    assert finding.level is Level.WARN
+    assert finding.level is FindingLevel.WARN
     (granted,) = checks.group_scheduling(computer.context())
-    assert granted.level is Level.OK
+    assert granted.level is FindingLevel.OK
 
 
 def test_a_damaged_kernel_configuration_harms_nothing(computer) -> None:
     computer.write("/proc/config.gz").write_bytes(b"\x1f\x8b garbage")
     (finding,) = checks.group_scheduling(computer.context())
-    assert finding.level is Level.MISSING
+    assert finding.level is FindingLevel.MISSING
 
 
 def test_group_scheduling_is_off_only_where_the_kernel_says_so(computer) -> None:
     options = gzip.compress(b"CONFIG_SMP=y\n# CONFIG_RT_GROUP_SCHED is not set\n", mtime=0)
     computer.write("/proc/config.gz").write_bytes(options)
     (finding,) = checks.group_scheduling(computer.context())
-    assert (finding.level, finding.measured) == (Level.OK, "off")
+    assert (finding.level, finding.measured) == (FindingLevel.OK, "off")
 
 
 @pytest.mark.parametrize(
     ("late_ms", "desktop", "real_time"),
-    [(0.0, Level.OK, Level.OK), (0.8, Level.OK, Level.OK), (0.9, Level.WARN, Level.FAIL)],
+    [
+        (0.0, FindingLevel.OK, FindingLevel.OK),
+        (0.8, FindingLevel.OK, FindingLevel.OK),
+        (0.9, FindingLevel.WARN, FindingLevel.FAIL),
+    ],
 )
 def test_wake_ups_are_judged_by_their_lateness(computer, late_ms, desktop, real_time) -> None:
     for profile, level in (("desktop", desktop), ("robot", real_time)):
@@ -155,7 +163,7 @@ def test_one_late_wake_up_in_two_hundred_and_fifty_is_told_but_not_judged(comput
     context = computer.context()
     context.clock.late_ns = lambda number: 40 * MS if number == 100 else 0
     (finding,) = checks.wake_up(context)
-    assert finding.level is Level.OK
+    assert finding.level is FindingLevel.OK
     assert "worst 40.00 ms" in finding.measured
 
 

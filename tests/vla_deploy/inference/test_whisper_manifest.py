@@ -7,9 +7,9 @@ import pytest
 
 from vla_deploy.inference.errors import ManifestInvalid, ModelFileSpoiled
 from vla_deploy.inference.file_check import check_parts
-from vla_deploy.inference.manifest import Calibration, Context, Manifest, ModelFile, Whisper
+from vla_deploy.inference.manifest import Calibration, EncoderContext, Manifest, ModelFile, Whisper
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 
 PARTS = ("model.bin", "config.json", "vocabulary.json", "tokenizer.json")
 
@@ -26,7 +26,7 @@ def manifest_of(paths: tuple[str, ...] = PARTS, role: str = "speech_to_text") ->
         ),
         whisper=Whisper(
             languages=("en",),
-            context=Context.TRIMMED,
+            context=EncoderContext.TRIMMED,
             calibration=Calibration(bias=3, log_probability=4.5, no_speech=-3, compression=-2),
         ),
     )
@@ -74,7 +74,7 @@ def test_a_whisper_plays_no_other_role(folder: Path) -> None:
 
 
 def test_a_half_written_part_is_found(folder: Path) -> None:
-    model = Model(manifest=manifest_of(), folder=folder, is_embedded=False)
+    model = StoredModel(manifest=manifest_of(), folder=folder, is_embedded=False)
     check_parts(model)
     (folder / "model.bin").write_text("model.b")
     with pytest.raises(ModelFileSpoiled, match=r"model\.bin.*add the model again"):

@@ -10,7 +10,7 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.cli.main import main
-from vla_deploy.install import Credential, InstallError, Layout, ServiceChoice, system_files
+from vla_deploy.install import Credential, InstallError, InstallLayout, ServiceChoice, system_files
 from vla_deploy.install.commands import before_uninstall
 from vla_deploy.install.errors import TemplateBroken
 from vla_deploy.install.files import filled
@@ -35,7 +35,7 @@ SERVICES = (
 
 def texts(choice: ServiceChoice | None = None, **robot: object) -> dict[str, str]:
     changed = replace(ROBOT, **robot)  # type: ignore[arg-type]
-    files = system_files(changed, PROFILE, choice or ServiceChoice(), Layout())
+    files = system_files(changed, PROFILE, choice or ServiceChoice(), InstallLayout())
     return {file.path.name: file.text for file in files}
 
 
@@ -47,7 +47,7 @@ def units(tmp_path_factory: pytest.TempPathFactory) -> Path:
     program.parent.mkdir(parents=True)
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
-    layout = Layout(prefix=root / "opt")
+    layout = InstallLayout(prefix=root / "opt")
     for file in system_files(ROBOT, PROFILE, ServiceChoice(), layout):
         inside = file.path.is_relative_to(root)
         path = file.path if inside else root / file.path.relative_to("/")
@@ -113,7 +113,7 @@ def test_the_robot_may_ask_for_a_power_mode_where_the_board_has_modes() -> None:
 
 
 def test_a_template_of_units_is_not_stopped_by_its_name() -> None:
-    files = system_files(ROBOT, PROFILE, ServiceChoice(), Layout())
+    files = system_files(ROBOT, PROFILE, ServiceChoice(), InstallLayout())
     (command,) = before_uninstall(file.path for file in files)
     assert "vla-deploy-power.socket" in command
     assert not [word for word in command if "@" in word]

@@ -12,7 +12,7 @@ import pytest
 
 from vla_deploy.cli.main import main
 from vla_deploy.install.errors import InstallError, ReleaseRefused
-from vla_deploy.install.release_build import Source, add_release, version_of
+from vla_deploy.install.release_build import ReleaseSource, add_release, version_of
 from vla_deploy.install.release_store import ReleaseStore
 
 ROOT = Path(__file__).parents[3]
@@ -91,7 +91,7 @@ def test_a_wheel_that_cannot_be_installed_becomes_no_release(tmp_path: Path) -> 
     wheel.write_bytes(b"no archive")
     store = ReleaseStore(tmp_path / "prefix")
     with pytest.raises(InstallError, match="pip"):
-        add_release(store, "new", Source(wheel=wheel, wheelhouse=tmp_path))
+        add_release(store, "new", ReleaseSource(wheel=wheel, wheelhouse=tmp_path))
     assert store.ids() == ()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.cli.main import main
-from vla_deploy.install import Layout
+from vla_deploy.install import InstallLayout
 from vla_deploy.install.service_profile import service_profile, slice_too_small
 
 CHOSEN, OTHER = "jetson_orin_nano_8gb", "jetson_orin_nx"
@@ -41,16 +41,16 @@ def test_on_this_computer_the_choice_is_the_services_own(
 ) -> None:
     choose(tmp_path / "library", CHOSEN)
     monkeypatch.setattr("vla_deploy.runtime.state_dir._ROOT_LIBRARY", tmp_path / "library")
-    assert service_profile("", Layout()).name == CHOSEN
+    assert service_profile("", InstallLayout()).name == CHOSEN
 
 
 def test_a_chosen_file_is_looked_for_inside_the_image(tmp_path: Path) -> None:
     choose(tmp_path / "var/lib/vla-deploy", "/etc/mine.toml")
-    assert service_profile("", Layout(root=tmp_path)).name == str(tmp_path / "etc/mine.toml")
+    assert service_profile("", InstallLayout(root=tmp_path)).name == str(tmp_path / "etc/mine.toml")
 
 
 def test_a_profile_larger_than_the_installed_slice_is_told(tmp_path: Path) -> None:
-    layout, large = Layout(root=tmp_path), load_profile("desktop")
+    layout, large = InstallLayout(root=tmp_path), load_profile("desktop")
     assert slice_too_small(large, layout) == ""  # nothing is installed
     slice_file = tmp_path / "etc/systemd/system/vla-deploy.slice"
     slice_file.parent.mkdir(parents=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.install.errors import CommandFailed, ReleaseRefused
+from vla_deploy.install.errors import ReleaseRefused, SystemCommandFailed
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import ServiceState, trouble_within
-from vla_deploy.install.switch import NEXT, End, Step, Switch, SwitchPlan, recover
+from vla_deploy.install.switch import NEXT, End, Switch, SwitchPlan, SwitchStep, recover
 
 GUARD = Path(__file__).parents[3] / "systemd" / "release-guard"
 TROUBLES = (
@@ -46,7 +46,7 @@ class RecordedService:
         self.started.append(self._store.current())
         self._asked = 0
         if self._fails.get(self.started[-1]) == "start":
-            raise CommandFailed("`systemctl restart vla-deploy.service` ended with 1")
+            raise SystemCommandFailed("`systemctl restart vla-deploy.service` ended with 1")
 
     def state(self) -> ServiceState:
         self._asked += 1
@@ -86,9 +86,9 @@ def guard(prefix: Path) -> None:
 
 
 def test_every_step_leads_somewhere_and_every_end_is_reached() -> None:
-    assert set(NEXT) == set(Step)
+    assert set(NEXT) == set(SwitchStep)
     reached = {follower for pair in NEXT.values() for follower in pair}
-    assert reached == (set(Step) | set(End)) - {Step.CHECK}
+    assert reached == (set(SwitchStep) | set(End)) - {SwitchStep.CHECK}
 
 
 def test_a_good_release_is_used_and_the_one_before_is_remembered(store: ReleaseStore) -> None:
@@ -136,26 +136,28 @@ def test_a_service_that_is_down_with_either_release_is_reported(store: ReleaseSt
     assert (report.end, report.current, len(report.failures)) == (End.DOWN, "old", 2)
 
 
-@pytest.mark.parametrize("step", [step for step in Step if not step.name.endswith("_BACK")])
-def test_a_step_that_fails_ends_with_a_release_that_works(store: ReleaseStore, step: Step) -> None:
+@pytest.mark.parametrize("step", [step for step in SwitchStep if not step.name.endswith("_BACK")])
+def test_a_step_that_fails_ends_with_a_release_that_works(
+    store: ReleaseStore, step: SwitchStep
+) -> None:
     def fail() -> None:
         raise OSError(28, "No space left on device")
 
     switch = switch_of(store)
     switch.do[step] = fail
     report = switch.run()
-    assert report.current == ("new" if step is Step.PRUNE else "old")
+    assert report.current == ("new" if step is SwitchStep.PRUNE else "old")
     assert store.trial() is None
     assert "No space left on device" in report.failures[0]
 
 
-CUT = [(step, after) for step in Step for after in (False, True)]
+CUT = [(step, after) for step in SwitchStep for after in (False, True)]
 
 
 @pytest.mark.parametrize(("step", "after"), CUT)
 @pytest.mark.parametrize("is_reboot", [False, True], ids=["killed", "power cut"])
 def test_a_switch_cut_off_at_any_step_is_ended_by_the_next_start(
-    store: ReleaseStore, step: Step, after: bool, is_reboot: bool
+    store: ReleaseStore, step: SwitchStep, after: bool, is_reboot: bool
 ) -> None:
     fails = {"new": "later"} if step.name.endswith("_BACK") else {}
     child = os.fork()
@@ -170,7 +172,7 @@ def test_a_switch_cut_off_at_any_step_is_ended_by_the_next_start(
     if is_reboot:
         (store.prefix / "boot").write_text("boot-2\n")
     guard(store.prefix)
-    kept = step is Step.PRUNE or (step is Step.CONFIRM and after)
+    kept = step is SwitchStep.PRUNE or (step is SwitchStep.CONFIRM and after)
     assert store.current() == ("new" if kept else "old")
     assert store.trial() is None
     assert (store.folder(store.current()) / "bin" / "vla-deploy").exists()

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.install import Layout
+from vla_deploy.install import InstallLayout
 from vla_deploy.install.tools import missing_tools
 
 
-class Here(Layout):
+class Here(InstallLayout):
     """Take a folder for this computer."""
 
     is_this_computer = True

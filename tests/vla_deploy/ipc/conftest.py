@@ -3,25 +3,29 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.ipc import Field, Kind, SharedSpace, Topic
+from vla_deploy.ipc import PackedField, SharedSpace, Topic, TopicKind
 
 TOPICS = (
     Topic(
         name="pair",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="a",
         summary="two numbers and three",
-        fields=(Field("x_m", "f8"), Field("count", "u4"), Field("values", "f4", 3)),
+        fields=(
+            PackedField("x_m", "f8"),
+            PackedField("count", "u4"),
+            PackedField("values", "f4", 3),
+        ),
     ),
     Topic(
         name="note",
-        kind=Kind.CELL,
+        kind=TopicKind.CELL,
         owner="a",
         summary="a text",
-        fields=(Field("document", "json", 200),),
+        fields=(PackedField("document", "json", 200),),
     ),
-    Topic(name="acts", kind=Kind.RING, owner="any", summary="events", slots=8, slot_bytes=128),
-    Topic(name="view", kind=Kind.FRAME, owner="a", summary="images", slots=3, slot_bytes=96),
+    Topic(name="acts", kind=TopicKind.RING, owner="any", summary="events", slots=8, slot_bytes=128),
+    Topic(name="view", kind=TopicKind.FRAME, owner="a", summary="images", slots=3, slot_bytes=96),
 )
 
 

@@ -1,8 +1,8 @@
 import pytest
 
-from vla_deploy.ipc import BadPayload, Kind, SharedSpace, Topic
+from vla_deploy.ipc import BadPayload, SharedSpace, Topic, TopicKind
 
-TOPIC = Topic(name="log", kind=Kind.RECORD, owner="a", summary="bytes", slots=8, slot_bytes=16)
+TOPIC = Topic(name="log", kind=TopicKind.RECORD, owner="a", summary="bytes", slots=8, slot_bytes=16)
 
 
 @pytest.fixture

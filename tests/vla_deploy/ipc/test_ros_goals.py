@@ -12,7 +12,7 @@ from vla_deploy.ipc.ros_goals import (
     GoalKind,
     GoalRequest,
     GoalState,
-    GoalUnreadable,
+    RosGoalUnreadable,
     read_answer,
     read_request,
 )
@@ -68,13 +68,13 @@ def test_a_long_text_is_cut() -> None:
     ],
 )
 def test_a_request_out_of_bounds_is_refused(changed: dict[str, Any], words: str) -> None:
-    with pytest.raises(GoalUnreadable, match=words):
+    with pytest.raises(RosGoalUnreadable, match=words):
         read_request(request(**changed).document())
 
 
 @pytest.mark.parametrize("document", [{}, {"kind": "fly"}, {"kind": "navigate_to_pose"}])
 def test_what_is_no_request_is_refused(document: dict[str, Any]) -> None:
-    with pytest.raises(GoalUnreadable):
+    with pytest.raises(RosGoalUnreadable):
         read_request(document)
 
 

@@ -7,11 +7,11 @@ import pytest
 
 from vla_deploy.ipc import (
     TOPICS,
-    Field,
-    Kind,
+    PackedField,
     SchemaMismatch,
     SharedSpace,
     SpaceUnavailable,
+    TopicKind,
     UnknownTopic,
 )
 from vla_deploy.ipc.layout import is_document, layout_of, record_dtype
@@ -22,7 +22,7 @@ PLACE = BY_NAME["pose"]
 
 def test_another_layout_of_a_topic_is_refused_with_what_to_do(tmp_path, clock):
     SharedSpace(tmp_path, clock, [PLACE]).cell_writer("pose")
-    newer = dataclasses.replace(PLACE, fields=(*PLACE.fields, Field("z_m", "f8")))
+    newer = dataclasses.replace(PLACE, fields=(*PLACE.fields, PackedField("z_m", "f8")))
     with pytest.raises(SchemaMismatch, match=r"pose\.cell: topic pose .*stop every process"):
         SharedSpace(tmp_path, clock, [newer]).cell_reader("pose")
 
@@ -99,13 +99,13 @@ def test_a_topic_of_another_kind_is_refused(tmp_path, clock, opener):
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
 def test_every_declared_topic_opens_for_writing_and_reading(tmp_path, clock, topic):
     space = SharedSpace(tmp_path, clock)
-    if topic.kind is Kind.RING:
+    if topic.kind is TopicKind.RING:
         space.ring_writer(topic.name).publish({"ok": 1})
         assert space.ring_reader(topic.name, from_start=True).drain()[0].payload == {"ok": 1}
-    elif topic.kind is Kind.FRAME:
+    elif topic.kind is TopicKind.FRAME:
         space.frame_writer(topic.name).put(bytes(topic.slot_bytes), width=1, height=1, stamp_ns=1)
         assert len(space.frame_reader(topic.name).latest().payload) == topic.slot_bytes
-    elif topic.kind is Kind.RECORD:
+    elif topic.kind is TopicKind.RECORD:
         space.record_writer(topic.name).append(b"ok")
         assert space.record_reader(topic.name).held()[0].payload == b"ok"
     elif is_document(topic):

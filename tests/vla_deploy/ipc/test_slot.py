@@ -2,10 +2,10 @@ import mmap
 
 import pytest
 
-from vla_deploy.ipc.layout import Layout
+from vla_deploy.ipc.layout import SlotLayout
 from vla_deploy.ipc.slot import SlotReader, SlotWriter
 
-LAYOUT = Layout(slots=3, capacity_bytes=64, stride_bytes=128)
+LAYOUT = SlotLayout(slots=3, capacity_bytes=64, stride_bytes=128)
 
 
 class RacingMap(mmap.mmap):

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.control.operator_desk import Act, OperatorDesk
+from vla_deploy.control.operator_desk import OperatorAct, OperatorDesk
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.stop_button import StopButton
@@ -94,7 +94,7 @@ def test_a_press_waits_for_no_writer_that_is_frozen_in_the_middle(
     frozen.publish({"act": "arm", "source": "cli", "reason": ""})
     space.ring_writer("operator").publish({"act": "reset", "source": "cli", "reason": ""})
     desk.listen()
-    assert desk.next_act() is Act.RESET
+    assert desk.next_act() is OperatorAct.RESET
 
 
 def test_a_writer_that_is_frozen_as_it_tells_of_its_event_does_not_take_the_press_back(

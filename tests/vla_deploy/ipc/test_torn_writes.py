@@ -6,23 +6,27 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.ipc import Field, Kind, SharedSpace, Topic
+from vla_deploy.ipc import PackedField, SharedSpace, Topic, TopicKind
 from vla_deploy.ipc.layout import file_name, layout_of
 
 WORD_BYTES = 8
 NEWEST_OFFSET = 96
 NUMBER = Topic(
     name="number",
-    kind=Kind.CELL,
+    kind=TopicKind.CELL,
     owner="a",
     summary="the same number in every field",
-    fields=(Field("first", "f8"), Field("second", "u4"), Field("more", "f8", 6)),
+    fields=(PackedField("first", "f8"), PackedField("second", "u4"), PackedField("more", "f8", 6)),
 )
 NOTE = Topic(
-    name="note", kind=Kind.CELL, owner="a", summary="n", fields=(Field("document", "json", 64),)
+    name="note",
+    kind=TopicKind.CELL,
+    owner="a",
+    summary="n",
+    fields=(PackedField("document", "json", 64),),
 )
-ACTS = Topic(name="acts", kind=Kind.RING, owner="any", summary="n", slots=4, slot_bytes=64)
-VIEW = Topic(name="view", kind=Kind.FRAME, owner="a", summary="n", slots=4, slot_bytes=64)
+ACTS = Topic(name="acts", kind=TopicKind.RING, owner="any", summary="n", slots=4, slot_bytes=64)
+VIEW = Topic(name="view", kind=TopicKind.FRAME, owner="a", summary="n", slots=4, slot_bytes=64)
 OLD, BEFORE, NEW = 5, 8, 9  # OLD and NEW share a slot, BEFORE is the last whole one
 reuse_fixtures = settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vla_deploy.manipulation.errors import Unreachable
+from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import RobotDescription, load_robot
@@ -108,7 +108,7 @@ def test_the_mirror_image_is_solved_by_the_other_arm(
 def test_a_point_beyond_the_arm_is_refused_with_the_distance_missing(
     arms: dict[str, ArmKinematics], tuck: np.ndarray
 ) -> None:
-    with pytest.raises(Unreachable, match=r"left hand cannot reach x 1\.200") as caught:
+    with pytest.raises(PostureUnreachable, match=r"left hand cannot reach x 1\.200") as caught:
         arms["left"].solve(hand_down((1.2, 0.2, 0.5), 0.0), tuck)
 
     assert 0.2 < caught.value.position_error_m < 1.2
@@ -137,7 +137,7 @@ def test_a_straight_line_through_the_unreachable_is_refused(
 ) -> None:
     start = arms["left"].solve(hand_down((0.45, 0.15, 0.5), 0.0), tuck).positions
 
-    with pytest.raises(Unreachable):
+    with pytest.raises(PostureUnreachable):
         arms["left"].straight_line(start, hand_down((0.95, 0.15, 0.5), 0.0))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.memory import MemoryStore, Outcome
+from vla_deploy.memory import EpisodeOutcome, MemoryStore
 from vla_deploy.memory.keeper import AGAIN_S, MOST_OPEN, MOST_THINGS, MemoryKeeper
 from vla_deploy.runtime.executors import InlineExecutor
 
@@ -97,7 +97,7 @@ def test_a_command_is_remembered_from_its_words_to_its_end(desk: Desk) -> None:
     (kept,) = desk.store.newest()
     assert (kept.command, kept.outcome, kept.rung) == (
         "put the cup in the box",
-        Outcome.SUCCEEDED,
+        EpisodeOutcome.SUCCEEDED,
         "rules",
     )
     assert (kept.goal, kept.plan, kept.source) == (PLAN["goal"], PLAN, "cli")
@@ -107,13 +107,23 @@ def test_a_command_is_remembered_from_its_words_to_its_end(desk: Desk) -> None:
 @pytest.mark.parametrize(
     ("event", "details", "outcome", "error"),
     [
-        ("rejected", {"reason": "I know no such place"}, Outcome.REFUSED, "I know no such place"),
-        ("finished", {"success": False, "error": "it slipped"}, Outcome.FAILED, "it slipped"),
-        ("answered", {"of": "c0"}, Outcome.SUCCEEDED, ""),
+        (
+            "rejected",
+            {"reason": "I know no such place"},
+            EpisodeOutcome.REFUSED,
+            "I know no such place",
+        ),
+        (
+            "finished",
+            {"success": False, "error": "it slipped"},
+            EpisodeOutcome.FAILED,
+            "it slipped",
+        ),
+        ("answered", {"of": "c0"}, EpisodeOutcome.SUCCEEDED, ""),
     ],
 )
 def test_every_end_is_remembered(
-    desk: Desk, event: str, details: dict[str, Any], outcome: Outcome, error: str
+    desk: Desk, event: str, details: dict[str, Any], outcome: EpisodeOutcome, error: str
 ) -> None:
     desk.say("go to the moon")
     desk.tell(event, **details)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.memory import Episode, LastSeen, MemoryStore, MemoryUnusable, Outcome
+from vla_deploy.memory import Episode, EpisodeOutcome, LastSeen, MemoryStore, MemoryUnusable
 from vla_deploy.memory.errors import NoSuchEpisode
 
-DONE = Episode(told_s=1000.0, command="bring me the bottle", outcome=Outcome.SUCCEEDED)
+DONE = Episode(told_s=1000.0, command="bring me the bottle", outcome=EpisodeOutcome.SUCCEEDED)
 KEYS = LastSeen(
     run_id="run-1",
     thing_id="keys_1",
@@ -40,7 +40,7 @@ def test_an_episode_comes_back_as_it_was_with_its_number(store: MemoryStore) -> 
     failed = Episode(
         told_s=5.5,
         command="fetch the cup",
-        outcome=Outcome.FAILED,
+        outcome=EpisodeOutcome.FAILED,
         source="voice",
         goal="the cup is with the person",
         reasoning="it stands on the table",
@@ -76,7 +76,7 @@ def test_what_fits_nothing_calls_nothing_up(store: MemoryStore, question: str) -
 
 
 def test_an_error_is_found_by_its_words_too(store: MemoryStore) -> None:
-    store.add([replace(DONE, outcome=Outcome.FAILED, error="a chair stood in the doorway")])
+    store.add([replace(DONE, outcome=EpisodeOutcome.FAILED, error="a chair stood in the doorway")])
     assert store.recall("what was wrong with the doorway")[0].episode.error.startswith("a chair")
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.memory import Episode, LastSeen, Outcome
+from vla_deploy.memory import Episode, EpisodeOutcome, LastSeen
 from vla_deploy.memory.wording import ago, place_words, sentence_of
 
 
@@ -22,7 +22,9 @@ def test_how_long_ago_something_was(elapsed_s: float, words: str) -> None:
 
 
 def test_an_episode_in_a_sentence() -> None:
-    failed = Episode(told_s=0.0, command="go", outcome=Outcome.FAILED, error="the way is blocked")
+    failed = Episode(
+        told_s=0.0, command="go", outcome=EpisodeOutcome.FAILED, error="the way is blocked"
+    )
     said = sentence_of(failed, 120.0)
     assert said == '2 minutes ago I was told "go" and it failed: the way is blocked.'
 

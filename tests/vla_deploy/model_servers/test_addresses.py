@@ -3,7 +3,7 @@ import socket
 import pytest
 
 from vla_deploy.model_servers.addresses import check_address, resolve
-from vla_deploy.model_servers.errors import PrivacyRefused, TimedOut, Unreachable
+from vla_deploy.model_servers.errors import PrivacyRefused, ServerUnreachable, TimedOut
 
 
 @pytest.mark.parametrize(
@@ -77,6 +77,6 @@ def test_an_unknown_host_is_unreachable(monkeypatch, host):
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(socket, "getaddrinfo", offline)
-    with pytest.raises(Unreachable) as found:
+    with pytest.raises(ServerUnreachable) as found:
         resolve(host, 9, 2.0)
     assert not found.value.was_sent

@@ -5,15 +5,15 @@ import pytest
 from pydantic import BaseModel, ConfigDict
 
 from vla_deploy.model_servers.asking import StructuredAsker
-from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.model_servers.errors import (
     AnswerEmpty,
     AnswerInvalid,
     AnswerMalformed,
     AnswerRefused,
     AnswerTruncated,
-    RequestRefused,
     ServerFailed,
+    ServerRefused,
 )
 
 
@@ -23,7 +23,7 @@ class Colour(BaseModel):
     colour: Literal["red", "green"]
 
 
-CHAT = Chat(system="be brief", messages=(Message(text="which colour?"),))
+CHAT = Chat(system="be brief", messages=(ChatMessage(text="which colour?"),))
 RED = json.dumps({"colour": "red"})
 
 
@@ -67,7 +67,7 @@ def test_the_last_way_is_to_ask_in_words(loopback, asker):
 
 def test_a_server_that_refuses_every_way_is_told(loopback, asker):
     loopback.then(loopback.sends(400, {"error": "no"}))
-    with pytest.raises(RequestRefused, match="no"):
+    with pytest.raises(ServerRefused, match="no"):
         asker.ask(CHAT)
     assert (len(loopback.heard), asker.rung) == (3, "json_schema")
 
@@ -82,13 +82,13 @@ def test_a_failure_after_a_way_has_proven_right_changes_nothing(loopback, asker)
 
 def test_a_wrong_key_is_no_reason_to_ask_otherwise(loopback, asker):
     loopback.then(loopback.sends(401, b""))
-    with pytest.raises(RequestRefused, match="key"):
+    with pytest.raises(ServerRefused, match="key"):
         asker.ask(CHAT)
     assert (asker.rung, len(loopback.heard)) == ("json_schema", 1)
 
 
 def test_a_wrong_shape_is_sent_back_once_with_its_faults_and_without_images(loopback, open_server):
-    picture = Chat(messages=(Message(text="which colour?", images=(b"jpeg",)),))
+    picture = Chat(messages=(ChatMessage(text="which colour?", images=(b"jpeg",)),))
     loopback.then(loopback.says('{"colour": "blue"}'), loopback.says(RED))
     asker = StructuredAsker(open_server(loopback.url, vision=True), Colour)
     assert asker.ask(picture).colour == "red"

@@ -4,7 +4,7 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from vla_deploy.model_servers.chat import Chat, Message, Role
+from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.table import FORMATS
@@ -29,9 +29,9 @@ SCHEMA = Things.model_json_schema()
 CHAT = Chat(
     system="be brief",
     messages=(
-        Message(text="what is it?", images=(JPEG,)),
-        Message(role=Role.ASSISTANT, text="a cup"),
-        Message(text="sure?"),
+        ChatMessage(text="what is it?", images=(JPEG,)),
+        ChatMessage(role=ChatRole.ASSISTANT, text="a cup"),
+        ChatMessage(text="sure?"),
     ),
     schema=SCHEMA,
     schema_name="things",

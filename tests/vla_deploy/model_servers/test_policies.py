@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.model_servers.admission import Admission
 from vla_deploy.model_servers.backoff import Backoff, may_pass
 from vla_deploy.model_servers.breaker import BreakerState, CircuitBreaker
-from vla_deploy.model_servers.chat import Chat, Completion, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerInvalid,
@@ -16,15 +16,15 @@ from vla_deploy.model_servers.errors import (
     CircuitOpen,
     PrivacyRefused,
     ServerFailed,
+    ServerUnreachable,
     TimedOut,
-    Unreachable,
 )
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.privacy import check_privacy
 from vla_deploy.model_servers.rate import CallRate
 
-TEXT = Chat(messages=(Message(text="hello"),))
-IMAGE = Chat(messages=(Message(text="what is it?", images=(b"jpeg",)),))
+TEXT = Chat(messages=(ChatMessage(text="hello"),))
+IMAGE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))
 
 
 def test_the_wait_is_jittered_over_a_bound_that_doubles_up_to_the_longest():
@@ -48,8 +48,8 @@ def _failed(wait_s: float | None = None) -> ServerFailed:
     ("error", "expected"),
     [
         (_failed(), True),
-        (Unreachable("refused", was_sent=False), True),
-        (Unreachable("broke", was_sent=True), False),
+        (ServerUnreachable("refused", was_sent=False), True),
+        (ServerUnreachable("broke", was_sent=True), False),
         (TimedOut("late"), False),
         (AnswerInvalid(("name",)), False),
     ],

@@ -10,7 +10,7 @@ import traceback
 
 import pytest
 
-from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
@@ -18,14 +18,14 @@ from vla_deploy.model_servers.errors import (
     CircuitOpen,
     ModelServerError,
     PrivacyRefused,
-    RequestRefused,
     ServerFailed,
+    ServerRefused,
+    ServerUnreachable,
     TimedOut,
-    Unreachable,
 )
 
-CHAT = Chat(messages=(Message(text="hello"),))
-PICTURE = Chat(messages=(Message(text="what is it?", images=(b"jpeg",)),))
+CHAT = Chat(messages=(ChatMessage(text="hello"),))
+PICTURE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))
 KEY = "sk-very-secret-0123456789"
 
 
@@ -99,7 +99,7 @@ def test_what_waiting_does_not_mend_is_not_tried_again(
     loopback, open_server, clock, status, said, told
 ):
     loopback.then(loopback.sends(status, said))
-    with pytest.raises(RequestRefused, match=told):
+    with pytest.raises(ServerRefused, match=told):
         open_server(loopback.url, clock=clock, key=KEY).complete(CHAT)
     assert len(loopback.heard) == 1
 
@@ -108,7 +108,7 @@ def test_a_redirect_is_not_followed(loopback, open_server):
     other = "http://u:p@elsewhere.example/v1?token=1"
     loopback.then(loopback.sends(307, b"", Location=other))
     with pytest.raises(
-        RequestRefused, match=r"points to http://elsewhere\.example; that"
+        ServerRefused, match=r"points to http://elsewhere\.example; that"
     ) as refused:
         open_server(loopback.url).complete(CHAT)
     assert "token" not in str(refused.value)
@@ -148,7 +148,7 @@ def test_a_huge_answer_is_cut_off(loopback, open_server):
 
 def test_endless_headers_are_cut_off(loopback, open_server):
     loopback.then(loopback.raw(b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 100_000))
-    with pytest.raises(Unreachable, match="no whole HTTP answer"):
+    with pytest.raises(ServerUnreachable, match="no whole HTTP answer"):
         open_server(loopback.url).complete(CHAT)
 
 
@@ -163,7 +163,7 @@ def test_endless_headers_are_cut_off(loopback, open_server):
 )
 def test_a_server_that_goes_in_mid_answer_is_not_asked_twice(loopback, open_server, clock, content):
     loopback.then(loopback.raw(content))
-    with pytest.raises(Unreachable) as gone:
+    with pytest.raises(ServerUnreachable) as gone:
         open_server(loopback.url, clock=clock).complete(CHAT)
     assert gone.value.was_sent
     assert len(loopback.heard) == 1
@@ -196,7 +196,7 @@ def test_a_refused_connection_is_tried_again_and_then_told(open_server, clock):
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{unused.getsockname()[1]}"
-        with pytest.raises(Unreachable, match="refused") as found:
+        with pytest.raises(ServerUnreachable, match="refused") as found:
             open_server(url, clock=clock, max_attempts=3, draw=lambda: 0.1).complete(CHAT)
     assert not found.value.was_sent
     assert clock.waits_s == pytest.approx([0.05, 0.1])
@@ -242,7 +242,7 @@ def test_nothing_is_sent_that_may_not_leave_the_robot(loopback, open_server):
 
 def test_a_model_that_takes_no_images_gets_none(loopback, open_server):
     loopback.then(loopback.says("hi"))
-    with pytest.raises(RequestRefused, match="vision = true"):
+    with pytest.raises(ServerRefused, match="vision = true"):
         open_server(loopback.url).complete(PICTURE)
     assert loopback.heard == []
 
@@ -335,7 +335,7 @@ def test_a_key_is_in_no_log_and_no_error(loopback, open_server, clock, caplog):
 def test_tls_with_a_server_that_speaks_none_is_unreachable(loopback, open_server):
     url = loopback.url.replace("http://", "https://")
     loopback.then(loopback.says("hi"))
-    with pytest.raises(Unreachable, match=r"(?i)ssl|tls|record"):
+    with pytest.raises(ServerUnreachable, match=r"(?i)ssl|tls|record"):
         open_server(url, max_attempts=1).complete(CHAT)
 
 
@@ -366,9 +366,9 @@ def test_a_certificate_is_checked_by_the_declared_authority_and_name(
         loopback.url.replace("http://127.0.0.1", f"https://{n}") for n in ("bench", "other")
     )
     here = {"resolve": lambda host, port, timeout_s: ("127.0.0.1",), "max_attempts": 1}
-    with pytest.raises(Unreachable, match="certificate verify failed"):
+    with pytest.raises(ServerUnreachable, match="certificate verify failed"):
         open_server(bench, **here).complete(CHAT)
-    with pytest.raises(Unreachable, match="certificate verify failed: Hostname mismatch"):
+    with pytest.raises(ServerUnreachable, match="certificate verify failed: Hostname mismatch"):
         open_server(other, ca_file=str(certificate[0]), **here).complete(CHAT)
     assert loopback.heard == []
     assert open_server(bench, ca_file=str(certificate[0]), **here).complete(CHAT).text == "hi"
@@ -376,7 +376,7 @@ def test_a_certificate_is_checked_by_the_declared_authority_and_name(
 
 def test_an_authority_s_file_that_is_none_is_told(open_server, tmp_path):
     (tmp_path / "ca.pem").write_text("nothing")
-    with pytest.raises(RequestRefused, match=r"ca\.pem"):
+    with pytest.raises(ServerRefused, match=r"ca\.pem"):
         open_server("https://127.0.0.1:9", ca_file=str(tmp_path / "ca.pem")).complete(CHAT)
 
 

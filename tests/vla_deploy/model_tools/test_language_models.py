@@ -9,7 +9,7 @@ import pytest
 from vla_deploy.cli.main import main
 from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ModelUnknown
 from vla_deploy.inference.language_model import open_language_model
-from vla_deploy.inference.manifest import Use
+from vla_deploy.inference.manifest import LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.model_tools.language_models import (
@@ -35,7 +35,7 @@ def test_a_model_is_kept_after_it_has_answered(shelf: ModelShelf, folder: Path) 
     model, answer = add_language_model(shelf.store, source(folder), clock=shelf.clock)
     assert set(json.loads(answer.text)) == {"skill", "place"}
     assert model.manifest.language is not None
-    assert model.manifest.language.use is Use.CHAT
+    assert model.manifest.language.use is LanguageUse.CHAT
     assert shelf.store.load("mine").manifest == model.manifest
     assert {part.path for part in model.manifest.parts} == {
         "genai_config.json", "tokenizer.json", "tokenizer_config.json", "model.onnx",

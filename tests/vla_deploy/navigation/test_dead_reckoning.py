@@ -3,13 +3,15 @@ import math
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.dead_reckoning import FROZEN_SAMPLES, DeadReckoning, Step
+from vla_deploy.navigation.dead_reckoning import FROZEN_SAMPLES, DeadReckoning, OdometryStep
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 
 TICK_NS = 20_000_000
 
 
-def turning(imu_yaws: list[float | None], rate_rad: float = 0.02) -> tuple[DeadReckoning, Step]:
+def turning(
+    imu_yaws: list[float | None], rate_rad: float = 0.02
+) -> tuple[DeadReckoning, OdometryStep]:
     """Turn on the spot, the wheels telling `rate_rad` a step; return the reckoning, last step."""
     reckoning = DeadReckoning()
     step = reckoning.move(0, ORIGIN, imu_yaws[0])

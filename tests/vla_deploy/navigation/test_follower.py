@@ -6,7 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.navigation.follower import DriveLimits, PathFollower, Phase, Twist, wrap_angle
+from vla_deploy.navigation.follower import (
+    DriveLimits,
+    FollowerPhase,
+    PathFollower,
+    Twist,
+    wrap_angle,
+)
 
 LIMITS = DriveLimits(
     speed_m_s=0.5, turn_rate_rad_s=1.0, acceleration_m_s2=0.5, turn_acceleration_rad_s2=2.0
@@ -40,9 +46,9 @@ def run(points: list[tuple[float, float]], start_yaw: float, final_yaw: float) -
         assert abs(twist.w_rad_s) <= LIMITS.turn_rate_rad_s
         body.drive(twist, 0.02)
         off_path_m = max(off_path_m, distance_to(path, body.x_m, body.y_m))
-        if follower.phase is Phase.ARRIVED:
+        if follower.phase is FollowerPhase.ARRIVED:
             break
-    assert follower.phase is Phase.ARRIVED
+    assert follower.phase is FollowerPhase.ARRIVED
     end_m = math.hypot(body.x_m - path[-1, 0], body.y_m - path[-1, 1])
     return end_m, abs(wrap_angle(body.yaw_rad - final_yaw)), off_path_m
 

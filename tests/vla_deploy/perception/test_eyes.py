@@ -17,7 +17,7 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
-from vla_deploy.perception.eyes import FAILURES_TO_DISMISS, Answer, Eyes, open_network
+from vla_deploy.perception.eyes import FAILURES_TO_DISMISS, DetectorAnswer, Eyes, open_network
 
 
 class HeldBack(Executor):
@@ -106,18 +106,18 @@ def test_an_answer_is_awaited_and_then_taken_once(eyes, executor, rgb):
     answer = eyes.answer()
     assert [one.class_name for one in answer.view.voices] == ["red", "green", "blue"]
     assert {int(one) for one in answer.view.boxes.classes} == {0}
-    assert eyes.answer() == Answer(view=None)
+    assert eyes.answer() == DetectorAnswer(view=None)
     assert eyes.document()["model"]["runs"] == 1
 
 
 def test_a_network_that_takes_too_long_is_done_without_until_it_answers(eyes, executor, clock, rgb):
     eyes.ask(rgb)
     clock.ns = 1_100_000_000
-    assert eyes.answer() == Answer(view=None)
+    assert eyes.answer() == DetectorAnswer(view=None)
     assert eyes.document()["mode"] == "form"
     assert eyes.document()["why"] == "no answer within 1 s"
     eyes.ask(rgb)  # it is still busy with the first
-    assert eyes.answer() == Answer(view=None)
+    assert eyes.answer() == DetectorAnswer(view=None)
     executor.catch_up()
     eyes.ask(rgb)
     executor.catch_up()
@@ -131,13 +131,13 @@ def test_a_network_that_fails_again_and_again_is_asked_no_more(eyes, executor, r
         assert eyes.network.detector is not None
         eyes.ask(rgb)
         executor.catch_up()
-        assert eyes.answer() == Answer(view=None)
+        assert eyes.answer() == DetectorAnswer(view=None)
         assert eyes.document()["mode"] == "form"
         assert "session is closed" in eyes.document()["why"]
         assert ("asked no more" in caplog.text) is (number + 1 == FAILURES_TO_DISMISS)
     assert eyes.document()["model"] is None
     eyes.ask(rgb)
-    assert eyes.answer() == Answer(view=None)
+    assert eyes.answer() == DetectorAnswer(view=None)
 
 
 def test_a_network_that_is_replaced_still_answers_what_it_was_asked(eyes, executor, shelf, rgb):
@@ -239,5 +239,5 @@ def test_weights_that_give_no_numbers_for_an_image_fail_that_image(
     eyes.take(open_network(shelf, profile(), 0))
     eyes.ask(rgb)
     executor.catch_up()
-    assert eyes.answer() == Answer(view=None)
+    assert eyes.answer() == DetectorAnswer(view=None)
     assert "blobs: output 'output': 672 of its 672 values are no numbers" in eyes.document()["why"]

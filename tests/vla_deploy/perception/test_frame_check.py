@@ -11,7 +11,7 @@ from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M
-from vla_deploy.perception.frame_check import LIMITS, Limit, Use, judge_frame
+from vla_deploy.perception.frame_check import LIMITS, ImageUse, StatisticLimit, judge_frame
 from vla_deploy.perception.frame_statistics import FrameStatistics, measure_frame
 from vla_deploy.perception.frame_watch import FrameWatch
 
@@ -80,15 +80,15 @@ def painted(*colour: int) -> Change:
     return lambda rgb, depth, random: (np.full_like(rgb, colour), depth)
 
 
-SPOILED: dict[str, tuple[Change, Use]] = {
-    "dark": (lambda rgb, depth, _: (rgb // 12, depth), Use.OBSTACLES),
-    "saturated": (lambda rgb, depth, _: (np.maximum(rgb, 253), depth), Use.OBSTACLES),
-    "plain": (painted(0, 135, 0), Use.OBSTACLES),
-    "noisy": (noisy(40.0), Use.OBSTACLES),
-    "grainy": (noisy(20.0), Use.FORM),
-    "cut off": (half_empty, Use.NOTHING),
-    "depth holes": (holes(0.96), Use.NOTHING),
-    "noisy depth": (shaken_depth(8.0), Use.NOTHING),
+SPOILED: dict[str, tuple[Change, ImageUse]] = {
+    "dark": (lambda rgb, depth, _: (rgb // 12, depth), ImageUse.OBSTACLES),
+    "saturated": (lambda rgb, depth, _: (np.maximum(rgb, 253), depth), ImageUse.OBSTACLES),
+    "plain": (painted(0, 135, 0), ImageUse.OBSTACLES),
+    "noisy": (noisy(40.0), ImageUse.OBSTACLES),
+    "grainy": (noisy(20.0), ImageUse.FORM),
+    "cut off": (half_empty, ImageUse.NOTHING),
+    "depth holes": (holes(0.96), ImageUse.NOTHING),
+    "noisy depth": (shaken_depth(8.0), ImageUse.NOTHING),
 }
 
 
@@ -162,7 +162,7 @@ def test_an_image_is_torn_with_one_that_came_and_was_not_judged() -> None:
     seen, torn = watch(frame(*room(0))), frame(rgb, depth)
     seen.came(skipped, 0)
     seen.came(torn, 0)
-    assert seen.judge(torn, torn.depth_m(), turned(0.0), HERE).use is Use.NOTHING
+    assert seen.judge(torn, torn.depth_m(), turned(0.0), HERE).use is ImageUse.NOTHING
 
 
 @pytest.mark.parametrize(
@@ -196,8 +196,8 @@ def test_colours_that_stay_are_stale_however_slowly_the_camera_moves() -> None:
         one = frame(rgb, room(number)[1])
         here = Pose2D(1.0 + 0.005 * number, 1.0, 0.0)
         uses.append(seen.judge(one, one.depth_m(), turned(0.0), here).use)
-    assert uses[0] is Use.ALL
-    assert uses[-1] is Use.OBSTACLES
+    assert uses[0] is ImageUse.ALL
+    assert uses[-1] is ImageUse.OBSTACLES
 
 
 @pytest.mark.parametrize("driven_m", [0.0, 0.5])
@@ -215,10 +215,12 @@ def test_a_robot_at_rest_whose_yaw_drifts_has_not_moved_its_camera(noise_seeds: 
     for second in range(0, 1200, 4):
         rgb, depth = room(second % noise_seeds)[0], room(second)[1]
         one = replace(frame(rgb, depth), stamp_ns=second * second_ns)
-        assert seen.judge(one, one.depth_m(), turned(drift_rad_s * second), HERE).use is Use.ALL
+        assert (
+            seen.judge(one, one.depth_m(), turned(drift_rad_s * second), HERE).use is ImageUse.ALL
+        )
     after = replace(frame(rgb, room(1200)[1]), stamp_ns=1200 * second_ns)
     verdict = seen.judge(after, after.depth_m(), turned(drift_rad_s * 1200 + 0.2), HERE)
-    assert verdict.use is Use.NOTHING
+    assert verdict.use is ImageUse.NOTHING
 
 
 def test_a_bare_wall_looks_the_same_from_everywhere_and_is_not_taken_for_frozen() -> None:
@@ -239,6 +241,6 @@ def test_a_camera_that_sends_no_more_is_told() -> None:
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.fault)
-def test_every_limit_is_one_that_a_sound_image_keeps(limit: Limit) -> None:
+def test_every_limit_is_one_that_a_sound_image_keeps(limit: StatisticLimit) -> None:
     assert limit.measure(FrameStatistics()) <= limit.most
-    assert limit.leaves < Use.ALL
+    assert limit.leaves < ImageUse.ALL

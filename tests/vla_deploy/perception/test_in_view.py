@@ -10,7 +10,7 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
-from vla_deploy.perception.in_view import Image, View, view_of
+from vla_deploy.perception.in_view import Image, PlaceView, view_of
 from vla_deploy.perception.supports import KnownSurface, counter_clockwise, find_supports
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def test_a_thing_that_stands_there_without_a_name_does_not_show_its_place_withou
     boxed: "StillFlat",
 ) -> None:
     place = local(boxed, CUP_IN_BOX_M)
-    assert view_of(place, CUP_SIZE_M, look(boxed), []) is View.HIDDEN
+    assert view_of(place, CUP_SIZE_M, look(boxed), []) is PlaceView.HIDDEN
 
 
 def test_a_box_around_a_place_does_not_explain_what_stands_in_it(boxed: "StillFlat") -> None:
@@ -98,14 +98,14 @@ def test_a_box_around_a_place_does_not_explain_what_stands_in_it(boxed: "StillFl
     boxes = [one for one in found if one.class_name == "box"]
     place = local(boxed, CUP_IN_BOX_M)
     assert boxes
-    assert view_of(place, CUP_SIZE_M, image, boxes) is View.HIDDEN
-    assert view_of(place, CUP_SIZE_M, image, found) is View.CLEAR
+    assert view_of(place, CUP_SIZE_M, image, boxes) is PlaceView.HIDDEN
+    assert view_of(place, CUP_SIZE_M, image, found) is PlaceView.CLEAR
 
 
 def test_the_place_of_what_was_taken_away_is_in_clear_view(boxed: "StillFlat") -> None:
     boxed.put("red_cup", (2.2, 1.6, 0.5))
-    assert view_of(local(boxed, CUP_IN_BOX_M), CUP_SIZE_M, look(boxed), []) is View.CLEAR
+    assert view_of(local(boxed, CUP_IN_BOX_M), CUP_SIZE_M, look(boxed), []) is PlaceView.CLEAR
 
 
 def test_what_is_out_of_the_image_is_hidden(boxed: "StillFlat") -> None:
-    assert view_of((-1.0, 0.0, 0.5), CUP_SIZE_M, look(boxed), []) is View.HIDDEN
+    assert view_of((-1.0, 0.0, 0.5), CUP_SIZE_M, look(boxed), []) is PlaceView.HIDDEN

@@ -3,7 +3,7 @@
 import pytest
 
 from vla_deploy.perception.classes import BYSTANDERS, OTHER, Form
-from vla_deploy.perception.naming import Name, Source, Word, by_both, by_form, chance_of
+from vla_deploy.perception.naming import ClassVote, Name, NameSource, by_both, by_form, chance_of
 
 POOR, GOOD = 0.55, 0.95
 
@@ -13,14 +13,14 @@ def form(name: str, *look_alikes: str, impossible: frozenset[str] = frozenset())
     return Form(name=name, fits=fits, impossible=BYSTANDERS | impossible)
 
 
-def said(class_name: str, chance: float) -> Word:
-    return Word(class_name=class_name, chance=chance)
+def said(class_name: str, chance: float) -> ClassVote:
+    return ClassVote(class_name=class_name, chance=chance)
 
 
 @pytest.mark.parametrize("chance", [0.05, POOR, GOOD])
 def test_agreement_makes_a_name_surer_than_either(chance: float) -> None:
     name = by_both(form("ball"), [said("ball", chance)])
-    assert (name.class_name, name.source) == ("ball", Source.BOTH)
+    assert (name.class_name, name.source) == ("ball", NameSource.BOTH)
     assert name.confidence > max(chance, by_form(form("ball")).confidence)
 
 
@@ -50,13 +50,13 @@ def test_among_look_alikes_a_good_network_decides_and_a_poor_one_does_not() -> N
     poor, good = by_both(alike, [said("can", POOR)]), by_both(alike, [said("can", GOOD)])
     assert poor.class_name == "cup"
     assert poor.confidence < 0.6
-    assert (good.class_name, good.source) == ("can", Source.BOTH)
+    assert (good.class_name, good.source) == ("can", NameSource.BOTH)
     assert good.confidence > 0.8
 
 
 def test_what_no_form_names_is_named_by_the_network_as_surely_as_it_is_right() -> None:
     assert by_both(form(OTHER), [said("cup", 0.8)]) == Name(
-        class_name="cup", confidence=pytest.approx(0.8), source=Source.NETWORK
+        class_name="cup", confidence=pytest.approx(0.8), source=NameSource.NETWORK
     )
     assert by_both(form(OTHER), [said("cup", 0.45)]).class_name == OTHER
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.perception.detectors.boxes import Boxes
-from vla_deploy.perception.naming import Word
+from vla_deploy.perception.naming import ClassVote
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.voices import Voice
 
@@ -34,7 +34,7 @@ def test_a_place_has_a_word_of_each_class_that_fills_the_same_box_the_surest_fir
         ((11, 10, 30, 40), 0.2, 2),
         voices=MEASURED,
     )
-    cup, ball = (Word(class_name="cup", chance=0.7), Word(class_name="ball", chance=0.35))
+    cup, ball = (ClassVote(class_name="cup", chance=0.7), ClassVote(class_name="ball", chance=0.35))
     assert seen.words_for((10, 10, 30, 40)) == [cup, ball]
     assert seen.words_for((60, 10, 90, 40)) == []
 

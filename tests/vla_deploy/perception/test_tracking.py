@@ -5,12 +5,12 @@ import pytest
 
 from vla_deploy.perception.detection import Detection
 from vla_deploy.perception.filtering import Estimate
-from vla_deploy.perception.in_view import View
+from vla_deploy.perception.in_view import PlaceView
 from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
 from vla_deploy.perception.tracking import Tracker
 
-CLEAR, HIDDEN = View.CLEAR, View.HIDDEN
+CLEAR, HIDDEN = PlaceView.CLEAR, PlaceView.HIDDEN
 
 
 def seen(
@@ -48,7 +48,7 @@ class Watcher:
         self.tracker = Tracker()
         self.images = 0
 
-    def image(self, *detections: Detection, view: View = CLEAR) -> list[dict[str, Any]]:
+    def image(self, *detections: Detection, view: PlaceView = CLEAR) -> list[dict[str, Any]]:
         self.images += 1
         views = {id(track): view for track in self.tracker.tracks}
         stamp_ns = self.images * 200_000_000

@@ -6,21 +6,21 @@ import pytest
 
 from vla_deploy.inference.manifest import (
     ClassMeasured,
-    Detection,
+    DetectionOutputs,
     Fit,
     ImageInput,
-    Layout,
     Measured,
+    TensorLayout,
 )
 from vla_deploy.perception.class_names import OTHER_WORDS, known_as
 from vla_deploy.perception.classes import FURNITURE, OTHER, POSSIBLE, Form
-from vla_deploy.perception.naming import Source, Word, by_both, by_form, chance_of
+from vla_deploy.perception.naming import ClassVote, NameSource, by_both, by_form, chance_of
 from vla_deploy.perception.voices import Voice, voices_of
 
 IMAGE = ImageInput(
     width_px=640,
     height_px=640,
-    layout=Layout.NCHW,
+    layout=TensorLayout.NCHW,
     colour="rgb",
     fit=Fit.LETTERBOX,
     fill=114,
@@ -28,7 +28,7 @@ IMAGE = ImageInput(
     mean=(0.0, 0.0, 0.0),
     std=(1.0, 1.0, 1.0),
 )
-COCO = Detection(
+COCO = DetectionOutputs(
     adapter="yolo",
     classes=("cell phone", "sports ball", "dining table", "teddy bear"),
     score_threshold=0.25,
@@ -39,7 +39,7 @@ PHONE = Form(name="phone", fits=frozenset({"phone"}), impossible=frozenset({FURN
 SHAPELESS = Form(name=OTHER, fits=frozenset(), impossible=frozenset({FURNITURE}))
 
 
-def measured(*rows: ClassMeasured) -> Detection:
+def measured(*rows: ClassMeasured) -> DetectionOutputs:
     return replace(COCO, measured=Measured(precision=0.9, recall=0.8, classes=rows))
 
 
@@ -97,16 +97,16 @@ def test_words_that_say_nothing_of_the_kind_never_raise_a_names_confidence(
     voice = voices_of(
         measured(row("cell phone", 0.95, 0.9, 500), row("dining table", 0.95, 0.9, 500))
     )[said]
-    word = Word(class_name=voice.class_name, chance=chance_of(0.99, voice.precision))
+    word = ClassVote(class_name=voice.class_name, chance=chance_of(0.99, voice.precision))
     name = by_both(form, [word])
     alone = by_form(form)
-    assert (name.class_name, name.source) in {(form.name, alone.source), (OTHER, Source.NONE)}
+    assert (name.class_name, name.source) in {(form.name, alone.source), (OTHER, NameSource.NONE)}
     assert name.confidence <= alone.confidence
 
 
 def test_a_measured_word_for_a_cell_phone_makes_a_phone_surer() -> None:
     phone = voices_of(measured(row("cell phone", 0.95, 0.9, 500)))[0]
-    word = Word(class_name=phone.class_name, chance=chance_of(0.9, phone.precision))
+    word = ClassVote(class_name=phone.class_name, chance=chance_of(0.9, phone.precision))
     name = by_both(PHONE, [word])
-    assert (name.class_name, name.source) == ("phone", Source.BOTH)
+    assert (name.class_name, name.source) == ("phone", NameSource.BOTH)
     assert name.confidence > by_form(PHONE).confidence

@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
+from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
@@ -49,12 +49,12 @@ class ScriptedBackEnd(BackEnd):
 
     def __init__(self, name: str, clock: StepClock, *script: Any, takes_s: float = 0.0) -> None:
         self.name = name
-        self.asked: list[Request] = []
+        self.asked: list[PlanRequest] = []
         self._clock = clock
         self._script = list(script)
         self._takes_s = takes_s
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         self.asked.append(request)
         self._clock.pass_s(self._takes_s)
         said = self._script.pop(0) if len(self._script) > 1 else self._script[0]
@@ -230,13 +230,13 @@ def scene(thing: Callable[..., Thing]) -> Snapshot:
 
 
 @pytest.fixture(scope="session")
-def ask(scene: Snapshot) -> Callable[..., Request]:
+def ask(scene: Snapshot) -> Callable[..., PlanRequest]:
     """Return a request to butler about that world, some values replaced."""
 
-    def ask(text: str, holding: dict[str, str | None] | None = None, **changes: Any) -> Request:
+    def ask(text: str, holding: dict[str, str | None] | None = None, **changes: Any) -> PlanRequest:
         world = world_of(butler(), holding or {"left": None, "right": None})
         told = {"command_id": "c1", "text": text, "world": world, "scene": scene}
-        return Request(**(told | {"here": (0.0, 0.0, 0.0)} | changes))
+        return PlanRequest(**(told | {"here": (0.0, 0.0, 0.0)} | changes))
 
     return ask
 

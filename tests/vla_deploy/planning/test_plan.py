@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from vla_deploy.planning.plan import (
     Action,
+    ActionPriority,
     Plan,
-    Priority,
     dependency_faults,
     execution_order,
     plan_schema,
@@ -48,8 +48,8 @@ def test_a_plan_either_has_an_order_or_a_cycle_that_really_is_one(
 
 def test_dependencies_come_first_and_priority_second() -> None:
     actions = [
-        Action(id="low", skill="stop", priority=Priority.LOW),
-        Action(id="high", skill="stop", priority=Priority.HIGH, depends_on=("low",)),
+        Action(id="low", skill="stop", priority=ActionPriority.LOW),
+        Action(id="high", skill="stop", priority=ActionPriority.HIGH, depends_on=("low",)),
         Action(id="medium", skill="stop"),
     ]
     assert [action.id for action in execution_order(actions)] == ["medium", "low", "high"]

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from platforms import load_profile
-from vla_deploy.memory import LastSeen, MemoryStore, Outcome
+from vla_deploy.memory import EpisodeOutcome, LastSeen, MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.assembly import open_memory
 from vla_deploy.planning.dialogue.situation import OLDEST_S, recalled
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.patterns.backend import Patterns
 
 BOUNDS = load_profile("desktop").planning
@@ -46,8 +46,8 @@ def test_a_command_and_its_end_are_remembered(open_desk: Callable, memory: Memor
     again = MemoryStore(memory.path)
     outcomes = {one.command: one.outcome for one in again.newest()}
     assert outcomes == {
-        "go to the kitchen": Outcome.SUCCEEDED,
-        "sing a sea shanty": Outcome.REFUSED,
+        "go to the kitchen": EpisodeOutcome.SUCCEEDED,
+        "sing a sea shanty": EpisodeOutcome.REFUSED,
     }
     again.close()
 
@@ -57,7 +57,7 @@ def test_status_tells_of_the_memory(open_desk: Callable, memory: MemoryStore) ->
 
 
 def test_where_a_thing_was_days_ago_is_said_before_it_is_looked_for(
-    ask: Callable[..., Request],
+    ask: Callable[..., PlanRequest],
 ) -> None:
     request = ask("where are my keys?", last_seen=(keys(unix_s() - 7200.0),))
     plan = Patterns().propose(request, deadline=None).plan
@@ -68,7 +68,7 @@ def test_where_a_thing_was_days_ago_is_said_before_it_is_looked_for(
     assert looked.skill == "find_object"
 
 
-def test_another_thing_than_asked_for_is_not_told(ask: Callable[..., Request]) -> None:
+def test_another_thing_than_asked_for_is_not_told(ask: Callable[..., PlanRequest]) -> None:
     request = ask("where is the phone?", last_seen=(keys(unix_s()),))
     plan = Patterns().propose(request, deadline=None).plan
     assert [one.skill for one in plan.actions] == ["find_object"]

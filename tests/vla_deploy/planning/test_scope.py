@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import Answer, fresh_desk
+from benchmarks.planner_desk import PlannerAnswer, fresh_desk
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import Proposal, Request
+from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.scope import guarded, scope_words
@@ -27,13 +27,13 @@ CHANGES: Final = (
 )  # fmt: skip
 
 
-def asked(text: str) -> Answer:
+def asked(text: str) -> PlannerAnswer:
     with fresh_desk() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         return desk.say(text)[1]
 
 
-def runs(answer: Answer) -> bool:
+def runs(answer: PlannerAnswer) -> bool:
     return answer.outcome == "plan" and moves(answer.plan or {})
 
 
@@ -80,8 +80,8 @@ def proposed(skill: str = "navigate_to", **changes: object) -> Proposal:
     return Proposal(plan=plan, back_end="test", confidence=1.0, **changes)
 
 
-def request_for(text: str) -> Request:
-    return Request(command_id="c", text=text, world=world_of(load_robot("butler"), {}))
+def request_for(text: str) -> PlanRequest:
+    return PlanRequest(command_id="c", text=text, world=world_of(load_robot("butler"), {}))
 
 
 def test_a_language_model_is_asked_about_what_others_are_refused_for() -> None:

@@ -18,7 +18,7 @@ from vla_deploy.robots.camera_calibration import (
     write_lens,
     write_mounting,
 )
-from vla_deploy.robots.description import LensCalibration, Mounting
+from vla_deploy.robots.description import CameraMounting, LensCalibration
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.robots.model import RobotModel, full_positions
 
@@ -35,7 +35,7 @@ LENS = LensCalibration(
     tool="vla-deploy camera calibrate",
 )  # fmt: skip
 HALF_RAD = math.radians(2.0) / 2
-MOUNTING = Mounting(
+MOUNTING = CameraMounting(
     site=CAMERA.site,
     model=CAMERA.model,
     focal_px=CAMERA.focal_px,

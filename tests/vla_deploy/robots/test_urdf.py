@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.vla_deploy.robots.conftest import small_robot
 from vla_deploy.robots import RobotDescription, RobotFileError, load_robot
-from vla_deploy.robots.description import Mounting
+from vla_deploy.robots.description import CameraMounting
 from vla_deploy.robots.model import RobotModel
 from vla_deploy.robots.urdf import roll_pitch_yaw, urdf_of
 
@@ -171,7 +171,7 @@ def test_the_camera_is_where_calibration_has_found_it(robot: RobotDescription) -
     turn = np.array((0.02, -0.03, 0.01, 1.0))
     turn /= np.linalg.norm(turn)
     camera = robot.camera
-    mounting = Mounting(
+    mounting = CameraMounting(
         site=camera.site,
         model=camera.model,
         focal_px=camera.focal_px,

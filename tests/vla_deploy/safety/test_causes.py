@@ -5,7 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.safety import CLEAR, RULES, Cause, Direction, Latch, Reaction, ResetOutcome, Rule
+from vla_deploy.safety import (
+    CLEAR,
+    RULES,
+    Cause,
+    CauseRule,
+    Direction,
+    Latch,
+    Reaction,
+    ResetOutcome,
+)
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "safety.md"
 REACTIONS = {
@@ -59,7 +68,7 @@ def test_directions_are_told_by_their_names() -> None:
 
 
 @rules
-def test_an_advice_reads_on_within_the_line(rule: Rule) -> None:
+def test_an_advice_reads_on_within_the_line(rule: CauseRule) -> None:
     assert rule.advice[0].islower()
     assert not rule.advice.endswith(".")
 

@@ -17,6 +17,7 @@ from vla_deploy.safety import (
     NOTHING_KNOWN,
     RULES,
     Cause,
+    CauseRule,
     Clearance,
     Direction,
     DriveSample,
@@ -25,7 +26,6 @@ from vla_deploy.safety import (
     Latch,
     Reaction,
     ResetOutcome,
-    Rule,
     SafetyInputs,
     SafetyLimits,
     SafetyState,
@@ -573,7 +573,7 @@ def test_a_cause_begins_exactly_beyond_its_limit(
 
 
 @rules
-def test_a_cause_acts_only_after_its_debounce(rule: Rule) -> None:
+def test_a_cause_acts_only_after_its_debounce(rule: CauseRule) -> None:
     state, verdict = ticks(SafetyState(), rule.debounce_samples - 1, **SPOILERS[rule.cause])
     assert verdict.reaction is Reaction.NONE
     _, verdict = tick(state, **SPOILERS[rule.cause])
@@ -581,7 +581,7 @@ def test_a_cause_acts_only_after_its_debounce(rule: Rule) -> None:
 
 
 @pytest.mark.parametrize("rule", [rule for rule in RULES if rule.debounce_samples > 1])
-def test_one_good_sample_starts_the_debounce_again(rule: Rule) -> None:
+def test_one_good_sample_starts_the_debounce_again(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples - 1, **SPOILERS[rule.cause])
     state, _ = tick(state)
     _, verdict = ticks(state, rule.debounce_samples - 1, **SPOILERS[rule.cause])
@@ -589,7 +589,7 @@ def test_one_good_sample_starts_the_debounce_again(rule: Rule) -> None:
 
 
 @rules
-def test_a_latched_cause_outlives_itself_until_reset(rule: Rule) -> None:
+def test_a_latched_cause_outlives_itself_until_reset(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
     state, verdict = ticks(state, max(100, rule.release_samples))
     latches = rule.latch is not Latch.NEVER
@@ -601,7 +601,7 @@ def test_a_latched_cause_outlives_itself_until_reset(rule: Rule) -> None:
 
 
 @rules
-def test_reset_is_refused_while_a_latched_cause_persists(rule: Rule) -> None:
+def test_reset_is_refused_while_a_latched_cause_persists(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
     after, verdict = tick(state, reset_requested=True, **SPOILERS[rule.cause])
     assert verdict.reaction is rule.reaction
@@ -611,7 +611,7 @@ def test_reset_is_refused_while_a_latched_cause_persists(rule: Rule) -> None:
 
 
 @rules
-def test_only_the_estop_latches_while_nothing_is_energised(rule: Rule) -> None:
+def test_only_the_estop_latches_while_nothing_is_energised(rule: CauseRule) -> None:
     changes = {**SPOILERS[rule.cause], "energised": False}
     state, _ = ticks(SafetyState(), rule.debounce_samples, **changes)
     assert bool(state.latched) is (rule.cause is Cause.ESTOP)
@@ -636,7 +636,7 @@ automatic_rules = pytest.mark.parametrize(
 
 
 @automatic_rules
-def test_what_ends_by_itself_ends_when_it_was_gone_for_its_time(rule: Rule) -> None:
+def test_what_ends_by_itself_ends_when_it_was_gone_for_its_time(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
     state, verdict = ticks(state, rule.release_samples - 1)
     assert (verdict.cause, verdict.latched) == (rule.cause, False)
@@ -646,7 +646,7 @@ def test_what_ends_by_itself_ends_when_it_was_gone_for_its_time(rule: Rule) -> N
 
 
 @automatic_rules
-def test_a_cause_that_comes_back_starts_its_release_again(rule: Rule) -> None:
+def test_a_cause_that_comes_back_starts_its_release_again(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
     state, _ = ticks(state, rule.release_samples - 1)
     state, _ = ticks(state, rule.debounce_samples, **SPOILERS[rule.cause])
@@ -679,7 +679,7 @@ def test_a_reset_does_not_end_what_ends_by_itself() -> None:
 
 
 @rules
-def test_what_brings_the_base_to_rest_leaves_it_no_speed(rule: Rule) -> None:
+def test_what_brings_the_base_to_rest_leaves_it_no_speed(rule: CauseRule) -> None:
     _, verdict = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
     assert (verdict.speed_ratio == 0.0) is (rule.reaction >= Reaction.BASE_RAMP)
 

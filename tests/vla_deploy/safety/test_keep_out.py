@@ -8,11 +8,11 @@ import pytest
 
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import Direction
-from vla_deploy.safety.zones import PROBES, Footprint, Motion
+from vla_deploy.safety.zones import PROBES, BaseMotion, Footprint
 
 ROUND = Footprint(corners_m=((0.0, 0.0),), radius_m=0.25)
 LONG = Footprint(corners_m=((0.5, 0.1), (-0.5, 0.1), (-0.5, -0.1), (0.5, -0.1)), radius_m=0.0)
-STANDING = Motion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.5)
+STANDING = BaseMotion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.5)
 BOX = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
 
 

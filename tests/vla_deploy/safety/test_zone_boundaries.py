@@ -12,8 +12,8 @@ from vla_deploy.safety.surroundings import Direction
 from vla_deploy.safety.zones import (
     IDLE,
     PROBES,
+    BaseMotion,
     Footprint,
-    Motion,
     Points,
     directions_towards,
     inside,
@@ -26,7 +26,7 @@ from vla_deploy.safety.zones import (
 ROUND = Footprint(corners_m=((0.0, 0.0),), radius_m=0.25)
 SMALL = replace(ROUND, radius_m=0.05)
 LONG = Footprint(corners_m=((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2)), radius_m=0.0)
-STANDING = Motion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.5)
+STANDING = BaseMotion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.5)
 CRUISING = replace(STANDING, v_m_s=0.5)
 DIAMOND = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 TRIANGLE = np.array([[0.0, 0.0], [4.0, 1.0], [1.0, 3.0]])

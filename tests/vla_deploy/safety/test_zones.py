@@ -13,10 +13,10 @@ from vla_deploy.safety.surroundings import Direction
 from vla_deploy.safety.zones import (
     IDLE,
     LEAST_RATIO,
+    BaseMotion,
     Footprint,
-    Motion,
     Points,
-    Trigger,
+    ZoneMemory,
     braking_m,
     directions_towards,
     inside,
@@ -30,7 +30,7 @@ from vla_deploy.safety.zones import (
 ROUND = Footprint(corners_m=((0.0, 0.0),), radius_m=0.24)
 LONG = Footprint(corners_m=((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2)), radius_m=0.0)
 SQUARE = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
-STANDING = Motion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.6)
+STANDING = BaseMotion(v_m_s=0.0, w_rad_s=0.0, deceleration_m_s2=0.6)
 CRUISING = replace(STANDING, v_m_s=0.45)
 STOP = Zone(name="near", kind=ZoneKind.STOP, sources=(ZoneSource.LIDAR,), polygon_m=SQUARE)
 APPROACH = Zone(
@@ -45,7 +45,7 @@ clouds = st.lists(st.tuples(coordinates, coordinates), max_size=12).map(
     lambda rows: np.array(rows, dtype=np.float64).reshape(-1, 2)
 )
 motions = st.builds(
-    Motion,
+    BaseMotion,
     v_m_s=st.floats(-0.5, 0.5),
     w_rad_s=st.floats(-1.5, 1.5),
     deceleration_m_s2=st.just(0.6),
@@ -190,7 +190,9 @@ def test_an_approach_zone_tells_the_time_to_the_collision_and_how_far_it_looks_a
 
 
 @given(clouds, motions)
-def test_what_is_in_a_zone_is_never_further_than_it_reaches(points: Points, motion: Motion) -> None:
+def test_what_is_in_a_zone_is_never_further_than_it_reaches(
+    points: Points, motion: BaseMotion
+) -> None:
     zone = replace(STOP, min_points=1, reaction_s=0.2)
     for footprint in (ROUND, LONG):
         _, found = judge_zone(zone, IDLE, points, footprint, motion, fresh=True)
@@ -217,7 +219,7 @@ def test_a_single_point_never_blocks_both_ways(points: Points) -> None:
 
 
 @given(clouds, st.integers(0, 12), motions)
-def test_fewer_points_never_restrict_more(points: Points, kept: int, motion: Motion) -> None:
+def test_fewer_points_never_restrict_more(points: Points, kept: int, motion: BaseMotion) -> None:
     fewer = points[:kept]
     assert set(directions_towards(fewer, ROUND)) <= set(directions_towards(points, ROUND))
     assert time_to_collision(fewer, ROUND, motion, 1.0) >= (
@@ -249,4 +251,4 @@ def test_driving_an_arc_there_and_back_moves_no_point(
 
 
 def test_an_idle_trigger_remembers_nothing() -> None:
-    assert Trigger() == IDLE
+    assert ZoneMemory() == IDLE

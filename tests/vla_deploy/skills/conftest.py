@@ -17,7 +17,7 @@ from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.world import Snapshot, read_snapshot
 
@@ -73,7 +73,7 @@ class Executor:
 
 @dataclass
 class StandingLink:
-    """Say where the robot stands and what it has seen; the part of `RobotLink` that is state."""
+    """Say where the robot stands and what it has seen; the part of `SkillLink` that is state."""
 
     pose: FloorPose
     objects: list[dict[str, Any]] = field(default_factory=list)
@@ -111,7 +111,7 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
     space = SharedSpace(tmp_path, MonotonicClock())
     return SkillContext(
         robot=load_robot("butler"),
-        link=cast("RobotLink", standing),
+        link=cast("SkillLink", standing),
         planner=PathPlanner(grid, BODY_RADIUS_M),
         arms={},
         say=lambda _: None,

@@ -16,7 +16,7 @@ from vla_deploy.skills.bearings import SEARCH_RATE_RAD_S, SEARCH_S, SEARCH_TURN_
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, drive_to
 from vla_deploy.skills.errors import TryAgain
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 
 STEP_S = 0.1
 
@@ -36,7 +36,7 @@ class Told:
         robot = load_robot("butler")
         self.context = SkillContext(
             robot=robot,
-            link=RobotLink(space, self, robot),
+            link=SkillLink(space, self, robot),
             planner=PathPlanner(grid, 0.2),
             arms={},
             say=lambda _: None,

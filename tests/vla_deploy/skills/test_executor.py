@@ -16,7 +16,7 @@ from vla_deploy.skills import executor
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.executor import PlanExecution
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.resources import WAIT_LIMIT_S, body_of, needs_of
 
 JOINT = "left_shoulder_yaw"
@@ -86,7 +86,7 @@ def stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
     space = SharedSpace(tmp_path / "ipc", clock)
     context = SkillContext(
         robot=robot,
-        link=RobotLink(space, clock, robot),
+        link=SkillLink(space, clock, robot),
         planner=None,  # type: ignore[arg-type]
         arms={},
         say=lambda _: None,

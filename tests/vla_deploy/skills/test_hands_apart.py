@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.control.axes import AxisState
+from vla_deploy.control.axes import AxesState
 from vla_deploy.control.body_shapes import BodyShapes
 from vla_deploy.control.dispatch import axis_limits
 from vla_deploy.control.profile_motion import plan_motion
@@ -42,7 +42,7 @@ def posture(name: str) -> Floats:
 def least_m(start: Floats, end: Floats) -> float:
     """Return how near the arms come to each other on the way."""
     still = np.zeros_like(start)
-    begin = AxisState(position=start, velocity=still, acceleration=still.copy())
+    begin = AxesState(position=start, velocity=still, acceleration=still.copy())
     way = plan_motion(begin, end, LIMITS)
     times_s = np.linspace(0.0, way.duration_s, 30)
     return min(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic.state import State
+from vla_deploy.planning.symbolic.state import SymbolicState
 from vla_deploy.skills.arms import recall_hands
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.errors import NotPossible
@@ -59,7 +59,7 @@ def missing(context: SkillContext, standing: "StandingLink"):
         standing.objects = objects
         context.hands = FREE | hands
         action = Action(id="a", skill="pick_up", parameters={"object": wanted})
-        return WorldCheck(context).missing_effect(action, State(), 0)
+        return WorldCheck(context).missing_effect(action, SymbolicState(), 0)
 
     return missing
 

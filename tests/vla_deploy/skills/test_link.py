@@ -13,7 +13,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, turn
 from vla_deploy.skills.errors import RobotNotReady, TryAgain
-from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S, RobotLink
+from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S, SkillLink
 from vla_deploy.skills.motion import move_joints
 
 
@@ -65,7 +65,7 @@ def space(tmp_path: Path, clock: SteppedClock) -> Iterator[SharedSpace]:
 def test_a_pose_that_grows_old_is_waited_for_and_then_given_up(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     before_it_ever_spoke = link.is_blind
     poses = space.cell_writer("pose")
     put_pose(poses, x_m=1.0, y_m=2.0, yaw_rad=0.5)
@@ -81,7 +81,7 @@ def test_a_pose_that_grows_old_is_waited_for_and_then_given_up(
 def test_a_halt_rests_the_base_only_if_it_was_driven(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     commands = space.cell_reader("base_command")
     link.halt()
     assert commands.latest() is None
@@ -115,7 +115,7 @@ def control_says(space: SharedSpace, **status: object) -> None:
 def test_a_motion_that_control_holds_back_is_known_with_its_cause(
     space: SharedSpace, clock: SteppedClock, twist: Twist, status: dict[str, object], held: bool
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     assert link.held_by_control(twist) == ""
     control_says(space, cause="obstacle_stop_zone", detail="a chair", **status)
     assert link.held_by_control(twist) == ("control holds the base: a chair" if held else "")
@@ -124,7 +124,7 @@ def test_a_motion_that_control_holds_back_is_known_with_its_cause(
 def test_a_protective_stop_is_a_pause_and_no_refusal(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     silent = link.is_paused
     control_says(space, state="protective_stop")
     paused, refusal = link.is_paused, refusal_of(link.control_status)
@@ -132,7 +132,7 @@ def test_a_protective_stop_is_a_pause_and_no_refusal(
     assert (silent, paused, refusal, link.is_paused) == (False, True, None, False)
 
 
-def context_of(link: RobotLink) -> SkillContext:
+def context_of(link: SkillLink) -> SkillContext:
     robot = load_robot("butler")
     book = cast("ClaimBook", None)  # the pieces under test claim and say nothing
     return SkillContext(
@@ -149,7 +149,7 @@ def context_of(link: RobotLink) -> SkillContext:
 def test_a_motion_that_a_pause_ended_is_tried_again_and_one_that_a_stop_ended_is_not(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     results = space.ring_writer("motion_result")
     for state, expected in (("protective_stop", TryAgain), ("stopped", RobotNotReady)):
         control_says(space, state=state)
@@ -169,7 +169,7 @@ def _commands(space: SharedSpace) -> list[Event]:
 def test_a_turn_that_control_holds_back_is_asked_for_until_it_is_given_up(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
-    link = RobotLink(space, clock, load_robot("butler"))
+    link = SkillLink(space, clock, load_robot("butler"))
     poses, commands = space.cell_writer("pose"), space.cell_reader("base_command")
     skill = turn(context_of(link), {"angle_rad": 1.0})
 

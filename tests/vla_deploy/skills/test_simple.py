@@ -16,7 +16,7 @@ from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.simple import speak
 from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.voice.tts import EspeakEngine
@@ -37,7 +37,7 @@ class Talk:
         robot = load_robot("butler")
         self.context = SkillContext(
             robot=robot,
-            link=RobotLink(self.space, self.clock, robot),
+            link=SkillLink(self.space, self.clock, robot),
             planner=cast("PathPlanner", None),
             arms={},
             say=self.shown.append,

@@ -15,7 +15,7 @@ from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import FRAME, Playing, SoundBlock, duration_ns
 from vla_deploy.speech.transcript import Transcript, confidence
 from vla_deploy.speech.transcription_queue import TranscriptionQueue
-from vla_deploy.speech.verdict import OWN_VOICE, Verdict
+from vla_deploy.speech.verdict import OWN_VOICE, PhraseVerdict
 from vla_deploy.speech.voice_activity import VoiceActivity
 
 LOUD = 0.25
@@ -79,14 +79,17 @@ def heard(
 @pytest.mark.parametrize("log_probability", [-0.1, UNSURE])
 def test_a_stop_is_told_in_the_pause_before_its_phrase_ends(log_probability: float) -> None:
     ((at_s, stop), (ended_s, after)) = heard("stop", 0.3, log_probability)
-    assert (stop.judgement.verdict, stop.text) == (Verdict.STOP, "stop")
+    assert (stop.judgement.verdict, stop.text) == (PhraseVerdict.STOP, "stop")
     assert at_s < 0.3 + 0.2 < ended_s
-    assert (after.judgement.verdict, after.judgement.reason) == (Verdict.REJECTED, STOPPED)
+    assert (after.judgement.verdict, after.judgement.reason) == (PhraseVerdict.REJECTED, STOPPED)
 
 
 def test_a_stop_word_among_others_stops_the_robot() -> None:
     told = heard("stop before you hit the chair now", 2.4)
-    assert [one.judgement.verdict for _, one in told] == [Verdict.STOP, Verdict.REJECTED]
+    assert [one.judgement.verdict for _, one in told] == [
+        PhraseVerdict.STOP,
+        PhraseVerdict.REJECTED,
+    ]
     assert told[0][1].text == "stop before you hit the chair now"
 
 
@@ -94,12 +97,12 @@ def test_a_stop_word_among_others_stops_the_robot() -> None:
 def test_other_talk_is_told_once_at_its_end(words: str) -> None:
     ((at_s, one),) = heard(words, 2.4)
     assert at_s > 2.4
-    assert (one.text, one.judgement.verdict) == (words, Verdict.ACCEPTED)
+    assert (one.text, one.judgement.verdict) == (words, PhraseVerdict.ACCEPTED)
 
 
 def test_a_stop_word_among_others_that_are_hardly_understood_stops_nothing() -> None:
     told = heard("take the stop to me now please", 2.4, UNSURE)
-    assert [one.judgement.verdict for _, one in told] == [Verdict.DOUBTED]
+    assert [one.judgement.verdict for _, one in told] == [PhraseVerdict.DOUBTED]
 
 
 def test_the_robots_own_stop_word_stops_nothing_while_no_person_is_known_to_speak() -> None:
@@ -107,4 +110,4 @@ def test_the_robots_own_stop_word_stops_nothing_while_no_person_is_known_to_spea
     told = heard("stop", 0.1, playing=saying)
     assert [one.judgement.reason for _, one in told] in ([], [OWN_VOICE])
     told = heard("stop", 0.4, playing=saying)
-    assert told[0][1].judgement.verdict is Verdict.STOP, "a person has barged in"
+    assert told[0][1].judgement.verdict is PhraseVerdict.STOP, "a person has barged in"

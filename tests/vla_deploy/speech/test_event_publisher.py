@@ -14,14 +14,14 @@ from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.event_publisher import SpeechEvents
 from vla_deploy.speech.sound import NOTHING
 from vla_deploy.speech.transcript import Transcript
-from vla_deploy.speech.verdict import Judgement, Verdict
+from vla_deploy.speech.verdict import PhraseJudgement, PhraseVerdict
 
 TOPICS = ("heard", "utterance", "say", "operator")
 
 
 def heard(
     text: str,
-    verdict: Verdict,
+    verdict: PhraseVerdict,
     *,
     ask_again: bool = False,
     others: tuple[tuple[str, float], ...] = (),
@@ -38,7 +38,7 @@ def heard(
     return HeardPhrase(
         phrase=Phrase(began_ns=NS_PER_S // 2, ended_ns=NS_PER_S, samples=NOTHING),
         transcript=reading,
-        judgement=Judgement(verdict=verdict, reason="because", ask_again=ask_again),
+        judgement=PhraseJudgement(verdict=verdict, reason="because", ask_again=ask_again),
     )
 
 
@@ -64,7 +64,7 @@ def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
     publisher: SpeechEvents, told: Any, clock: ManualClock
 ) -> None:
     clock.ns = NS_PER_S + 300_000_000
-    publisher.publish(heard("pick up the red cup", Verdict.ACCEPTED))
+    publisher.publish(heard("pick up the red cup", PhraseVerdict.ACCEPTED))
     (utterance,) = told("utterance")
     assert (utterance["text"], utterance["source"]) == ("pick up the red cup", "voice")
     assert utterance["command_id"].startswith("voice-")
@@ -77,7 +77,7 @@ def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
 
 
 def test_a_stop_presses_the_button_and_is_no_command(publisher: SpeechEvents, told: Any) -> None:
-    publisher.publish(heard("stop!", Verdict.STOP))
+    publisher.publish(heard("stop!", PhraseVerdict.STOP))
     (press,) = told("operator")
     assert (press["act"], press["source"], press["reason"]) == ("estop", "voice", 'heard "stop!"')
     assert told("utterance") == []
@@ -85,7 +85,7 @@ def test_a_stop_presses_the_button_and_is_no_command(publisher: SpeechEvents, to
 
 
 def test_a_refusal_is_never_a_command(publisher: SpeechEvents, told: Any) -> None:
-    publisher.publish(heard("nice weather", Verdict.REJECTED))
+    publisher.publish(heard("nice weather", PhraseVerdict.REJECTED))
     assert told("utterance") == told("operator") == told("say") == []
     assert told("heard")[0]["reason"] == "because"
 
@@ -94,13 +94,13 @@ def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
     publisher: SpeechEvents, told: Any
 ) -> None:
     others = (("put it in the box", 0.7), ("word " * 60, 0.1))
-    publisher.publish(heard("put it in the boss", Verdict.DOUBTED, others=others))
+    publisher.publish(heard("put it in the boss", PhraseVerdict.DOUBTED, others=others))
     (utterance,) = told("utterance")
     given = utterance["heard"]
     assert given["others"] == [{"text": "put it in the box", "odds": 0.7}]
     assert (given["doubted"], given["ask_again"]) == (True, True)
     assert told("say") == [], "the planner asks, if it makes no sense of them"
-    publisher.publish(heard("put it in the boss", Verdict.DOUBTED))
+    publisher.publish(heard("put it in the boss", PhraseVerdict.DOUBTED))
     assert told("utterance")[0]["heard"]["ask_again"] is False, "nobody is asked again so soon"
 
 
@@ -110,11 +110,11 @@ def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
     asked = []
     for second in range(120):
         clock.ns = (10 + second) * NS_PER_S
-        publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
+        publisher.publish(heard("mumble", PhraseVerdict.REJECTED, ask_again=True))
         asked += [second] * len(told("say"))
     assert asked == [0, 10, 30, 70]
-    publisher.publish(heard("turn left", Verdict.ACCEPTED))
-    publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
+    publisher.publish(heard("turn left", PhraseVerdict.ACCEPTED))
+    publisher.publish(heard("mumble", PhraseVerdict.REJECTED, ask_again=True))
     (order,) = told("say")
     assert "say it again" in order["text"]
     assert order["source"] == "speech"

@@ -20,7 +20,7 @@ from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.ipc.page_sound import PageSound, Step
+from vla_deploy.ipc.page_sound import PageSound, SoundStep
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.node import SpeechNode
@@ -150,7 +150,7 @@ class Bench:
     def hold(
         self,
         text: str,
-        last: Step | None = Step.ENDED,
+        last: SoundStep | None = SoundStep.ENDED,
         rate_hz: int = 48_000,
         share: float = 1.0,
     ) -> None:
@@ -163,7 +163,7 @@ class Bench:
         turn, size = self.turn, rate_hz // 10
         for at in range(0, len(samples), size):
             sound = PageSound(
-                turn=turn, rate_hz=rate_hz, step=Step.SOUND, samples=samples[at : at + size]
+                turn=turn, rate_hz=rate_hz, step=SoundStep.SOUND, samples=samples[at : at + size]
             )
             records.append(sound.packed())
             self.quiet(0.1)
@@ -415,7 +415,7 @@ def test_what_is_said_into_the_page_is_understood_as_soon_as_the_button_is_let_g
 def test_a_phrase_that_is_cut_off_is_not_carried_out(bench: MakeBench) -> None:
     rig = bench()
     rig.quiet(1.0)
-    rig.hold(TEXT, last=Step.CUT, share=0.5)
+    rig.hold(TEXT, last=SoundStep.CUT, share=0.5)
     rig.quiet(3.0)
     assert rig.told("heard") == rig.told("utterance") == []
     rig.say(TEXT)
@@ -439,7 +439,7 @@ def test_while_a_person_speaks_into_the_page_the_room_is_heard_for_stop_words_on
     rig.quiet(1.0)
     records, heard = rig.space.record_writer("page_sound"), len(rig.listener.blocks)
     silence = np.zeros(1600, np.int16)
-    sound = PageSound(turn=9, rate_hz=16_000, step=Step.SOUND, samples=silence).packed()
+    sound = PageSound(turn=9, rate_hz=16_000, step=SoundStep.SOUND, samples=silence).packed()
     for _ in range(3):
         records.append(sound)
         rig.say(TEXT)

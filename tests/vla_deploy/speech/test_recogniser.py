@@ -11,7 +11,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
-from vla_deploy.inference.manifest import Context
+from vla_deploy.inference.manifest import EncoderContext
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
@@ -33,8 +33,10 @@ def opened(folder: Path, choice: ModelChoice = CHOICE) -> Recogniser:
     return open_recogniser(store.load(folder.name), choice, beam=1, clock=MonotonicClock())
 
 
-@pytest.mark.parametrize("context", [Context.TRIMMED, Context.PADDED])
-def test_a_text_is_read_with_what_speaks_for_it(scripted_whisper: Any, context: Context) -> None:
+@pytest.mark.parametrize("context", [EncoderContext.TRIMMED, EncoderContext.PADDED])
+def test_a_text_is_read_with_what_speaks_for_it(
+    scripted_whisper: Any, context: EncoderContext
+) -> None:
     folder = scripted_whisper.model("ours", "pick up the red cup", context=context)
     recogniser = opened(folder)
     reading = recogniser.read(SECOND)
@@ -50,7 +52,7 @@ def test_a_text_is_read_with_what_speaks_for_it(scripted_whisper: Any, context: 
 def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: Any) -> None:
     trimmed, padded = (
         opened(scripted_whisper.model(name, "turn left", context=context))
-        for name, context in (("short", Context.TRIMMED), ("long", Context.PADDED))
+        for name, context in (("short", EncoderContext.TRIMMED), ("long", EncoderContext.PADDED))
     )
     frames: list[int] = []
     for recogniser in (trimmed, padded):
@@ -68,7 +70,7 @@ def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: A
 
 def test_no_length_of_sound_is_encoded_twice(scripted_whisper: Any) -> None:
     """CTranslate2 takes states for features where there are as many of them as mel bands."""
-    recogniser = opened(scripted_whisper.model("ours", "turn left", context=Context.TRIMMED))
+    recogniser = opened(scripted_whisper.model("ours", "turn left", context=EncoderContext.TRIMMED))
     model = recogniser._whisper
     encode = model.model.encode
     states: list[tuple[int, ...]] = []

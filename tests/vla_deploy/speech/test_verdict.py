@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.speech.transcript import Transcript, confidence
-from vla_deploy.speech.verdict import Judgement, Verdict, judge, stops
+from vla_deploy.speech.verdict import PhraseJudgement, PhraseVerdict, judge, stops
 from vla_deploy.speech.words import is_stop, is_unfinished, words_of
 
 TRANSCRIPT = Transcript(
@@ -21,13 +21,13 @@ TRANSCRIPT = Transcript(
 LEAST = 0.5
 
 
-def judged(own_words: str = "", **changes: Any) -> Judgement:
+def judged(own_words: str = "", **changes: Any) -> PhraseJudgement:
     return judge(replace(TRANSCRIPT, **changes), own_words, LEAST)
 
 
 def test_a_sure_reading_is_a_command() -> None:
     judgement = judged()
-    assert (judgement.verdict, judgement.reason) == (Verdict.ACCEPTED, "")
+    assert (judgement.verdict, judgement.reason) == (PhraseVerdict.ACCEPTED, "")
 
 
 @pytest.mark.parametrize(
@@ -51,24 +51,24 @@ def test_what_speaks_against_it_is_told(
     changed: dict[str, Any], reason: str, ask_again: bool
 ) -> None:
     judgement = judged(**changed)
-    assert judgement.verdict is Verdict.REJECTED
+    assert judgement.verdict is PhraseVerdict.REJECTED
     assert reason in judgement.reason
     assert judgement.ask_again is ask_again
 
 
 @pytest.mark.parametrize(
     ("confidence", "verdict"),
-    [(0.24, Verdict.REJECTED), (0.25, Verdict.DOUBTED), (0.49, Verdict.DOUBTED)],
+    [(0.24, PhraseVerdict.REJECTED), (0.25, PhraseVerdict.DOUBTED), (0.49, PhraseVerdict.DOUBTED)],
 )
 def test_what_is_only_not_sure_enough_is_for_the_planner_to_make_sense_of(
-    confidence: float, verdict: Verdict
+    confidence: float, verdict: PhraseVerdict
 ) -> None:
     assert judged(confidence=confidence).verdict is verdict
 
 
 def test_what_else_speaks_against_it_is_no_doubt() -> None:
     judgement = judged(confidence=0.4, no_speech=0.93)
-    assert judgement.verdict is Verdict.REJECTED
+    assert judgement.verdict is PhraseVerdict.REJECTED
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_else_speaks_against_it_is_no_doubt() -> None:
     ],
 )
 def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: str) -> None:
-    assert judged(text=answer, own_words=said).verdict is Verdict.ACCEPTED
+    assert judged(text=answer, own_words=said).verdict is PhraseVerdict.ACCEPTED
 
 
 @pytest.mark.parametrize(

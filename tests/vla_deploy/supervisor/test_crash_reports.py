@@ -6,7 +6,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.crash_reports import CrashReports, signal_name, traceback_of
-from vla_deploy.supervisor.lifecycle import Record, State
+from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.state_folder import BoundedFolder
 
@@ -39,14 +39,18 @@ def crashes(tmp_path, folder):
     return CrashReports(folder, run_dir, RunOptions(), space, clock)
 
 
-def end(crashes: CrashReports, before: State, after: State, **fields) -> None:
+def end(crashes: CrashReports, before: ProcessState, after: ProcessState, **fields) -> None:
     crashes.note(
-        {"planner": Record(state=before)}, {"planner": Record(state=after, **fields)}, STARTED
+        {"planner": ProcessRecord(state=before)},
+        {"planner": ProcessRecord(state=after, **fields)},
+        STARTED,
     )
 
 
 def test_a_report_tells_how_whom_and_how_old_the_topics_were(crashes, folder):
-    end(crashes, State.READY, State.BACKOFF, exit_code=-9, reason="killed by signal 9")
+    end(
+        crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=-9, reason="killed by signal 9"
+    )
     (path,) = folder.entries()
     report = json.loads(path.read_text())
     assert path.name == "000001-planner.json"
@@ -59,11 +63,11 @@ def test_a_report_tells_how_whom_and_how_old_the_topics_were(crashes, folder):
 @pytest.mark.parametrize(
     ("before", "after"),
     [
-        (State.READY, State.STOPPING),
-        (State.STOPPING, State.STOPPED),
-        (State.BACKOFF, State.STARTING),
-        (State.GIVEN_UP, State.GIVEN_UP),
-        (State.STOPPING, State.OFF),
+        (ProcessState.READY, ProcessState.STOPPING),
+        (ProcessState.STOPPING, ProcessState.STOPPED),
+        (ProcessState.BACKOFF, ProcessState.STARTING),
+        (ProcessState.GIVEN_UP, ProcessState.GIVEN_UP),
+        (ProcessState.STOPPING, ProcessState.OFF),
     ],
 )
 def test_what_ends_as_asked_or_has_been_told_is_not_reported(crashes, folder, before, after):
@@ -73,7 +77,7 @@ def test_what_ends_as_asked_or_has_been_told_is_not_reported(crashes, folder, be
 
 def test_old_reports_make_room(crashes, folder):
     for _ in range(4):
-        end(crashes, State.READY, State.BACKOFF, exit_code=1)
+        end(crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=1)
     assert [path.name for path in folder.entries()] == [
         "000003-planner.json",
         "000004-planner.json",
@@ -82,7 +86,7 @@ def test_old_reports_make_room(crashes, folder):
 
 def test_a_folder_that_cannot_be_written_is_told_and_stops_nobody(crashes, folder, caplog):
     folder.path.write_text("no folder")
-    end(crashes, State.READY, State.BACKOFF, exit_code=1)
+    end(crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=1)
     assert "no crash report of planner" in caplog.text
 
 
@@ -91,7 +95,7 @@ def test_lines_of_an_earlier_instance_are_left_out(crashes, folder, tmp_path):
     common = {"stamp_ns": 1, "time": "t", "level": "ERROR", "process": "planner"}
     lines = [{**common, "pid": pid, "message": f"of {pid}"} for pid in (41, 42)]
     log.write_text("".join(json.dumps(line) + "\n" for line in lines) + '{"cut off')
-    end(crashes, State.READY, State.BACKOFF, exit_code=1)
+    end(crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=1)
     report = json.loads(folder.entries()[0].read_text())
     assert report["last_log"] == ["t planner: ERROR: of 42"]
 
@@ -118,10 +122,10 @@ def test_a_report_that_does_not_fit_on_the_disk_leaves_no_broken_one(crashes, fo
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
     try:
-        end(crashes, State.READY, State.BACKOFF, exit_code=-9)
+        end(crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=-9)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert folder.entries() == []
     assert "no crash report of planner" in caplog.text
-    end(crashes, State.READY, State.BACKOFF, exit_code=-9)
+    end(crashes, ProcessState.READY, ProcessState.BACKOFF, exit_code=-9)
     assert len(folder.entries()) == 1

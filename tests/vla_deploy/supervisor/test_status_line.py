@@ -2,15 +2,17 @@
 
 import pytest
 
-from vla_deploy.supervisor.lifecycle import Record, State
+from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
 from vla_deploy.supervisor.status_line import status_line, trouble_in, with_late
 
-READY = Record(state=State.READY)
+READY = ProcessRecord(state=ProcessState.READY)
 
 
-@pytest.mark.parametrize("state", [State.BACKOFF, State.GIVEN_UP, State.ABORTING])
-def test_a_process_that_fails_is_trouble(state: State) -> None:
-    failing = Record(state=state, reason="exit code 1")
+@pytest.mark.parametrize(
+    "state", [ProcessState.BACKOFF, ProcessState.GIVEN_UP, ProcessState.ABORTING]
+)
+def test_a_process_that_fails_is_trouble(state: ProcessState) -> None:
+    failing = ProcessRecord(state=state, reason="exit code 1")
     status = status_line({"control": READY, "planner": failing}, stopping=False)
     assert status == f"degraded: planner {state.value} (exit code 1)"
     assert trouble_in(status) == status
@@ -24,15 +26,15 @@ def test_what_is_late_is_trouble() -> None:
 @pytest.mark.parametrize(
     ("state", "status"),
     [
-        (State.READY, "all 2 processes ready"),
-        (State.STARTING, "starting planner: 1 of 2 ready"),
-        (State.OFF, "all 1 processes ready"),
+        (ProcessState.READY, "all 2 processes ready"),
+        (ProcessState.STARTING, "starting planner: 1 of 2 ready"),
+        (ProcessState.OFF, "all 1 processes ready"),
     ],
 )
 def test_what_starts_or_is_off_is_no_trouble_nor_is_another_profile(
-    state: State, status: str
+    state: ProcessState, status: str
 ) -> None:
-    records = {"control": READY, "planner": Record(state=state)}
+    records = {"control": READY, "planner": ProcessRecord(state=state)}
     told = status_line(records, stopping=False, fault="the chosen profile x does not load")
     assert told == f"{status}; the chosen profile x does not load"
     assert trouble_in(with_late(told, [])) == ""

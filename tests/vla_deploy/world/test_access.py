@@ -3,7 +3,7 @@ from collections.abc import Callable
 import pytest
 
 from vla_deploy.world import Body, Snapshot, Thing, Viewpoint, access_to
-from vla_deploy.world.access import Bar, Way
+from vla_deploy.world.access import Bar, GraspStand
 from vla_deploy.world.thing import Rest
 
 Make, MakeWorld = Callable[..., Thing], Callable[..., Snapshot]
@@ -17,20 +17,20 @@ def bars(one: Thing, snapshot: Snapshot, body: Body = BODY) -> list[tuple[Bar, s
 def test_a_cup_before_the_robot_can_be_taken_from_here(thing: Make, world: MakeWorld) -> None:
     cup = thing("cup", 0.45, 0.1)
     found = access_to(cup, world(cup), BODY)
-    assert (found.way, found.is_graspable, found.is_accessible) == (Way.HERE, True, True)
+    assert (found.way, found.is_graspable, found.is_accessible) == (GraspStand.HERE, True, True)
 
 
 @pytest.mark.parametrize(("x_m", "y_m"), [(0.7, 0.0), (0.45, 0.3), (0.2, 0.0), (-0.45, 0.0)])
 def test_elsewhere_it_takes_a_drive(thing: Make, world: MakeWorld, x_m: float, y_m: float) -> None:
     cup = thing("cup", x_m, y_m)
-    assert access_to(cup, world(cup), BODY).way is Way.AFTER_DRIVING
+    assert access_to(cup, world(cup), BODY).way is GraspStand.AFTER_DRIVING
 
 
 def test_where_nobody_can_stand_it_says_so(thing: Make, world: MakeWorld) -> None:
     cup = thing("cup", 2.0, 0.0)
     walled = Body(opening_max_m=0.088, hands=("left",), is_free=lambda x_m, y_m: False)
     found = access_to(cup, world(cup), walled)
-    assert (found.way, bars(cup, world(cup), walled)) == (Way.NONE, [(Bar.NO_STAND, "")])
+    assert (found.way, bars(cup, world(cup), walled)) == (GraspStand.NONE, [(Bar.NO_STAND, "")])
 
 
 def test_a_book_under_a_ball_is_blocked_by_it(thing: Make, world: MakeWorld) -> None:
@@ -117,6 +117,6 @@ def test_a_place_that_is_a_guess_must_be_looked_at_first(thing: Make, world: Mak
 def test_without_a_pose_or_a_map_it_still_judges_the_grasp(thing: Make, world: MakeWorld) -> None:
     cup = thing("cup", 0.45, 0.0)
     blind = Body(opening_max_m=0.088, hands=("left",))
-    assert access_to(cup, world(cup, robot=None), blind).way is Way.AFTER_DRIVING
+    assert access_to(cup, world(cup, robot=None), blind).way is GraspStand.AFTER_DRIVING
     seen = world(cup, robot=Viewpoint(x_m=0.0, y_m=0.0))
-    assert access_to(cup, seen, blind).way is Way.HERE
+    assert access_to(cup, seen, blind).way is GraspStand.HERE

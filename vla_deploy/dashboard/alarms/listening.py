@@ -7,7 +7,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.told import Document, Told, Word
-from vla_deploy.ipc import TOPICS, Kind, Sample
+from vla_deploy.ipc import TOPICS, Sample, TopicKind
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
 
 DOCUMENTS: Final = frozenset(
@@ -25,7 +25,7 @@ DOCUMENTS: Final = frozenset(
 )
 _WINDOW_NS: Final = 5 * NS_PER_S
 _CELLS: Final = tuple(
-    topic.name for topic in TOPICS if topic.kind is Kind.CELL and topic.deadline_s
+    topic.name for topic in TOPICS if topic.kind is TopicKind.CELL and topic.deadline_s
 )
 
 

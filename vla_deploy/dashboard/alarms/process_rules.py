@@ -6,7 +6,7 @@ from typing import Final
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Document, Told
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.supervisor.lifecycle import State
+from vla_deploy.supervisor.lifecycle import ProcessState
 from vla_deploy.supervisor.table import TABLE, GivingUp
 
 GIVEN_UP: Final[Mapping[GivingUp, Severity]] = {
@@ -14,7 +14,7 @@ GIVEN_UP: Final[Mapping[GivingUp, Severity]] = {
     GivingUp.NO_COMMANDS: Severity.ERROR,
     GivingUp.CARRY_ON: Severity.WARNING,
 }
-_AGAIN: Final = (State.BACKOFF.value, State.ABORTING.value)
+_AGAIN: Final = (ProcessState.BACKOFF.value, ProcessState.ABORTING.value)
 _WHAT_IT_MEANS: Final = {spec.name: spec.giving_up for spec in TABLE}
 
 
@@ -38,7 +38,7 @@ def silent_supervisor(told: Told) -> Iterator[Finding]:
 def lost_processes(told: Told) -> Iterator[Finding]:
     """Find processes that were given up, and those that are being started again."""
     for row in _rows(told):
-        if row["state"] == State.GIVEN_UP.value:
+        if row["state"] == ProcessState.GIVEN_UP.value:
             yield _given_up(row)
         elif row["state"] in _AGAIN or _is_starting_again(row):
             yield _started_again(row)
@@ -47,7 +47,7 @@ def lost_processes(told: Told) -> Iterator[Finding]:
 def odd_topics(told: Told) -> Iterator[Finding]:
     """Find what the supervisor's watch says: too few values, and such as cannot be."""
     for row in _rows(told):
-        for topic in row["topics"] if row["state"] == State.READY.value else ():
+        for topic in row["topics"] if row["state"] == ProcessState.READY.value else ():
             yield from _seldom(row["name"], topic)
             yield from _nonsense(row["name"], topic)
 
@@ -72,7 +72,7 @@ def _given_up(row: Document) -> Finding:
 
 
 def _is_starting_again(row: Document) -> bool:
-    return row["state"] == State.STARTING.value and bool(row["restarts"])
+    return row["state"] == ProcessState.STARTING.value and bool(row["restarts"])
 
 
 def _started_again(row: Document) -> Finding:

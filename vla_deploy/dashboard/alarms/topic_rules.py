@@ -5,7 +5,7 @@ from typing import Final
 
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Told
-from vla_deploy.ipc import TOPICS, Kind, Topic
+from vla_deploy.ipc import TOPICS, Topic, TopicKind
 
 BY_OWNER: Final[Mapping[str, Severity]] = {"control": Severity.CRITICAL}
 """How grave a silent topic is by its owner; of others it is a warning."""
@@ -25,7 +25,7 @@ _AGAIN: Final = "the supervisor starts it again before long; see why"
 _CELLS: Final = tuple(
     topic
     for topic in TOPICS
-    if topic.kind is Kind.CELL and topic.deadline_s and topic.name not in ON_DEMAND
+    if topic.kind is TopicKind.CELL and topic.deadline_s and topic.name not in ON_DEMAND
 )
 
 

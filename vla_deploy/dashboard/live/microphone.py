@@ -22,7 +22,7 @@ from vla_deploy.dashboard.live.turn import (
     rate_in,
 )
 from vla_deploy.ipc import RecordWriter
-from vla_deploy.ipc.page_sound import NOTHING, PageSound, Samples, Step
+from vla_deploy.ipc.page_sound import NOTHING, PageSound, Samples, SoundStep
 
 LET_GO: Final = frozenset({1000, 1005})
 """How a page closes a connection; one that is lost, or a page that is left, closes it otherwise."""
@@ -51,7 +51,7 @@ class PageMicrophones:
         if self._link.fresh("speech_status", _EARS_S) is None:
             raise TurnRefused(1013, "deaf", "the robot's speech process does not run")
 
-    def hand_on(self, turn: "OpenTurn", step: Step, samples: Samples = NOTHING) -> None:
+    def hand_on(self, turn: "OpenTurn", step: SoundStep, samples: Samples = NOTHING) -> None:
         """Give a step of a turn to the speech process."""
         rate_hz = turn.rules.rate_hz
         sound = PageSound(turn=turn.number, rate_hz=rate_hz, step=step, samples=samples)
@@ -74,12 +74,12 @@ class OpenTurn:
             TurnRefused: what came is not taken.
             WebSocketDisconnect: the connection was lost.
         """
-        step = Step.CUT
+        step = SoundStep.CUT
         try:
             while (data := await self._next()) is not None:
                 samples = self.rules.take(data, self._microphones.clock.now_ns())
-                self._microphones.hand_on(self, Step.SOUND, samples)
-            step = Step.ENDED
+                self._microphones.hand_on(self, SoundStep.SOUND, samples)
+            step = SoundStep.ENDED
         finally:
             self._microphones.hand_on(self, step)
 

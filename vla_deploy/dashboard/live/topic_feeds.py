@@ -9,7 +9,7 @@ import numpy as np
 
 from vla_deploy.dashboard.live.feed import Feed
 from vla_deploy.dashboard.live.message import Message, Moment, json_message, text_message
-from vla_deploy.ipc import TOPICS, CellReader, Kind, RingReader, Sample, SharedSpace, Topic
+from vla_deploy.ipc import TOPICS, CellReader, RingReader, Sample, SharedSpace, Topic, TopicKind
 from vla_deploy.ipc.layout import is_document
 
 FASTEST_S: Final = 0.1
@@ -96,11 +96,13 @@ class RingFeed:
 def topic_feeds(space: SharedSpace, joint_names: Sequence[str]) -> list[Feed]:
     """Return a feed for each cell and each event ring of the schema table."""
     extra = {"joint_state": {"names": list(joint_names)}}
-    make: Mapping[Kind, Callable[[Topic], Feed]] = {
-        Kind.CELL: lambda topic: CellFeed(
+    make: Mapping[TopicKind, Callable[[Topic], Feed]] = {
+        TopicKind.CELL: lambda topic: CellFeed(
             topic, space.cell_reader(topic.name), extra.get(topic.name, {})
         ),
-        Kind.RING: lambda topic: RingFeed(topic, space.ring_reader(topic.name, from_start=False)),
+        TopicKind.RING: lambda topic: RingFeed(
+            topic, space.ring_reader(topic.name, from_start=False)
+        ),
     }
     return [make[topic.kind](topic) for topic in TOPICS if topic.kind in make]
 

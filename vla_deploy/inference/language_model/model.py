@@ -20,7 +20,7 @@ from vla_deploy.inference.language_model.model_folder import (
     read_tokenizers,
 )
 from vla_deploy.inference.manifest import Language
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_servers.deadline import Deadline
 
 # Tokens of one run. Exports score every token that they read: 3000 of a prompt at once would be
@@ -151,7 +151,7 @@ class LanguageModel:
         self._session.close()
 
 
-def open_language_model(model: Model, choice: ModelChoice) -> LanguageModel:
+def open_language_model(model: StoredModel, choice: ModelChoice) -> LanguageModel:
     """Open a model of the store, every file of it as it was checked in.
 
     Raises:

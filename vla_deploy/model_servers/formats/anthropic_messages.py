@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 from urllib.parse import quote
 
-from vla_deploy.model_servers.chat import Chat, Completion, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.base import Json, ModelFacts, WireRequest, count, part
@@ -77,7 +77,7 @@ class AnthropicMessages:
         return ModelFacts(is_present=True, known=(str(part(reply, "id")),))
 
 
-def _turn(message: Message) -> Json:
+def _turn(message: ChatMessage) -> Json:
     images = [
         {
             "type": "image",

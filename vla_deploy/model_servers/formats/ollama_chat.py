@@ -3,7 +3,7 @@
 import base64
 from typing import Final
 
-from vla_deploy.model_servers.chat import Chat, Completion, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerTruncated
 from vla_deploy.model_servers.formats.base import (
@@ -79,7 +79,7 @@ class OllamaChat:
         )
 
 
-def _turn(message: Message) -> Json:
+def _turn(message: ChatMessage) -> Json:
     turn: Json = {"role": message.role, "content": message.text}
     if message.images:
         turn["images"] = [base64.b64encode(image).decode("ascii") for image in message.images]

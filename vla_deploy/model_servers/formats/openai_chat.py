@@ -4,7 +4,7 @@ import base64
 from collections.abc import Mapping
 from typing import Any, Final
 
-from vla_deploy.model_servers.chat import Chat, Completion, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.base import (
@@ -86,7 +86,7 @@ class OpenAiChat:
         )
 
 
-def _turn(message: Message) -> Json:
+def _turn(message: ChatMessage) -> Json:
     if not message.images:
         return {"role": message.role, "content": message.text}
     images = [

@@ -8,19 +8,19 @@ from drivers.clock import Clock
 from vla_deploy.inference.errors import ImagesInvalid, ModelMismatch
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
-    Detection,
+    DetectionOutputs,
     Fit,
     ImageInput,
-    Layout,
     Manifest,
     ModelFile,
     Tensor,
+    TensorLayout,
     Variant,
 )
 from vla_deploy.inference.opening import PLAIN_CHOICE, Graph, read_graph
 from vla_deploy.inference.session import open_session
-from vla_deploy.inference.store import Model, ModelStore
-from vla_deploy.model_tools.detectors.trial import Trial, try_out
+from vla_deploy.inference.store import ModelStore, StoredModel
+from vla_deploy.model_tools.detectors.trial import DetectorTrial, try_out
 from vla_deploy.model_tools.keeping import CARD, keep_tried, require_free
 from vla_deploy.perception.detectors.adapters import ADAPTERS
 from vla_deploy.perception.detectors.detector import ROLE, Detector
@@ -57,7 +57,7 @@ class DetectorSource:
 
 def add_model(
     store: ModelStore, source: DetectorSource, *, engines: Path, clock: Clock, replace: bool = False
-) -> tuple[Model, Trial]:
+) -> tuple[StoredModel, DetectorTrial]:
     """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
 
     Raises:
@@ -79,7 +79,7 @@ def add_model(
     )
 
 
-def try_model(model: Model, *, engines: Path, clock: Clock) -> Trial:
+def try_model(model: StoredModel, *, engines: Path, clock: Clock) -> DetectorTrial:
     """Run a detector on the CPU, on images with nothing in them.
 
     Raises:
@@ -101,7 +101,7 @@ def describe(source: DetectorSource, graph: Graph) -> Manifest:
     """
     tensor, image = _image_input(source, graph)
     classes = _classes(source, graph)
-    detection = Detection(
+    detection = DetectionOutputs(
         adapter=source.adapter or "",
         classes=classes,
         score_threshold=source.score_threshold,
@@ -121,7 +121,9 @@ def describe(source: DetectorSource, graph: Graph) -> Manifest:
     )
 
 
-def _with_adapter(source: DetectorSource, graph: Graph, detection: Detection) -> Detection:
+def _with_adapter(
+    source: DetectorSource, graph: Graph, detection: DetectionOutputs
+) -> DetectionOutputs:
     """Return the detection with an adapter: the one that was named, or the only one that fits."""
     fitting = [
         name
@@ -149,14 +151,14 @@ def _image_input(source: DetectorSource, graph: Graph) -> tuple[Tensor, ImageInp
         fault = f"expected one image as input, [1, 3, height, width], got {shapes}"
         raise ModelMismatch(str(source.onnx), (fault,))
     (tensor,) = graph.inputs
-    layout = Layout.NHWC if tensor.shape[3] == _CHANNELS else Layout.NCHW
-    height, width = tensor.shape[1:3] if layout == Layout.NHWC else tensor.shape[2:4]
+    layout = TensorLayout.NHWC if tensor.shape[3] == _CHANNELS else TensorLayout.NCHW
+    height, width = tensor.shape[1:3] if layout == TensorLayout.NHWC else tensor.shape[2:4]
     if isinstance(width, str) or isinstance(height, str):
         if source.size_px is None:
             fault = f"its input {list(tensor.shape)} has no size; give one by --size WIDTHxHEIGHT"
             raise ModelMismatch(str(source.onnx), (fault,))
         width, height = source.size_px
-    shape = (1, 3, height, width) if layout == Layout.NCHW else (1, height, width, 3)
+    shape = (1, 3, height, width) if layout == TensorLayout.NCHW else (1, height, width, 3)
     image = ImageInput(
         width_px=width,
         height_px=height,

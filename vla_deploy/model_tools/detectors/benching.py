@@ -12,7 +12,7 @@ from platforms import ModelChoice
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession, open_session
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.memory import memory_mb
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import Image
@@ -22,7 +22,7 @@ _INT8: Final = (Variant.INT8_U8S8, Variant.INT8_S8S8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class FileFigures:
     """Hold the figures of one file: frames, from the image to its boxes, and the runs in them.
 
     95 % of them take no longer than `_p95_s`. `memory_mb` is what a fresh process grows by.
@@ -41,7 +41,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
+class ModelFigures:
     """Hold the figures of one model.
 
     `int8_speedup` is by how much int8 runs faster than fp32; None unless both were measured.
@@ -49,7 +49,7 @@ class Bench:
 
     model: str
     threads: int
-    rows: tuple[Row, ...]
+    rows: tuple[FileFigures, ...]
     int8_speedup: float | None
 
     def document(self) -> dict[str, Any]:
@@ -73,9 +73,9 @@ class _Timed:
         self.frames_s.append((clock.now_ns() - started_ns) / NS_PER_S)
         self.runs_s.append(self.session.stats().busy_s - busy_s)
 
-    def row(self, shelf: ModelShelf) -> Row:
+    def row(self, shelf: ModelShelf) -> FileFigures:
         stats = self.session.stats()
-        return Row(
+        return FileFigures(
             variant=stats.variant,
             provider=stats.provider,
             frames=len(self.frames_s),
@@ -90,8 +90,8 @@ class _Timed:
 
 
 def bench(
-    shelf: ModelShelf, model: Model, choice: ModelChoice, images: Sequence[Image], rounds: int
-) -> Bench:
+    shelf: ModelShelf, model: StoredModel, choice: ModelChoice, images: Sequence[Image], rounds: int
+) -> ModelFigures:
     """Measure every file that the choice's providers would take at some precision.
 
     Raises:
@@ -107,12 +107,12 @@ def bench(
     finally:
         for one in timed:
             one.detector.close()
-    return Bench(
+    return ModelFigures(
         model=model.manifest.name, threads=choice.threads, rows=rows, int8_speedup=_speedup(rows)
     )
 
 
-def _open_all(shelf: ModelShelf, model: Model, choice: ModelChoice) -> Iterator[_Timed]:
+def _open_all(shelf: ModelShelf, model: StoredModel, choice: ModelChoice) -> Iterator[_Timed]:
     seen: set[Variant] = set()
     for precision in _PRECISIONS:
         asked = dataclasses.replace(choice, precision=precision)
@@ -124,7 +124,7 @@ def _open_all(shelf: ModelShelf, model: Model, choice: ModelChoice) -> Iterator[
         yield _Timed(session, asked)
 
 
-def _speedup(rows: tuple[Row, ...]) -> float | None:
+def _speedup(rows: tuple[FileFigures, ...]) -> float | None:
     medians = {row.variant: row.run_median_s for row in rows}
     int8 = next((medians[variant] for variant in _INT8 if variant in medians), None)
     return medians[Variant.FP32] / int8 if int8 and Variant.FP32 in medians else None

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from vla_deploy.inference.errors import ModelFileSpoiled, ToolMissing
+from vla_deploy.inference.errors import ModelFileSpoiled, PackageMissing
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.runtime import SESSION_ERRORS
 from vla_deploy.runtime.one_line import one_line
@@ -112,7 +112,7 @@ def _tools() -> tuple[Any, Any]:
     try:
         return import_module("onnx"), import_module("onnxruntime.quantization")
     except ImportError as error:
-        raise ToolMissing(
+        raise PackageMissing(
             f"quantising needs {error.name}, which is not installed; try: "
             "pip install 'vla-deploy[models]'"
         ) from error

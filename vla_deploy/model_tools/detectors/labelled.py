@@ -19,13 +19,13 @@ from vla_deploy.inference.errors import ImagesInvalid
 from vla_deploy.model_tools.detectors.images import image_paths, read_image
 from vla_deploy.perception.detectors.boxes import Floats, Indices
 from vla_deploy.perception.detectors.image_input import Image
-from vla_deploy.robots.schema import TEXT, Check, Shape, is_number
+from vla_deploy.robots.schema import TEXT, Shape, ValueCheck, is_number
 
 _NAMES: Final = "classes.txt"
-_ID: Final = Check(
+_ID: Final = ValueCheck(
     expected="a number or a text", holds=lambda value: is_number(value) or isinstance(value, str)
 )
-_BOX: Final = Check(
+_BOX: Final = ValueCheck(
     expected="left, top, width, height",
     holds=lambda value: (
         isinstance(value, list)

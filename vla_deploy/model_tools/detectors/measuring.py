@@ -15,7 +15,7 @@ from vla_deploy.inference.manifest import Manifest, Variant
 from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.session import open_session
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.accuracy import Accuracy, AccuracyCount
 from vla_deploy.model_tools.detectors.labelled import LabelledImage
 from vla_deploy.model_tools.detectors.trial import only
@@ -26,7 +26,7 @@ _MEASURING_SCORE: Final = 0.01
 
 
 def measure_files(
-    model: Model, labelled: Sequence[LabelledImage], *, engines: Path, clock: Clock
+    model: StoredModel, labelled: Sequence[LabelledImage], *, engines: Path, clock: Clock
 ) -> dict[Variant, Accuracy]:
     """Measure every file of a detector that was added, and write down what it is worth.
 
@@ -65,7 +65,7 @@ def worst(accuracy: Mapping[Variant, Accuracy]) -> Accuracy:
 
 
 def measure(
-    model: Model,
+    model: StoredModel,
     variant: Variant,
     labelled: Sequence[LabelledImage],
     *,

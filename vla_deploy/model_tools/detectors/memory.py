@@ -14,7 +14,7 @@ from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession, open_session
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.trial import only
 
 
@@ -47,7 +47,7 @@ def main() -> None:
     values: dict[str, Any] = told["choice"]
     lists = {key: tuple(values[key]) for key in ("tiers", "providers")}
     choice = ModelChoice(**{**values, **lists})
-    model = Model(manifest=read_manifest(folder), folder=folder, is_embedded=False)
+    model = StoredModel(manifest=read_manifest(folder), folder=folder, is_embedded=False)
     session = open_session(
         only(model, Variant(told["variant"])),
         choice,

@@ -14,9 +14,9 @@ from vla_deploy.inference.errors import (
     ModelMismatch,
 )
 from vla_deploy.inference.file_check import checked_file, sha256_of
-from vla_deploy.inference.manifest import Detection, Manifest, ModelFile, Variant
+from vla_deploy.inference.manifest import DetectionOutputs, Manifest, ModelFile, Variant
 from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.model_tools.detectors.accuracy import Accuracy
 from vla_deploy.model_tools.detectors.images import read_image
 from vla_deploy.model_tools.detectors.int8_files import TYPES, Feed, write_int8
@@ -40,7 +40,7 @@ class Quantised:
 
 def quantise(
     store: ModelStore,
-    model: Model,
+    model: StoredModel,
     *,
     name: str,
     calibration: Sequence[Path],
@@ -85,20 +85,22 @@ def quantise(
     return Quantised(model=name, accuracy=accuracy, drop_points=drop_points)
 
 
-def _copy_original(model: Model, source: Path, draft: Path, name: str) -> None:
+def _copy_original(model: StoredModel, source: Path, draft: Path, name: str) -> None:
     shutil.copyfile(source, draft / f"{name}.onnx")
     if model.manifest.card:
         shutil.copyfile(model.folder / model.manifest.card, draft / model.manifest.card)
 
 
-def _describe(model: Model, draft: Path, name: str, paths: Mapping[Variant, Path]) -> Model:
+def _describe(
+    model: StoredModel, draft: Path, name: str, paths: Mapping[Variant, Path]
+) -> StoredModel:
     every = {Variant.FP32: draft / f"{name}.onnx", **paths}
     files = {
         variant: ModelFile(path=path.name, sha256=sha256_of(path))
         for variant, path in every.items()
     }
     manifest = dataclasses.replace(model.manifest, name=name, files=files)
-    return Model(manifest=manifest, folder=draft, is_embedded=False)
+    return StoredModel(manifest=manifest, folder=draft, is_embedded=False)
 
 
 def _judge(accuracy: Mapping[Variant, Accuracy], max_drop_points: float) -> float:
@@ -119,7 +121,9 @@ def _judge(accuracy: Mapping[Variant, Accuracy], max_drop_points: float) -> floa
     return drops[worst]
 
 
-def _inputs(manifest: Manifest, detection: Detection, images: Sequence[Path]) -> Iterator[Feed]:
+def _inputs(
+    manifest: Manifest, detection: DetectionOutputs, images: Sequence[Path]
+) -> Iterator[Feed]:
     (tensor,) = manifest.inputs
     for path in images:
         fitted, _ = fit_image(read_image(path), detection.image, tensor.dtype)

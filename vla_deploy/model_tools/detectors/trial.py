@@ -9,7 +9,7 @@ import numpy as np
 
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.inference.manifest import Variant
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import Image
 
@@ -19,7 +19,7 @@ _SEED: Final = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class DetectorTrial:
     """Hold what a detector answered: boxes found in each of the empty images."""
 
     boxes: Mapping[str, int]
@@ -41,7 +41,7 @@ def empty_images() -> dict[str, Image]:
     }
 
 
-def try_out(detector: Detector) -> Trial:
+def try_out(detector: Detector) -> DetectorTrial:
     """Run a detector on the empty images.
 
     Raises:
@@ -54,10 +54,10 @@ def try_out(detector: Detector) -> Trial:
             boxes[name] = int((found.scores >= detector.detection.score_threshold).sum())
         except RunFailed as error:
             raise RunFailed(f"{error} (on an image that is {name})") from error
-    return Trial(boxes=boxes)
+    return DetectorTrial(boxes=boxes)
 
 
-def only(model: Model, variant: Variant) -> Model:
+def only(model: StoredModel, variant: Variant) -> StoredModel:
     """Return a model that has no file but one, so that every precision gives that."""
     files = {variant: model.manifest.files[variant]}
     manifest = dataclasses.replace(model.manifest, files=files)

@@ -31,7 +31,7 @@ _REFINE_PX: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Board:
+class CalibrationBoard:
     """Describe a board by its squares; `square_m` is to be measured on the print."""
 
     columns: int = 7
@@ -92,7 +92,7 @@ class Board:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class BoardView:
     """Hold the corners of one image: where they are in it (n, 2) and on the board (n, 3)."""
 
     name: str
@@ -100,7 +100,7 @@ class View:
     corners_m: Array
 
 
-def find_board(image: Image, board: Board, name: str) -> View | None:
+def find_board(image: Image, board: CalibrationBoard, name: str) -> BoardView | None:
     """Return the corners that an image (grey or RGB) shows, None where it shows too few."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     corners, numbers = _detector(board).detectBoard(grey)[:2]
@@ -108,10 +108,10 @@ def find_board(image: Image, board: Board, name: str) -> View | None:
         return None
     chosen = np.asarray(numbers, dtype=np.intp).ravel()
     pixels = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-    return View(name=name, pixels=pixels, corners_m=board.corners_m[chosen])
+    return BoardView(name=name, pixels=pixels, corners_m=board.corners_m[chosen])
 
 
-def _detector(board: Board) -> Any:
+def _detector(board: CalibrationBoard) -> Any:
     markers = cv2.aruco.DetectorParameters()
     markers.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     markers.cornerRefinementWinSize = _REFINE_PX
@@ -122,7 +122,7 @@ def _detector(board: Board) -> Any:
     )
 
 
-def write_board(file: Path, board: Board) -> None:
+def write_board(file: Path, board: CalibrationBoard) -> None:
     """Write a printable board in its true size, as PDF or PNG by the file's ending.
 
     Raises:

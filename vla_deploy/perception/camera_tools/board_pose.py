@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.camera_tools.board import Array, View
+from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages
 from vla_deploy.perception.lens import matrix_of, project
 
@@ -20,7 +20,7 @@ class BoardPose:
     error_px: float
 
 
-def board_pose(view: View, camera: Intrinsics) -> BoardPose:
+def board_pose(view: BoardView, camera: Intrinsics) -> BoardPose:
     """Return where the board is.
 
     Raises:
@@ -55,7 +55,7 @@ def rms(offsets: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
 
 
-def depth_ratio(view: View, pose: BoardPose, depth_m: NDArray[np.float32]) -> float | None:
+def depth_ratio(view: BoardView, pose: BoardPose, depth_m: NDArray[np.float32]) -> float | None:
     """Return measured over expected depth at the corners; None where too few have depth."""
     columns, rows = np.rint(view.pixels).astype(np.intp).T
     height, width = depth_m.shape

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.camera_tools.board import Array, View
+from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.board_pose import board_pose, placed, rms
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.lens import project
@@ -36,7 +36,7 @@ _ENOUGH: Final = 1e-9
 class HeadView:
     """Hold a view of the board and where the camera's site was then, in the base frame (4 x 4)."""
 
-    view: View
+    view: BoardView
     base_from_site: Array
 
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.camera_tools.board import Array, View
+from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.selecting import MIN_VIEWS, require_variety
 from vla_deploy.runtime.one_line import one_line
@@ -47,7 +47,9 @@ class _Solved:
     errors_px: Array
 
 
-def fit_lens(views: Sequence[View], size_px: tuple[int, int], model: str = "plumb_bob") -> LensFit:
+def fit_lens(
+    views: Sequence[BoardView], size_px: tuple[int, int], model: str = "plumb_bob"
+) -> LensFit:
     """Return the lens that explains the views best.
 
     Raises:
@@ -73,7 +75,7 @@ def fit_lens(views: Sequence[View], size_px: tuple[int, int], model: str = "plum
     return _as_fit(solved, kept, outliers, size_px, model)
 
 
-def _solve(views: Sequence[View], size_px: tuple[int, int], model: str) -> _Solved:
+def _solve(views: Sequence[BoardView], size_px: tuple[int, int], model: str) -> _Solved:
     # A third power bends the corners of the image wherever no view has held it; ROS leaves it out.
     flags = cv2.CALIB_RATIONAL_MODEL if model == "rational_polynomial" else cv2.CALIB_FIX_K3
     boards = [view.corners_m.astype(np.float32) for view in views]
@@ -125,7 +127,7 @@ def _require_sense(solved: _Solved) -> None:
 
 def _as_fit(
     solved: _Solved,
-    views: Sequence[View],
+    views: Sequence[BoardView],
     outliers: dict[str, float],
     size_px: tuple[int, int],
     model: str,

@@ -8,7 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.perception.camera_tools.board import Array, Board, Image, View, find_board
+from vla_deploy.perception.camera_tools.board import (
+    Array,
+    BoardView,
+    CalibrationBoard,
+    Image,
+    find_board,
+)
 from vla_deploy.perception.camera_tools.errors import BadImages
 
 # The brightness step between squares, as a share of it for each pixel: less is out of focus.
@@ -23,25 +29,25 @@ _STEP_PX: Final = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Selection:
+class ViewSelection:
     """Hold the views that are used, and for each image left out the reason."""
 
-    views: tuple[View, ...]
+    views: tuple[BoardView, ...]
     left_out: dict[str, str]
 
 
 def select(
     images: Iterable[tuple[str, Image]],
-    board: Board,
+    board: CalibrationBoard,
     *,
     enough: int | None = None,
-    tell: Callable[[View], None] = lambda _: None,
-) -> Selection:
+    tell: Callable[[BoardView], None] = lambda _: None,
+) -> ViewSelection:
     """Return the views that show the board, sharp, each otherwise than those before.
 
     It takes no further image once there are `enough`; `tell` hears of each view that is used.
     """
-    views: list[View] = []
+    views: list[BoardView] = []
     left_out: dict[str, str] = {}
     for name, image in images:
         view = find_board(image, board, name)
@@ -53,10 +59,10 @@ def select(
             tell(view)
         if len(views) == enough:
             break
-    return Selection(views=tuple(views), left_out=left_out)
+    return ViewSelection(views=tuple(views), left_out=left_out)
 
 
-def why_not(image: Image, view: View, earlier: Sequence[View]) -> str:
+def why_not(image: Image, view: BoardView, earlier: Sequence[BoardView]) -> str:
     """Return why a view is of no use beside the earlier ones, "" where it is."""
     sharp = sharpness(image, view.pixels)
     if sharp < SHARP_PER_PX:
@@ -84,7 +90,7 @@ def _steepness(grey: Image, x: float, y: float) -> float:
     return float(steepest / max(high - low, 8.0))
 
 
-def require_variety(views: Sequence[View], size_px: tuple[int, int]) -> None:
+def require_variety(views: Sequence[BoardView], size_px: tuple[int, int]) -> None:
     """Check that there are enough views, and that they cover the image.
 
     Raises:
@@ -103,7 +109,7 @@ def require_variety(views: Sequence[View], size_px: tuple[int, int]) -> None:
         )
 
 
-def covered_ratio(views: Sequence[View], size_px: tuple[int, int]) -> float:
+def covered_ratio(views: Sequence[BoardView], size_px: tuple[int, int]) -> float:
     """Return in which share of the image's cells corners were seen."""
     cells = np.zeros(COVERED_CELLS, dtype=np.bool_)
     pixels: NDArray[np.float64] = np.vstack([view.pixels for view in views])
@@ -113,7 +119,7 @@ def covered_ratio(views: Sequence[View], size_px: tuple[int, int]) -> float:
     return float(cells.mean())
 
 
-def _gap_px(view: View, other: View) -> float:
+def _gap_px(view: BoardView, other: BoardView) -> float:
     """Return how far apart the corners are that both show; infinite where they share too few."""
     first = {tuple(np.round(corner, 6)): pixel for corner, pixel in _pairs(view)}
     gaps = [
@@ -124,5 +130,5 @@ def _gap_px(view: View, other: View) -> float:
     return float(np.median(gaps)) if len(gaps) >= 4 else float("inf")
 
 
-def _pairs(view: View) -> Iterable[tuple[Array, Array]]:
+def _pairs(view: BoardView) -> Iterable[tuple[Array, Array]]:
     return zip(view.corners_m, view.pixels, strict=True)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.inference.manifest import Detection, Tensor
+from vla_deploy.inference.manifest import DetectionOutputs, Tensor
 from vla_deploy.perception.detectors import centre_net, yolo
 from vla_deploy.perception.detectors.boxes import Boxes
 
@@ -20,8 +20,8 @@ class Adapter:
     """
 
     summary: str
-    faults: Callable[[tuple[Tensor, ...], Detection], Iterator[str]]
-    read: Callable[[Outputs, Detection], Boxes]
+    faults: Callable[[tuple[Tensor, ...], DetectionOutputs], Iterator[str]]
+    read: Callable[[Outputs, DetectionOutputs], Boxes]
 
 
 ADAPTERS: Final[Mapping[str, Adapter]] = {

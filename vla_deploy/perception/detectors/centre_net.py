@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.inference.manifest import Detection, Tensor
+from vla_deploy.inference.manifest import DetectionOutputs, Tensor
 from vla_deploy.perception.detectors.boxes import Boxes, Floats, Indices, sound, without_doubles
 
 Outputs = tuple[NDArray[Any], ...]
 
 
-def faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+def faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why these are not heat (1, classes, h, w) and edges (1, 4, h, w)."""
     count, image = len(detection.classes), detection.image
     shapes = [tensor.shape for tensor in outputs]
@@ -29,7 +29,7 @@ def faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
         yield f"expected maps in the image's proportions, got {wide} x {high} cells"
 
 
-def read(outputs: Outputs, detection: Detection) -> Boxes:
+def read(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
     """Return the boxes of heat (1, classes, h, w) and edges (1, 4, h, w)."""
     heat, edges = (np.asarray(output[0], dtype=np.float32) for output in outputs)
     return decode(

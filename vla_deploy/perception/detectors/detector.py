@@ -7,7 +7,7 @@ import numpy as np
 from platforms import Profile
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.graph_check import output_faults
-from vla_deploy.inference.manifest import Detection
+from vla_deploy.inference.manifest import DetectionOutputs
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession
 from vla_deploy.inference.stats import SessionStats
@@ -39,7 +39,7 @@ class Detector:
         return self._detection.classes
 
     @property
-    def detection(self) -> Detection:
+    def detection(self) -> DetectionOutputs:
         """Return how its outputs are read, and how good it was measured to be."""
         return self._detection
 
@@ -95,7 +95,7 @@ class Detector:
             )
 
 
-def detection_of(session: ModelSession) -> Detection:
+def detection_of(session: ModelSession) -> DetectionOutputs:
     """Return how a session's outputs are read.
 
     Raises:

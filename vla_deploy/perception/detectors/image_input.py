@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.inference.manifest import Fit, ImageInput, Layout
+from vla_deploy.inference.manifest import Fit, ImageInput, TensorLayout
 from vla_deploy.perception.detectors.boxes import Boxes, Floats
 
 Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Placement:
+class InputPlacement:
     """Say where the image lies in the input: pixel p of it is at p * scale + offset."""
 
     scale_x: float
@@ -39,13 +39,13 @@ class Placement:
         return moved.where(inside)
 
 
-def fit_image(rgb: Image, image: ImageInput, dtype: str) -> tuple[NDArray[Any], Placement]:
+def fit_image(rgb: Image, image: ImageInput, dtype: str) -> tuple[NDArray[Any], InputPlacement]:
     """Return an RGB image (h, w, 3) as a detector's input (1, ...), and where it lies in it."""
     fitted, placement = _FITS[image.fit](rgb, image)
     if image.colour == "bgr":
         fitted = fitted[..., ::-1]
     pixels = _normalised(fitted, image).astype(dtype, copy=False)
-    ordered = pixels.transpose(2, 0, 1) if image.layout == Layout.NCHW else pixels
+    ordered = pixels.transpose(2, 0, 1) if image.layout == TensorLayout.NCHW else pixels
     return np.ascontiguousarray(ordered)[None], placement
 
 
@@ -59,7 +59,7 @@ def _normalised(fitted: Image, image: ImageInput) -> Floats:
     return pixels
 
 
-def _letterbox(rgb: Image, image: ImageInput) -> tuple[Image, Placement]:
+def _letterbox(rgb: Image, image: ImageInput) -> tuple[Image, InputPlacement]:
     height, width = rgb.shape[:2]
     ratio = min(image.width_px / width, image.height_px / height)
     inner = max(1, round(width * ratio)), max(1, round(height * ratio))
@@ -69,14 +69,14 @@ def _letterbox(rgb: Image, image: ImageInput) -> tuple[Image, Placement]:
     return canvas, _placement(rgb, inner, (left, top))
 
 
-def _stretch(rgb: Image, image: ImageInput) -> tuple[Image, Placement]:
+def _stretch(rgb: Image, image: ImageInput) -> tuple[Image, InputPlacement]:
     size = image.width_px, image.height_px
     return _resized(rgb, size), _placement(rgb, size, (0, 0))
 
 
-def _placement(rgb: Image, inner: tuple[int, int], offset: tuple[int, int]) -> Placement:
+def _placement(rgb: Image, inner: tuple[int, int], offset: tuple[int, int]) -> InputPlacement:
     height, width = rgb.shape[:2]
-    return Placement(
+    return InputPlacement(
         scale_x=inner[0] / width,
         scale_y=inner[1] / height,
         left_px=offset[0],
@@ -93,7 +93,7 @@ def _resized(rgb: Image, size: tuple[int, int]) -> Image:
     return resized
 
 
-_FITS: Final[Mapping[Fit, Callable[[Image, ImageInput], tuple[Image, Placement]]]] = {
+_FITS: Final[Mapping[Fit, Callable[[Image, ImageInput], tuple[Image, InputPlacement]]]] = {
     Fit.LETTERBOX: _letterbox,
     Fit.STRETCH: _stretch,
 }

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.inference.errors import RunFailed
-from vla_deploy.inference.manifest import Detection, Dimension, Tensor
+from vla_deploy.inference.manifest import DetectionOutputs, Dimension, Tensor
 from vla_deploy.perception.detectors.boxes import Boxes, sound, without_doubles
 
 Outputs = tuple[NDArray[Any], ...]
@@ -19,7 +19,7 @@ _COORDINATES: Final = 4
 _END_TO_END: Final = 6  # left, top, right, bottom, score, class
 
 
-def raw_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+def raw_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why this is no output (1, 4 + classes, boxes), or that transposed."""
     channels = _COORDINATES + len(detection.classes)
     shapes = [tensor.shape for tensor in outputs]
@@ -34,7 +34,7 @@ def raw_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[st
         )
 
 
-def read_raw(outputs: Outputs, detection: Detection) -> Boxes:
+def read_raw(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
     """Return the boxes of (1, 4 + classes, n) or (1, n, 4 + classes); doubles are removed here.
 
     Raises:
@@ -59,7 +59,7 @@ def read_raw(outputs: Outputs, detection: Detection) -> Boxes:
     return without_doubles(sound(boxes, detection.least_score), detection.iou_threshold)
 
 
-def end_to_end_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+def end_to_end_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why this is no output (1, boxes, 6)."""
     shapes = [tensor.shape for tensor in outputs]
     if len(shapes) != 1 or len(shapes[0]) != 3 or not _is(shapes[0][2], _END_TO_END):
@@ -69,7 +69,7 @@ def end_to_end_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iter
         )
 
 
-def read_end_to_end(outputs: Outputs, detection: Detection) -> Boxes:
+def read_end_to_end(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
     """Return the boxes of (1, n, 6), which have no doubles: v10, and exports with NMS in them.
 
     Raises:
@@ -82,7 +82,7 @@ def read_end_to_end(outputs: Outputs, detection: Detection) -> Boxes:
     return sound(boxes, detection.least_score)
 
 
-def counted_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+def counted_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why these are not the outputs count, boxes (1, n, 4), scores (1, n), classes (1, n)."""
     shapes = [tensor.shape for tensor in outputs]
     fits = (
@@ -97,7 +97,7 @@ def counted_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterato
         )
 
 
-def read_counted(outputs: Outputs, detection: Detection) -> Boxes:
+def read_counted(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
     """Return the boxes of four outputs; what lies behind the count is left over from before.
 
     Raises:

@@ -7,11 +7,11 @@ from typing import Final
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.symbolic.state import Point
-from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
+from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.memory import place_of, seen_words
 from vla_deploy.world.thing import FLOOR
@@ -25,7 +25,7 @@ ABILITIES = (
 )
 
 
-def _tell_sight(fields: Fields, request: Request) -> list[Skill]:
+def _tell_sight(fields: Fields, request: PlanRequest) -> list[Skill]:
     """Say what is known, on a piece of furniture if one is named."""
     things = [] if request.scene is None else list(request.scene.things)
     where = ""
@@ -38,7 +38,7 @@ def _tell_sight(fields: Fields, request: Request) -> list[Skill]:
     return _say(f"I see {_things(things)}{where}.")
 
 
-def _tell_hands(_: Fields, request: Request) -> list[Skill]:
+def _tell_hands(_: Fields, request: PlanRequest) -> list[Skill]:
     """Say what the hands hold."""
     held = {one.held_by: str(one) for one in (request.scene.things if request.scene else ())}
     full = [
@@ -49,7 +49,7 @@ def _tell_hands(_: Fields, request: Request) -> list[Skill]:
     return _say(f"I hold {listed(full)}." if full else "My hands are empty.")
 
 
-def _tell_place(_: Fields, request: Request) -> list[Skill]:
+def _tell_place(_: Fields, request: PlanRequest) -> list[Skill]:
     """Say near which place the robot is."""
     here = request.here
     if here is None or not request.world.sites:
@@ -59,7 +59,7 @@ def _tell_place(_: Fields, request: Request) -> list[Skill]:
     return _say(f"I am near the {nearest.name.replace('_', ' ')}.")
 
 
-def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
+def tell_or_find(fields: Fields, request: PlanRequest) -> list[Skill]:
     """Say where a thing is if that is known, else where it was, and look for it."""
     found = _known(fields["what"], request)
     if not found or request.scene is None:
@@ -70,7 +70,7 @@ def tell_or_find(fields: Fields, request: Request) -> list[Skill]:
     return _say(" ".join(_where(one, places, request.scene) for one in found[:MOST_TOLD]))
 
 
-def _tell_whether(fields: Fields, request: Request) -> list[Skill]:
+def _tell_whether(fields: Fields, request: PlanRequest) -> list[Skill]:
     """Say whether a thing is in sight."""
     found = _known(fields["what"], request)
     return _say(f"Yes, I see {_things(found)}." if found else "No, I do not see that.")
@@ -83,14 +83,14 @@ def _things(things: Sequence[Thing]) -> str:
     return listed([*words, f"{more} more"] if more > 0 else words)
 
 
-def _known(text: str, request: Request) -> list[Thing]:
+def _known(text: str, request: PlanRequest) -> list[Thing]:
     if request.scene is None:
         return []
     context = CommandContext(request)
-    return fitting(context.read(text), Use.SEE, context)
+    return fitting(context.read(text), ThingUse.SEE, context)
 
 
-def _remembered(text: str, request: Request) -> list[Skill]:
+def _remembered(text: str, request: PlanRequest) -> list[Skill]:
     """Say where such a thing was in earlier runs, if that is remembered."""
     query = CommandContext(request).read(text).query
     for seen in request.last_seen:
@@ -115,12 +115,12 @@ def _say(text: str) -> list[Skill]:
     return [("speak", {"text": text[:500]})]
 
 
-def _tell_doing(_: Fields, request: Request) -> list[Skill]:
+def _tell_doing(_: Fields, request: PlanRequest) -> list[Skill]:
     turns = request.conversation.turns
     return _say(f"The last that I was told is: {turns[-1].said}." if turns else READY)
 
 
-ANSWERS: Final[Mapping[str, Callable[[Fields, Request], list[Skill]]]] = {
+ANSWERS: Final[Mapping[str, Callable[[Fields, PlanRequest], list[Skill]]]] = {
     "holding": _tell_hands,
     "seeing": _tell_sight,
     "place": _tell_place,

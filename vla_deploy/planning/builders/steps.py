@@ -22,10 +22,10 @@ from vla_deploy.planning.errors import (
     UnknownObject,
     UnknownPlace,
 )
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import match_place
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
+from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
 from vla_deploy.world.relations import NEXT_TO
@@ -59,7 +59,7 @@ Handler = Callable[["Steps", Step], list[Skill]]
 class Steps:
     """Hold the words of a command, and make actions of the steps that answer it."""
 
-    def __init__(self, command: Sequence[str], request: Request) -> None:
+    def __init__(self, command: Sequence[str], request: PlanRequest) -> None:
         self.command = command
         self.request = request
 
@@ -125,17 +125,17 @@ class Steps:
         return value
 
 
-def is_seen(text: str, request: Request) -> bool:
+def is_seen(text: str, request: PlanRequest) -> bool:
     """Tell whether something in the scene fits what shall be put."""
     context = CommandContext(request)
     try:
         read = context.read(text)
     except UnknownObject:  # a place
         return False
-    return bool(read.pronoun or fitting(read, Use.PUT, context))
+    return bool(read.pronoun or fitting(read, ThingUse.PUT, context))
 
 
-def way_back(request: Request) -> Skill:
+def way_back(request: PlanRequest) -> Skill:
     """Return the way to where the robot stood when it got the command before.
 
     Raises:

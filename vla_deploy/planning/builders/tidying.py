@@ -5,10 +5,10 @@ from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
+from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.world import Thing
 
 STORE: Final = "box"
@@ -20,7 +20,7 @@ REACH_M: Final = 1.0
 """Half the side of the square around a place that belongs to it."""
 
 
-def tidy(fields: Mapping[str, str], request: Request) -> list[Skill]:
+def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
     """Put away what lies on a piece of furniture, or everywhere; look first where none is known.
 
     What fits the words of "except" stays.
@@ -28,7 +28,7 @@ def tidy(fields: Mapping[str, str], request: Request) -> list[Skill]:
     lying = _lying(fields.get("where", ""), request)
     if "except" in fields:
         context = CommandContext(request)
-        stays = fitting(context.read(fields["except"]), Use.SEE, context)
+        stays = fitting(context.read(fields["except"]), ThingUse.SEE, context)
         lying = [one for one in lying if one not in stays]
     if not lying:
         said = "I know of nothing there to put away. I look around."
@@ -42,7 +42,7 @@ def tidy(fields: Mapping[str, str], request: Request) -> list[Skill]:
     return [*steps, ("speak", {"text": said})]
 
 
-def _lying(place: str, request: Request) -> list[Thing]:
+def _lying(place: str, request: PlanRequest) -> list[Thing]:
     """Return what can be put away: not what is in a box already, nor what a hand cannot take.
 
     Raises:
@@ -70,7 +70,7 @@ def look_around(place: str | None = None) -> list[Skill]:
     return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
 
 
-def patrol(place: str, request: Request) -> list[Skill]:
+def patrol(place: str, request: PlanRequest) -> list[Skill]:
     """Drive towards the corners of the square around a place, as far as the floor is free.
 
     Raises:

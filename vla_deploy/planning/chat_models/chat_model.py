@@ -12,14 +12,14 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.language_model import AnswerBounds, LanguageModel
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.model_servers.asking import StructuredAsker
-from vla_deploy.model_servers.chat import Chat, Message, Role
+from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.picture import small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
-from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
+from vla_deploy.planning.interfaces import Aid, BackEnd, Check, PlanRequest, Proposal
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
 from vla_deploy.runtime.one_line import one_line
 
@@ -54,7 +54,7 @@ class ChatModel(BackEnd):
             Declined: it gives none in time, or none that can be read.
         """
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         """Return the plan that the model answers; one that is refused is sent back once.
 
         Raises:
@@ -76,7 +76,7 @@ class ChatModel(BackEnd):
                 raise
             return self._proposal(self.ask(_refused(chat, answer, error), deadline), request)
 
-    def _proposal(self, answer: PlanAnswer, request: Request) -> Proposal:
+    def _proposal(self, answer: PlanAnswer, request: PlanRequest) -> Proposal:
         if answer.question:
             raise Ambiguous(answer.question)
         if not answer.feasible or not answer.steps:
@@ -158,6 +158,6 @@ class ServedModel(ChatModel):
 def _refused(chat: Chat, answer: PlanAnswer, error: PlanningError) -> Chat:
     """Return the conversation that says why a model's plan was refused, without images."""
     before = tuple(replace(message, images=()) for message in chat.messages)
-    said = Message(role=Role.ASSISTANT, text=answer.model_dump_json())
-    wish = Message(text=filled("refused", faults=one_line(error)[:_FAULT_CHARACTERS]))
+    said = ChatMessage(role=ChatRole.ASSISTANT, text=answer.model_dump_json())
+    wish = ChatMessage(text=filled("refused", faults=one_line(error)[:_FAULT_CHARACTERS]))
     return replace(chat, messages=(*before, said, wish))

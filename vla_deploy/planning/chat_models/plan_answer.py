@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
-from vla_deploy.planning.catalogue import SKILLS, Parameter, SkillSpec, Type
+from vla_deploy.planning.catalogue import SKILLS, SkillParameter, SkillSpec, Type
 from vla_deploy.planning.dialects import PLAN_LISTS, parse_plan
 from vla_deploy.planning.plan import MOST_ACTIONS, Plan
 from vla_deploy.planning.prompts.composing import plain
@@ -92,7 +92,7 @@ def _forms(name: str, spec: SkillSpec, places: Sequence[str]) -> Iterator[Schema
         }
 
 
-def _typed(parameter: Parameter, places: Sequence[str]) -> Schema:
+def _typed(parameter: SkillParameter, places: Sequence[str]) -> Schema:
     match parameter.type:
         case Type.NUMBER:
             bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}

@@ -14,9 +14,9 @@ from platforms import ModelChoice
 from vla_deploy.client.action_words import skill_words
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
 from vla_deploy.inference.language_model import AnswerBounds, LanguageModel, open_language_model
-from vla_deploy.inference.manifest import Certainty, Use
+from vla_deploy.inference.manifest import Certainty, LanguageUse
 from vla_deploy.inference.memory_claims import MemoryClaim
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.certainty import (
@@ -34,7 +34,7 @@ from vla_deploy.planning.command_parser.wording import (
     plain_words,
 )
 from vla_deploy.planning.errors import CannotBeDone, Declined
-from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
+from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import order_of, proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
@@ -71,14 +71,14 @@ class CommandParser(BackEnd):
         Raises:
             ModelMismatch: it is no command parser.
         """
-        if model.language.use is not Use.COMMAND_PARSER:
-            raise ModelMismatch(NAME, (f"language.use: expected {Use.COMMAND_PARSER}",))
+        if model.language.use is not LanguageUse.COMMAND_PARSER:
+            raise ModelMismatch(NAME, (f"language.use: expected {LanguageUse.COMMAND_PARSER}",))
         self.model = model
         self.claim = MemoryClaim()
         self._known = known_words
         self._weights = model.language.certainty or UNMEASURED
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         """Return the plan that a command means, which is read back where that is unsure.
 
         Raises:
@@ -153,7 +153,7 @@ class CommandParser(BackEnd):
         self.claim.release()
 
 
-def open_command_parser(model: Model, choice: ModelChoice) -> CommandParser:
+def open_command_parser(model: StoredModel, choice: ModelChoice) -> CommandParser:
     """Open the command parser of a model's folder.
 
     Raises:

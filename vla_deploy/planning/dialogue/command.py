@@ -8,7 +8,7 @@ from typing import Any, Final
 from vla_deploy.ipc import Event
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
-from vla_deploy.planning.interfaces import PlanningResult, Request
+from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.steering import awaiting, is_stop
 from vla_deploy.planning.scope import negates
 from vla_deploy.planning.understanding.quantities import numbers_in
@@ -70,7 +70,7 @@ class PlannedCommand:
     """Hold a command, the request that was made of it, and what came of that."""
 
     command: UserCommand
-    request: Request
+    request: PlanRequest
     answer: PlanningResult
 
     @property

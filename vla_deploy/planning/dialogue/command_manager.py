@@ -20,7 +20,7 @@ from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.interfaces import PlanningResult, Request
+from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.follow_up import (
     asked_for,
     corrected,
@@ -31,7 +31,7 @@ from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.planning.recovery.strategies import recover
-from vla_deploy.planning.understanding import Candidate, Outcome, Verdict, judge_answer
+from vla_deploy.planning.understanding import AnswerVerdict, Candidate, TurnOutcome, judge_answer
 from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 from vla_deploy.runtime.executors import InlineExecutor
@@ -132,10 +132,10 @@ class CommandManager:
         self._queue.clear()
         for command in dropped:
             if command is not None:
-                self.dialogue.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+                self.dialogue.refuse(command, CANCELLED, outcome=TurnOutcome.CANCELLED)
         # "Again" after a stop cannot mean what was done before it.
         stop = UserCommand(command_id=command_id, told_ns=self._clock.now_ns(), text="stop")
-        self.dialogue.remember(stop, Outcome.CANCELLED)
+        self.dialogue.remember(stop, TurnOutcome.CANCELLED)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command."""
@@ -247,7 +247,7 @@ class CommandManager:
         self._events.cancelled_all(command_id)
         self._active.end_all()
 
-    def _accept(self, request: Request, answer: PlanningResult) -> None:
+    def _accept(self, request: PlanRequest, answer: PlanningResult) -> None:
         """Obey an order from now on, whatever planner another profile brings.
 
         What is under way ends where something is forbidden.
@@ -258,7 +258,7 @@ class CommandManager:
         if order is not None and order.forbids and self._is_moving:
             self._cancel_all(f"{request.command_id}-forbids")
 
-    def _request(self, command: UserCommand) -> Request:
+    def _request(self, command: UserCommand) -> PlanRequest:
         talk = self.dialogue.conversation
         request = self._situation.request(command, talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
@@ -266,10 +266,13 @@ class CommandManager:
     def _doubted_yes(self, command: UserCommand) -> UserCommand:
         """Return an answer as doubted if it agrees, and may have been a no: "go" sounds like it."""
         waiting = self.dialogue.pending or self.dialogue.held
-        if waiting is None or judge_answer(waiting.question, command.text)[0] is not Verdict.YES:
+        if (
+            waiting is None
+            or judge_answer(waiting.question, command.text)[0] is not AnswerVerdict.YES
+        ):
             return command
         others = command.may_have_been()
-        if all(judge_answer(waiting.question, one)[0] is not Verdict.NO for one in others):
+        if all(judge_answer(waiting.question, one)[0] is not AnswerVerdict.NO for one in others):
             return command
         return replace(command, is_doubted=True, may_ask_again=True)
 
@@ -282,7 +285,7 @@ class CommandManager:
         is_last = bool(turns) and turns[-1].command_id == held.command.command_id
         corrected = self._corrected(held, command.text) if is_last and sure else None
         verdict, _ = judge_answer(held.question, command.text)
-        begins, drops = is_word(command.text), verdict is Verdict.NO and not self._goes_on
+        begins, drops = is_word(command.text), verdict is AnswerVerdict.NO and not self._goes_on
         if sure and (corrected or drops or (begins and not command.awaits_word)):
             self.dialogue.take_held()
             self._events.answered(command, held.command)
@@ -292,7 +295,7 @@ class CommandManager:
                 self.dialogue.drop(held, Says.LEFT)
             else:
                 self._run_confirmed(held, held.plan)
-        elif begins or verdict is Verdict.YES:  # "okay", "go when I say so"
+        elif begins or verdict is AnswerVerdict.YES:  # "okay", "go when I say so"
             self.dialogue.refuse(command, Says.STILL_HELD)
         else:
             return False
@@ -312,18 +315,18 @@ class CommandManager:
         if command.awaits_word:  # "the red one, but only when I say so"
             asked = replace(asked, awaits_word=True)
         pending = replace(pending, command=asked)
-        verdict, chosen, instead = Verdict.ANEW, None, None
+        verdict, chosen, instead = AnswerVerdict.ANEW, None, None
         if command.plan is None:
             verdict, chosen = self.dialogue.judge(command.text)
-        if command.plan is None and verdict in (Verdict.ANEW, Verdict.MIXED):
+        if command.plan is None and verdict in (AnswerVerdict.ANEW, AnswerVerdict.MIXED):
             instead = self._instead_of(pending, command)
-            is_command = verdict is Verdict.ANEW or self._at_once(command).plan is not None
-            verdict = Verdict.ANEW if is_command else Verdict.UNCLEAR
+            is_command = verdict is AnswerVerdict.ANEW or self._at_once(command).plan is not None
+            verdict = AnswerVerdict.ANEW if is_command else AnswerVerdict.UNCLEAR
         if instead is not None:
             self._events.answered(command, asked)
             self.dialogue.settle()
             self._queue.appendleft(instead)
-        elif verdict is not Verdict.ANEW:
+        elif verdict is not AnswerVerdict.ANEW:
             self._events.answered(command, asked)
             self._go_on(pending, verdict, chosen)
         elif command.is_answer:
@@ -347,11 +350,13 @@ class CommandManager:
         deadline = self._deadline(self.planner.within_s)
         return self.planner.plan_at_once(self._request(command), deadline)
 
-    def _go_on(self, pending: PendingQuestion, verdict: Verdict, chosen: Candidate | None) -> None:
-        if verdict is Verdict.NO:
+    def _go_on(
+        self, pending: PendingQuestion, verdict: AnswerVerdict, chosen: Candidate | None
+    ) -> None:
+        if verdict is AnswerVerdict.NO:
             self._leave(Says.LEFT)
             return
-        if verdict is Verdict.UNCLEAR:
+        if verdict is AnswerVerdict.UNCLEAR:
             self.dialogue.ask_again(pending)
             return
         self.dialogue.choose(pending.question, chosen)
@@ -371,7 +376,7 @@ class CommandManager:
             return None
         if plan is not None:  # "the other one" is another than what was asked about
             mentioned = mentions_of(plan, request.scene)
-            self.dialogue.remember(command, Outcome.ASKED, mentioned=mentioned)
+            self.dialogue.remember(command, TurnOutcome.ASKED, mentioned=mentioned)
         return _with_words(command, told)
 
     def _correction_of_last(self, command: UserCommand) -> UserCommand | None:
@@ -419,7 +424,7 @@ def _stands_still(done: PlannedCommand) -> bool:
 
 
 def _correction(
-    command: str, text: str, plan: Plan | None, request: Request, unclear: str = ""
+    command: str, text: str, plan: Plan | None, request: PlanRequest, unclear: str = ""
 ) -> str | None:
     """Return a command as an utterance corrects its plan, or what was unclear of it."""
     asked = () if plan is None else asked_for(plan)

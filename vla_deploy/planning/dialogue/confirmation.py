@@ -9,7 +9,7 @@ from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
-from vla_deploy.planning.interfaces import Proposal, Request
+from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import quoted
 from vla_deploy.planning.symbolic.state import subject_of
@@ -26,7 +26,7 @@ FAR_BACK_M: Final = -1.0
 
 def confirmation_of(
     plan: Plan,
-    request: Request,
+    request: PlanRequest,
     proposal: Proposal | None = None,
     agreed: Set[str] = frozenset(),
 ) -> str:
@@ -40,7 +40,7 @@ def confirmation_of(
     return question_about(plan, request, proposal)
 
 
-def question_about(plan: Plan, request: Request, proposal: Proposal | None = None) -> str:
+def question_about(plan: Plan, request: PlanRequest, proposal: Proposal | None = None) -> str:
     """Return the question whether a plan is wanted, with what may be wrong with it."""
     if proposal is not None and proposal.order is not None and proposal.order.question:
         return proposal.order.question
@@ -55,12 +55,12 @@ def question_about(plan: Plan, request: Request, proposal: Proposal | None = Non
     return " ".join(filter(None, parts))
 
 
-def agreement_to(plan: Plan, request: Request) -> frozenset[str]:
+def agreement_to(plan: Plan, request: PlanRequest) -> frozenset[str]:
     """Return all that a person agrees to with a plan: kinds of risk, and each danger by itself."""
     return frozenset(_reasons(plan, request))
 
 
-def _reasons(plan: Plan, request: Request) -> dict[str, str]:
+def _reasons(plan: Plan, request: PlanRequest) -> dict[str, str]:
     """Return why a plan waits for a yes, by what would be agreed to."""
     if all(action.skill in MOTIONLESS for action in plan.actions):
         return {}
@@ -70,7 +70,7 @@ def _reasons(plan: Plan, request: Request) -> dict[str, str]:
     return found if wanted is Confirm.NEVER else found | dict(_risks(plan, request))
 
 
-def _doubts(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
+def _doubts(plan: Plan, request: PlanRequest) -> Iterator[tuple[str, str]]:
     """Yield what is unsure, since it may not be what was asked for."""
     if min(action.feasibility_score for action in plan.actions) < SURE:
         yield "unsure", "I am not sure that I understood you"
@@ -79,7 +79,7 @@ def _doubts(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
         yield "unheard", "I am not sure that I heard you right"
 
 
-def _risks(plan: Plan, request: Request) -> Iterator[tuple[str, str]]:
+def _risks(plan: Plan, request: PlanRequest) -> Iterator[tuple[str, str]]:
     """Yield each risk; a yes to one danger, or one heavy thing, is none to another."""
     for concern in plan.safety_concerns:
         yield concern, f"There may be a danger: {concern}"

@@ -21,16 +21,16 @@ from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
-from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import numbered
 from vla_deploy.planning.understanding import (
+    AnswerVerdict,
     Candidate,
     Conversation,
-    Outcome,
+    ConversationTurn,
     Question,
-    Turn,
-    Verdict,
+    TurnOutcome,
     judge_answer,
 )
 from vla_deploy.planning.understanding.conversation import ANSWER_LIMIT_S, mentions_of
@@ -89,7 +89,7 @@ class Dialogue:
 
     def __init__(
         self,
-        accepted: Callable[[Request, PlanningResult], None],
+        accepted: Callable[[PlanRequest, PlanningResult], None],
         situation: Situation,
         events: PlannerEvents,
         active: ActivePlans,
@@ -147,7 +147,7 @@ class Dialogue:
         self._events.dispatched(command, plan, answer)
         self._active.add(command, plan, answer, agreement_to(plan, request))
         self.metrics.planned += 1
-        self._remember_plan(done, plan, Outcome.UNDER_WAY)
+        self._remember_plan(done, plan, TurnOutcome.UNDER_WAY)
 
     def hold(self, done: PlannedCommand) -> None:
         """Read a plan back, and hold it until the person says go; one that was held is dropped."""
@@ -157,14 +157,14 @@ class Dialogue:
         asks = Says.HELD.format(question=question_about(plan, done.request, done.answer.proposal))
         self.held = self._asked(done, Ambiguous(asks), limit_s=HELD_S, choices=("go",))
         # "No, the blue one" means this plan, not what was done before it.
-        self._remember_plan(done, plan, Outcome.ASKED)
+        self._remember_plan(done, plan, TurnOutcome.ASKED)
 
     def refuse(
         self,
         command: UserCommand,
         reason: PlanningError | str,
         answer: PlanningResult | None = None,
-        outcome: Outcome = Outcome.REFUSED,
+        outcome: TurnOutcome = TurnOutcome.REFUSED,
     ) -> None:
         """Say why a command is not done."""
         if command.recovers:
@@ -175,14 +175,14 @@ class Dialogue:
         if command.is_doubted:
             if command.may_ask_again:
                 self._events.say(command, Says.HEARD_BADLY)
-        elif outcome is not Outcome.CANCELLED or isinstance(reason, Says):
+        elif outcome is not TurnOutcome.CANCELLED or isinstance(reason, Says):
             self._events.say(command, spoken_refusal(reason))
         self.remember(command, outcome, answer=str(reason))
 
     def drop(self, pending: PendingQuestion | None, why: Says) -> None:
         """Say that what waits for an answer, if anything does, is left."""
         if pending is not None:
-            self.refuse(pending.command, why, pending.answer, Outcome.CANCELLED)
+            self.refuse(pending.command, why, pending.answer, TurnOutcome.CANCELLED)
 
     # --- what waits for an answer ---------------------------------------------------------------
 
@@ -217,15 +217,15 @@ class Dialogue:
         told = replace(asked, text=Says.NOT_CLEAR.format(question=asked.text))
         self._events.asked(pending.command, told, pending.plan)
 
-    def judge(self, text: str) -> tuple[Verdict, Candidate | None]:
+    def judge(self, text: str) -> tuple[AnswerVerdict, Candidate | None]:
         """Return what an utterance is to the question that waits, and which candidate it picks."""
         if self.pending is None or self._is_overdue(self.pending):
-            return Verdict.ANEW, None
+            return AnswerVerdict.ANEW, None
         return judge_answer(self.pending.question, text)
 
     def declines(self, text: object) -> bool:
         """Return whether words such as "never mind" mean the question, and not all that goes on."""
-        return isinstance(text, str) and self.judge(text)[0] is Verdict.NO
+        return isinstance(text, str) and self.judge(text)[0] is AnswerVerdict.NO
 
     def settle(self) -> PendingQuestion | None:
         """Wait no more, and return what waited; nothing that was chosen counts any more."""
@@ -256,18 +256,20 @@ class Dialogue:
 
     # --- what was said and done -----------------------------------------------------------------
 
-    def remember(self, command: UserCommand, outcome: Outcome, **known: Any) -> None:
+    def remember(self, command: UserCommand, outcome: TurnOutcome, **known: Any) -> None:
         """Add a turn to the conversation: a command, what came of it, and what else is known."""
         text, command_id, told_ns = command.text, command.command_id, command.told_ns
-        turn = Turn(said=text, command_id=command_id, told_ns=told_ns, outcome=outcome, **known)
+        turn = ConversationTurn(
+            said=text, command_id=command_id, told_ns=told_ns, outcome=outcome, **known
+        )
         self.conversation = self.conversation.after(turn)
 
-    def _remember_plan(self, done: PlannedCommand, plan: Plan, outcome: Outcome) -> None:
+    def _remember_plan(self, done: PlannedCommand, plan: Plan, outcome: TurnOutcome) -> None:
         mentioned, here = mentions_of(plan, done.request.scene), done.request.here
         told = {"understood": plan.summary, "mentioned": mentioned, "plan": plan, "here": here}
         self.remember(done.command, outcome, **told)
 
     def ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how a command ended that was carried out."""
-        outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
+        outcome = TurnOutcome.SUCCEEDED if success else TurnOutcome.FAILED
         self.conversation = self.conversation.ended(command_id, outcome, error)

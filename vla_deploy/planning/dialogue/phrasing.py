@@ -11,7 +11,7 @@ from enum import StrEnum
 from itertools import zip_longest
 from typing import Any, Final
 
-from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanningError
+from vla_deploy.planning.errors import NotReadyToMove, NotUnderstood, PlanningError
 from vla_deploy.planning.plan import PUT_IN, Plan
 
 _MOST_STEPS: Final = 6
@@ -45,7 +45,7 @@ class Says(StrEnum):
 # What a person hears of errors whose message is for reading.
 _SPOKEN: Final[Mapping[type[PlanningError], Says]] = {
     NotUnderstood: Says.NOT_UNDERSTOOD,
-    NotReady: Says.NOT_READY,
+    NotReadyToMove: Says.NOT_READY,
 }
 Parameters = Mapping[str, Any]
 # What each skill is called when it is proposed.

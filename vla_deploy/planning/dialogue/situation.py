@@ -15,8 +15,8 @@ from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
-from vla_deploy.planning.errors import NotReady
-from vla_deploy.planning.interfaces import Aid, Request
+from vla_deploy.planning.errors import NotReadyToMove
+from vla_deploy.planning.interfaces import Aid, PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
@@ -64,13 +64,13 @@ class Situation:
         conversation: Conversation,
         *,
         of_use: frozenset[Aid] = frozenset(),
-    ) -> Request:
+    ) -> PlanRequest:
         """Return the request for a command with what is known now, and what aids are of use."""
         here = self._here()
         scene = self._snapshot(here)
         recalls = command.text if Aid.MEMORY in of_use else None
         recollections, last_seen = recalled(self._memory, recalls)
-        return Request(
+        return PlanRequest(
             command_id=command.command_id,
             text=command.text,
             world=world_of(self._robot, self._holding(scene), self._is_free),
@@ -97,11 +97,11 @@ class Situation:
         """
         table = self._table.latest()
         if table is not None and table.document().get("refusal"):
-            raise NotReady(str(table.document()["refusal"]))
+            raise NotReadyToMove(str(table.document()["refusal"]))
         control = self._fresh(self._control, STATUS_AGE_S)
         refusal = refusal_of(control.document() if control is not None else None)
         if refusal:
-            raise NotReady(refusal)
+            raise NotReadyToMove(refusal)
 
     def _holding(self, scene: Snapshot | None) -> Mapping[str, str | None]:
         """Return what the executor says that each hand holds, less what the fingers deny."""

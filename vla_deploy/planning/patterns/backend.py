@@ -8,7 +8,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
-from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
+from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.knowledge import World, match_place
 from vla_deploy.planning.patterns.follow_up import repeated
 from vla_deploy.planning.patterns.phrase import clauses
@@ -27,7 +27,7 @@ class Patterns(BackEnd):
 
     name = NAME
 
-    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+    def propose(self, request: PlanRequest, deadline: Deadline) -> Proposal:
         """Return the plan; a pattern fits or it does not, so there is no doubt about it.
 
         Raises:
@@ -45,7 +45,7 @@ class Patterns(BackEnd):
         return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
 
 
-def pattern_plan(request: Request) -> Plan:
+def pattern_plan(request: PlanRequest) -> Plan:
     """Return the plan of a command that patterns cover.
 
     Raises:
@@ -75,14 +75,14 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
         NotUnderstood: no pattern covers a clause.
         PlanningError: what a clause asks for cannot be done, or is not known.
     """
-    request = Request(command_id="", text=text, world=world, here=here)
+    request = PlanRequest(command_id="", text=text, world=world, here=here)
     try:
         return ground_plan(pattern_plan(request), request)
     except Declined as error:
         raise NotUnderstood(text) from error
 
 
-def _fitting(clause: str, request: Request) -> Step:
+def _fitting(clause: str, request: PlanRequest) -> Step:
     unknown = ""
     for pattern, given in PATTERNS:
         found = pattern.fullmatch(clause)
@@ -98,6 +98,6 @@ def _fitting(clause: str, request: Request) -> Step:
     raise Declined(f'no pattern covers "{clause[:60]}"')
 
 
-def _is_known(name: str, request: Request) -> bool:
+def _is_known(name: str, request: PlanRequest) -> bool:
     """Tell whether words name a place, or a thing, or are "there"."""
     return name in _THERE or is_thing(name) or match_place(name, request.world.places) is not None

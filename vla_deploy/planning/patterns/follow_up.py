@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from vla_deploy.planning.errors import NotAble
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import match_place, object_or_none
 from vla_deploy.planning.patterns.table import NAMED
 from vla_deploy.planning.plan import PUT_IN, Action, Plan, chained
-from vla_deploy.planning.understanding.conversation import Outcome, Turn
+from vla_deploy.planning.understanding.conversation import ConversationTurn, TurnOutcome
 from vla_deploy.world import UnknownWord, parse_query
 
 _AGAIN: Final = re.compile(
@@ -22,7 +22,7 @@ _AGAIN: Final = re.compile(
 )
 
 
-def repeated(text: str, request: Request) -> Plan | None:
+def repeated(text: str, request: PlanRequest) -> Plan | None:
     """Return the plan of a clause that repeats the command before it, None for other clauses.
 
     Raises:
@@ -38,10 +38,10 @@ def repeated(text: str, request: Request) -> Plan | None:
     return Plan(goal=last.plan.goal, summary=last.understood, actions=chained(own))
 
 
-def last_done(request: Request) -> Turn | None:
+def last_done(request: PlanRequest) -> ConversationTurn | None:
     """Return the turn before this one if it was carried out, or is."""
     turns = request.conversation.turns
-    is_done = bool(turns) and turns[-1].outcome in (Outcome.UNDER_WAY, Outcome.SUCCEEDED)
+    is_done = bool(turns) and turns[-1].outcome in (TurnOutcome.UNDER_WAY, TurnOutcome.SUCCEEDED)
     return turns[-1] if is_done and turns[-1].plan is not None else None
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
-from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.understanding import Turn
+from vla_deploy.planning.understanding import ConversationTurn
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 from vla_deploy.world.words import size_word
@@ -26,7 +26,7 @@ ROOM: Final = 14_000
 _FAILURE_CHARACTERS: Final = 600
 
 
-def chat_for(request: Request, robot: str, room: int = ROOM, jpeg: bytes | None = None) -> Chat:
+def chat_for(request: PlanRequest, robot: str, room: int = ROOM, jpeg: bytes | None = None) -> Chat:
     """Return the question; of the situation so much is told that `room` characters suffice."""
     extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
@@ -40,7 +40,7 @@ def chat_for(request: Request, robot: str, room: int = ROOM, jpeg: bytes | None 
     data_room = room - len(system) - len(text) - len(command)
     data = as_data(fitted(situation_of(request), data_room))
     images = () if jpeg is None else (jpeg,)
-    message = Message(text=text.format(data, command), images=images)
+    message = ChatMessage(text=text.format(data, command), images=images)
     return Chat(system=system, messages=(message,), schema_name="plan")
 
 
@@ -92,7 +92,7 @@ MOST_RECOLLECTIONS: Final = 8
 _UNKNOWN_KIND: Final = "object"
 
 
-def situation_of(request: Request) -> dict[str, Any]:
+def situation_of(request: PlanRequest) -> dict[str, Any]:
     """Return all that a planner should know of a request, apart from the command itself."""
     scene = request.scene
     return {
@@ -110,7 +110,7 @@ def situation_of(request: Request) -> dict[str, Any]:
     }
 
 
-def _things(request: Request, scene: Snapshot) -> list[dict[str, Any]]:
+def _things(request: PlanRequest, scene: Snapshot) -> list[dict[str, Any]]:
     words = set(request.text.casefold().split())
 
     def rank(thing: Thing) -> tuple[bool, float]:
@@ -138,7 +138,7 @@ def _distance_m(thing: Thing, robot: Viewpoint | None) -> float:
     return 0.0 if robot is None else math.dist(thing.xy_m, (robot.x_m, robot.y_m))
 
 
-def _turn(turn: Turn) -> dict[str, str]:
+def _turn(turn: ConversationTurn) -> dict[str, str]:
     row = {
         "person": plain(turn.said, SENTENCE_CHARACTERS),
         "done": plain(turn.understood, SENTENCE_CHARACTERS),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Request
+from vla_deploy.planning.interfaces import Check, PlanningResult, PlanRequest, Proposal
 from vla_deploy.planning.knowledge import object_or_none
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.recovery.setback import Carried, FailureCause
@@ -21,10 +21,10 @@ OBJECT_PARAMETERS: Final = ("object", "destination")
 _CONFIDENCE: Final = 0.8
 _UNCLEAR: Final = "nobody knows how much of the way was done"
 Steps = list[Action]
-Strategy = Callable[[Carried, Request], Steps]
+Strategy = Callable[[Carried, PlanRequest], Steps]
 
 
-def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
+def recover(carried: Carried, request: PlanRequest, check: Check) -> PlanningResult:
     """Return a plan that mends the last setback, or why none of the strategies has one.
 
     The proposal's `origin` names the strategy. Where it is not known how much of a drive or a turn
@@ -49,12 +49,12 @@ def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
     return PlanningResult(error=CannotBeDone(f"{error} ({why})"))
 
 
-def put_in(carried: Carried, _: Request) -> Steps:
+def put_in(carried: Carried, _: PlanRequest) -> Steps:
     """Do what is left, with what the world has turned out to lack put in before it."""
     return [] if carried.setbacks[-1].cause is FailureCause.SKILL else carried.left
 
 
-def take_again(carried: Carried, request: Request) -> Steps:
+def take_again(carried: Carried, request: PlanRequest) -> Steps:
     """Take once more what the hands have lost on the way."""
     if carried.failed.skill != "place":
         return []
@@ -69,7 +69,7 @@ def take_again(carried: Carried, request: Request) -> Steps:
     return [_looked_for(lost[-1]), lost[-1], *carried.left] if state.hands and lost else []
 
 
-def look_again(carried: Carried, _: Request) -> Steps:
+def look_again(carried: Carried, _: PlanRequest) -> Steps:
     """Look for the thing anew, and try once more from where it is seen then."""
     failed = carried.failed
     if failed.skill == "find_object" or _object_of(failed) is None:
@@ -77,7 +77,7 @@ def look_again(carried: Carried, _: Request) -> Steps:
     return [_looked_for(failed), *carried.left]
 
 
-def wait(carried: Carried, _: Request) -> Steps:
+def wait(carried: Carried, _: PlanRequest) -> Steps:
     """Give a person who stands in the way time to go, and try once more."""
     failed = carried.failed
     if failed.skill not in BLOCKED_BY_OTHERS:
@@ -86,7 +86,7 @@ def wait(carried: Carried, _: Request) -> Steps:
     return [pause, *carried.left]
 
 
-def other_hand(carried: Carried, request: Request) -> Steps:
+def other_hand(carried: Carried, request: PlanRequest) -> Steps:
     """Take with the other hand, and put down with it."""
     hands, used = tuple(request.world.holding), carried.failed.parameters.get("arm")
     if carried.failed.skill != "pick_up" or used not in hands or len(hands) != 2:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.planning.knowledge import World, match_place
-from vla_deploy.planning.symbolic.state import Point, State, Subject, subject_or_none
+from vla_deploy.planning.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.footprint import polygon_depth_m
@@ -51,10 +51,10 @@ class Setting:
 
 # MET is no fault, None is not known, any other text says what is wrong.
 Answer = str | None
-Condition = Callable[[State, Setting], Answer]
+Condition = Callable[[SymbolicState, Setting], Answer]
 
 
-def is_known(state: State, setting: Setting) -> Answer:
+def is_known(state: SymbolicState, setting: Setting) -> Answer:
     """Has the thing been looked for, or seen?"""
     subject = setting.subject("object") or setting.subject("destination")
     if subject is None or subject.key in state.found or state.holds(subject.key):
@@ -64,7 +64,7 @@ def is_known(state: State, setting: Setting) -> Answer:
     return f"the {subject.words} has not been seen; find_object comes first"
 
 
-def is_before(state: State, setting: Setting) -> Answer:
+def is_before(state: SymbolicState, setting: Setting) -> Answer:
     """Does the robot stand where the thing, or the place, is within reach?"""
     place, sites = setting.place("destination"), setting.world.sites
     subject = setting.subject("object") or setting.subject("destination")
@@ -87,7 +87,7 @@ def is_before(state: State, setting: Setting) -> Answer:
     return f"the {what} is {distance_m:.1f} m away; navigate_to it first"
 
 
-def has_free_hand(state: State, setting: Setting) -> Answer:
+def has_free_hand(state: SymbolicState, setting: Setting) -> Answer:
     """Is the hand that shall take free, or any?"""
     arm = str(setting.parameters.get("arm", ""))
     if not state.hands:
@@ -100,7 +100,7 @@ def has_free_hand(state: State, setting: Setting) -> Answer:
     return f"no hand is free ({', '.join(map(str, state.held))}); place something first"
 
 
-def holds_something(state: State, setting: Setting) -> Answer:
+def holds_something(state: SymbolicState, setting: Setting) -> Answer:
     """Does the hand that shall put down hold something?"""
     arm = str(setting.parameters.get("arm", ""))
     if state.holding(arm):
@@ -110,14 +110,14 @@ def holds_something(state: State, setting: Setting) -> Answer:
     return f"the {arm} hand holds nothing" if arm else "no hand holds anything"
 
 
-def knows_which(state: State, setting: Setting) -> Answer:
+def knows_which(state: SymbolicState, setting: Setting) -> Answer:
     """With both hands full, is it said which one puts down?"""
     if len(state.held) < 2 or "arm" in setting.parameters:
         return MET
     return f"{len(state.held)} hands hold something ({', '.join(map(str, state.held))}); say which"
 
 
-def is_not_held(state: State, setting: Setting) -> Answer:
+def is_not_held(state: SymbolicState, setting: Setting) -> Answer:
     """Is what shall be used not in a hand itself?"""
     subject = setting.subject("object") or setting.subject("destination")
     if subject is None or not state.holds(subject.key):
@@ -125,7 +125,7 @@ def is_not_held(state: State, setting: Setting) -> Answer:
     return f"a hand holds the {subject.words} itself"
 
 
-def can_be_gripped(_: State, setting: Setting) -> Answer:
+def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
     """Is the thing narrow enough, and at a height, for a hand that points down?"""
     subject, opening_m = setting.subject("object"), setting.world.opening_max_m
     if subject is None or subject.thing is None or opening_m is None:
@@ -144,7 +144,7 @@ def can_be_gripped(_: State, setting: Setting) -> Answer:
     return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
 
 
-def is_light_enough(_: State, setting: Setting) -> Answer:
+def is_light_enough(_: SymbolicState, setting: Setting) -> Answer:
     """Is the thing within what one hand may carry?"""
     subject, limit_kg = setting.subject("object"), setting.world.bounds.payload_kg
     mass_kg = None if subject is None else subject.mass_kg
@@ -153,7 +153,7 @@ def is_light_enough(_: State, setting: Setting) -> Answer:
     return f"it may weigh {mass_kg:.2f} kg by its size, a hand carries {limit_kg:g} kg"
 
 
-def takes_things(state: State, setting: Setting) -> Answer:
+def takes_things(state: SymbolicState, setting: Setting) -> Answer:
     """Can something be put in, on or next to the destination?"""
     place, subject = setting.place("destination"), setting.subject("destination")
     relation = setting.parameters.get("relation")
@@ -169,12 +169,12 @@ def takes_things(state: State, setting: Setting) -> Answer:
     return MET
 
 
-def rest_of_subject(state: State, subject: Subject) -> Rest | None:
+def rest_of_subject(state: SymbolicState, subject: Subject) -> Rest | None:
     """Return what a thing rests in or on: where the plan has put it, else where it was seen."""
     return state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
 
 
-def _has_room_beside(state: State, subject: Subject | None) -> Answer:
+def _has_room_beside(state: SymbolicState, subject: Subject | None) -> Answer:
     if subject is None:
         return "things are put next to things, and on furniture"
     rest = rest_of_subject(state, subject)
@@ -185,7 +185,7 @@ def _has_room_beside(state: State, subject: Subject | None) -> Answer:
     return "nothing is put down on the floor" if rest.of == FLOOR else MET
 
 
-def opens_empty(state: State, setting: Setting) -> Answer:
+def opens_empty(state: SymbolicState, setting: Setting) -> Answer:
     """Would opening the hand drop nothing?"""
     held = state.holding(str(setting.parameters.get("arm", "")))
     if not held:
@@ -193,7 +193,7 @@ def opens_empty(state: State, setting: Setting) -> Answer:
     return f"it would drop what is held ({held[0]}); place it, or hand it over instead"
 
 
-def may_go_there(state: State, setting: Setting) -> Answer:
+def may_go_there(state: SymbolicState, setting: Setting) -> Answer:
     """Is the goal outside the zones, and on free floor where a map is at hand?"""
     world = setting.world
     place, subject = setting.place("place"), setting.subject("object")
@@ -216,7 +216,7 @@ def _may_stand(x_m: float, y_m: float, world: World) -> Answer:
     return MET
 
 
-def way_is_allowed(state: State, setting: Setting) -> Answer:
+def way_is_allowed(state: SymbolicState, setting: Setting) -> Answer:
     """Does the straight way keep out of the zones, and on free floor where a map is at hand?"""
     if state.pose is None:
         return None
@@ -234,7 +234,7 @@ def _refusal(zone: KeepOutZone | None, what: str) -> Answer:
     return MET if zone is None else f"{what} is in the {zone.name}: {zone.reason}"
 
 
-def is_slow_enough(_: State, setting: Setting) -> Answer:
+def is_slow_enough(_: SymbolicState, setting: Setting) -> Answer:
     """Is the speed within what the base may do?"""
     speed_m_s, most_m_s = setting.parameters.get("speed_m_s"), setting.world.max_speed_m_s
     if speed_m_s is None or most_m_s is None:

@@ -6,7 +6,7 @@ from vla_deploy.planning.catalogue import ARMS, SKILLS
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Action, execution_order
 from vla_deploy.planning.symbolic.conditions import Setting
-from vla_deploy.planning.symbolic.state import Pose, State, state_of
+from vla_deploy.planning.symbolic.state import Pose, SymbolicState, state_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.world import Snapshot
 
@@ -41,7 +41,7 @@ def end_state(
     world: World,
     scene: Snapshot | None = None,
     here: Pose | None = None,
-) -> State:
+) -> SymbolicState:
     """Return what would hold after the plan."""
     state = state_of(world, scene, here)
     for action in execution_order(actions):
@@ -49,7 +49,9 @@ def end_state(
     return state
 
 
-def after(action: Action, state: State, world: World, scene: Snapshot | None) -> State:
+def after(
+    action: Action, state: SymbolicState, world: World, scene: Snapshot | None
+) -> SymbolicState:
     """Return what holds after one action."""
     setting = Setting(parameters=action.parameters, world=world, scene=scene)
     return LOGIC[action.skill].effect(state, setting)

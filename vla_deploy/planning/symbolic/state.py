@@ -17,7 +17,7 @@ Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Held:
+class HeldSymbol:
     """Hold one thing in a hand; `hand` is "" where the skill chooses it."""
 
     key: str
@@ -29,7 +29,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State:
+class SymbolicState:
     """Hold the symbols.
 
     `at` is the place or the thing (its key) that the robot stands before, "" elsewhere; `spot` is
@@ -42,11 +42,11 @@ class State:
     spot: Point | None = None
     pose: Pose | None = None
     hands: tuple[str, ...] = ()
-    held: tuple[Held, ...] = ()
+    held: tuple[HeldSymbol, ...] = ()
     found: frozenset[str] = frozenset()
     rests: Mapping[str, Rest] = field(default_factory=dict)
 
-    def holding(self, hand: str = "") -> tuple[Held, ...]:
+    def holding(self, hand: str = "") -> tuple[HeldSymbol, ...]:
         """Return what that hand may hold; what any hand holds, where none is named."""
         return tuple(one for one in self.held if not hand or one.hand in ("", hand))
 
@@ -58,23 +58,23 @@ class State:
         """Tell whether a hand holds that thing."""
         return any(one.key == key for one in self.held)
 
-    def taking(self, held: Held) -> "State":
+    def taking(self, held: HeldSymbol) -> "SymbolicState":
         """Return the state with one thing more in the hands."""
         rests = {key: rest for key, rest in self.rests.items() if key != held.key}
         return replace(self, held=(*self.held, held), rests=rests)
 
-    def without(self, given: Iterable[Held]) -> "State":
+    def without(self, given: Iterable[HeldSymbol]) -> "SymbolicState":
         """Return the state with some things no longer in the hands."""
         gone = tuple(given)
         return replace(self, held=tuple(one for one in self.held if one not in gone))
 
 
-def state_of(world: World, scene: Snapshot | None, here: Pose | None) -> State:
+def state_of(world: World, scene: Snapshot | None, here: Pose | None) -> SymbolicState:
     """Return what is known before a plan begins."""
     robot = scene.robot if scene is not None else None
     if here is None and robot is not None:
         here = (robot.x_m, robot.y_m, robot.yaw_rad)
-    return State(
+    return SymbolicState(
         spot=here[:2] if here is not None else None,
         pose=here,
         hands=tuple(world.holding),
@@ -82,14 +82,14 @@ def state_of(world: World, scene: Snapshot | None, here: Pose | None) -> State:
     )
 
 
-def _held(world: World, scene: Snapshot | None) -> Iterable[Held]:
+def _held(world: World, scene: Snapshot | None) -> Iterable[HeldSymbol]:
     """Yield what the hands hold: by the scene, which knows the thing, or by its kind."""
     seen = {one.held_by: one for one in scene.things if one.held_by} if scene is not None else {}
     for hand, thing in seen.items():
-        yield Held(key=thing.thing_id, kind=thing.kind, hand=hand)
+        yield HeldSymbol(key=thing.thing_id, kind=thing.kind, hand=hand)
     for hand, kind in world.holding.items():
         if kind and hand not in seen:
-            yield Held(key=kind, kind=kind, hand=hand)
+            yield HeldSymbol(key=kind, kind=kind, hand=hand)
 
 
 # How heavy a thing of a kind may be for its outer size, full where it can be filled. A bowl is

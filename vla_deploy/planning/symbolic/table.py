@@ -13,15 +13,15 @@ from vla_deploy.planning.symbolic.conditions import (
     Setting,
     rest_of_subject,
 )
-from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.planning.symbolic.state import HeldSymbol, SymbolicState
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import ON
 from vla_deploy.world.thing import Rest
 
-Effect = Callable[[State, Setting], State]
+Effect = Callable[[SymbolicState, Setting], SymbolicState]
 
 
-def goes(state: State, setting: Setting) -> State:
+def goes(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Stand at the goal."""
     place, subject = setting.place("place"), setting.subject("object")
     if subject is not None:
@@ -39,7 +39,7 @@ def goes(state: State, setting: Setting) -> State:
     return replace(state, at="", spot=(x_m, y_m), pose=facing)
 
 
-def moves(state: State, setting: Setting) -> State:
+def moves(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Stand a way ahead."""
     way_m = float(setting.parameters["distance_m"])
     at = state.at if abs(way_m) < SMALL_MOVE_M else ""
@@ -50,7 +50,7 @@ def moves(state: State, setting: Setting) -> State:
     return replace(state, at=at, spot=(x_m, y_m), pose=(x_m, y_m, yaw_rad))
 
 
-def turns(state: State, setting: Setting) -> State:
+def turns(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Look another way, and so stand before nothing any more."""
     if state.pose is None:
         return replace(state, at="")
@@ -59,7 +59,7 @@ def turns(state: State, setting: Setting) -> State:
     return replace(state, at="", pose=(x_m, y_m, yaw_rad))
 
 
-def finds(state: State, setting: Setting) -> State:
+def finds(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Know where the thing is; the search may have led anywhere unless it was in the scene."""
     subject = setting.subject("object")
     if subject is None or subject.key in state.found:
@@ -70,7 +70,7 @@ def finds(state: State, setting: Setting) -> State:
     return replace(state, found=found, at="", spot=None, pose=None)
 
 
-def takes(state: State, setting: Setting) -> State:
+def takes(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Hold the thing in the hand that is named, or the only free one."""
     subject = setting.subject("object")
     if subject is None or state.holds(subject.key):
@@ -78,10 +78,10 @@ def takes(state: State, setting: Setting) -> State:
     free = [hand for hand in state.hands if not any(one.hand == hand for one in state.held)]
     only = free[0] if len(free) == 1 else ""
     hand = str(setting.parameters.get("arm", only))
-    return state.taking(Held(key=subject.key, kind=subject.kind, hand=hand))
+    return state.taking(HeldSymbol(key=subject.key, kind=subject.kind, hand=hand))
 
 
-def puts(state: State, setting: Setting) -> State:
+def puts(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Hold the thing no longer, and let it rest where it was put."""
     held = state.holding(str(setting.parameters.get("arm", "")))[:1]
     rest = _rest_at_destination(state, setting)
@@ -89,7 +89,7 @@ def puts(state: State, setting: Setting) -> State:
     return replace(state.without(held), rests={**state.rests, **put})
 
 
-def _rest_at_destination(state: State, setting: Setting) -> Rest:
+def _rest_at_destination(state: SymbolicState, setting: Setting) -> Rest:
     """Return what it rests in or on then; beside a thing, on what that rests on."""
     subject, relation = setting.subject("destination"), str(setting.parameters.get("relation", ON))
     if subject is None:
@@ -100,12 +100,12 @@ def _rest_at_destination(state: State, setting: Setting) -> Rest:
     return Rest(ON, below.of if below is not None else "")
 
 
-def lets_go(state: State, setting: Setting) -> State:
+def lets_go(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Hold nothing in the hand that opens."""
     return state.without(state.holding(str(setting.parameters.get("arm", ""))))
 
 
-def stays(state: State, _: Setting) -> State:
+def stays(state: SymbolicState, _: Setting) -> SymbolicState:
     """Change nothing that plans are about."""
     return state
 

@@ -1,24 +1,24 @@
 """Understand what a command refers to: by the conversation, the scene and the robot's places."""
 
-from vla_deploy.planning.understanding.answers import Verdict, judge_answer
+from vla_deploy.planning.understanding.answers import AnswerVerdict, judge_answer
 from vla_deploy.planning.understanding.conversation import (
     Candidate,
     Conversation,
+    ConversationTurn,
     Mention,
-    Outcome,
+    MentionRole,
     Question,
-    Role,
-    Turn,
+    TurnOutcome,
 )
 
 __all__ = [
+    "AnswerVerdict",
     "Candidate",
     "Conversation",
+    "ConversationTurn",
     "Mention",
-    "Outcome",
+    "MentionRole",
     "Question",
-    "Role",
-    "Turn",
-    "Verdict",
+    "TurnOutcome",
     "judge_answer",
 ]

@@ -56,7 +56,7 @@ _COMPARING: Final = frozenset(
 _WORD: Final = re.compile(r"[a-z0-9_']+")
 
 
-class Verdict(StrEnum):
+class AnswerVerdict(StrEnum):
     """Say what an utterance is to a question."""
 
     YES = "yes"
@@ -67,29 +67,31 @@ class Verdict(StrEnum):
     ANEW = "anew"
 
 
-def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:
+def judge_answer(question: Question, text: str) -> tuple[AnswerVerdict, Candidate | None]:
     """Return what an utterance is to a question, and the candidate that it picks."""
     said = " ".join(_WORD.findall(text.lower().replace("\u2019", "'")))
     candidates = question.candidates
     if _NO.fullmatch(said):
-        return Verdict.NO, None
+        return AnswerVerdict.NO, None
     agrees = _YES.fullmatch(said) is not None
     if not candidates:
-        return (Verdict.YES if agrees else Verdict.ANEW), None
+        return (AnswerVerdict.YES if agrees else AnswerVerdict.ANEW), None
     if _ANY.fullmatch(said) or (agrees and len(candidates) == 1):
-        return Verdict.CHOSEN, candidates[0]
+        return AnswerVerdict.CHOSEN, candidates[0]
     known = frozenset[str]().union(*({*one.features, one.name} for one in candidates))
     denied = _NOT.fullmatch(said)
     meant = said if denied is None else denied["rest"]
     words = [word for word in meant.split() if word not in _SILENT or word in known - _FILL]
     if agrees and known.isdisjoint(words):  # "right" is the one on the right, where there is one
-        return Verdict.UNCLEAR, None
+        return AnswerVerdict.UNCLEAR, None
     if not (known | _COMPARING).issuperset(words):
-        return (Verdict.ANEW if known.isdisjoint(words) else Verdict.MIXED), None
+        return (AnswerVerdict.ANEW if known.isdisjoint(words) else AnswerVerdict.MIXED), None
     fitting = _fitting(candidates, words)
     if denied is not None:
         fitting = [one for one in candidates if one not in fitting] if fitting else []
-    return (Verdict.CHOSEN, fitting[0]) if len(fitting) == 1 else (Verdict.UNCLEAR, None)
+    return (
+        (AnswerVerdict.CHOSEN, fitting[0]) if len(fitting) == 1 else (AnswerVerdict.UNCLEAR, None)
+    )
 
 
 def _fitting(candidates: Sequence[Candidate], words: Sequence[str]) -> list[Candidate]:

@@ -20,7 +20,7 @@ MOST_TURNS: Final = 5
 ANSWER_LIMIT_S: Final = 20.0
 
 
-class Role(StrEnum):
+class MentionRole(StrEnum):
     """Name the part that something mentioned plays in a command."""
 
     OBJECT = "object"
@@ -28,7 +28,7 @@ class Role(StrEnum):
     PLACE = "place"
 
 
-class Outcome(StrEnum):
+class TurnOutcome(StrEnum):
     """Tell how a turn ended, or that it has not."""
 
     UNDER_WAY = "under way"
@@ -49,13 +49,13 @@ class Mention:
 
     said: str
     means: str
-    role: Role = Role.OBJECT
+    role: MentionRole = MentionRole.OBJECT
     thing_id: str = ""
     kind: str = ""
     colour: str = ""
 
     @classmethod
-    def of(cls, thing: Thing, said: str = "", role: Role = Role.OBJECT) -> "Mention":
+    def of(cls, thing: Thing, said: str = "", role: MentionRole = MentionRole.OBJECT) -> "Mention":
         """Return the mention of a thing of the scene, by its own words if it was not called."""
         return cls(
             said=said or str(thing),
@@ -68,7 +68,7 @@ class Mention:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Turn:
+class ConversationTurn:
     """Hold one command, what the robot answered to it, and the plan that came of it or None.
 
     `understood` is the command as the plan sums it up; `here` is where the robot stood (x, y, yaw
@@ -81,7 +81,7 @@ class Turn:
     understood: str = ""
     mentioned: tuple[Mention, ...] = ()
     plan: Plan | None = None
-    outcome: Outcome = Outcome.UNDER_WAY
+    outcome: TurnOutcome = TurnOutcome.UNDER_WAY
     answer: str = ""
     here: Pose | None = None
 
@@ -126,17 +126,17 @@ class Conversation:
     `choices` maps expressions of the command being planned to what the speaker said they mean.
     """
 
-    turns: tuple[Turn, ...] = ()
+    turns: tuple[ConversationTurn, ...] = ()
     choices: Mapping[str, str] = field(default_factory=dict)
 
-    def after(self, turn: Turn) -> "Conversation":
+    def after(self, turn: ConversationTurn) -> "Conversation":
         """Add a turn, or put it in the place of the one with its command id; forget the oldest."""
         others = tuple(
             one for one in self.turns if not turn.command_id or one.command_id != turn.command_id
         )
         return replace(self, turns=(*others, turn)[-MOST_TURNS:])
 
-    def ended(self, command_id: str, outcome: Outcome, answer: str = "") -> "Conversation":
+    def ended(self, command_id: str, outcome: TurnOutcome, answer: str = "") -> "Conversation":
         """Note how a turn ended; one that is forgotten changes nothing."""
         turns = tuple(
             replace(one, outcome=outcome, answer=answer or one.answer)
@@ -163,7 +163,9 @@ def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     for action in plan.actions:
         values = (action.parameters.get(name) for name in ("object", "destination", "place"))
         named = [
-            _mention(value, Role.DESTINATION if value in put_to else Role.OBJECT, scene)
+            _mention(
+                value, MentionRole.DESTINATION if value in put_to else MentionRole.OBJECT, scene
+            )
             for value in values
             if isinstance(value, str)
         ]
@@ -178,7 +180,7 @@ def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
     for word in words_of(goal[:MOST_LETTERS]):
         name = SYNONYMS.get(word, word)
         if name in OBJECT_CLASSES and name != ANY_CLASS:
-            yield _mention(f"{colour} {name}", Role.OBJECT, scene)
+            yield _mention(f"{colour} {name}", MentionRole.OBJECT, scene)
         colour = name if name in COLOURS else ""
 
 
@@ -193,11 +195,11 @@ def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterat
         yield Mention.of(held[0], held[0].thing_id)
 
 
-def _mention(said: str, role: Role, scene: Snapshot | None) -> Mention:
+def _mention(said: str, role: MentionRole, scene: Snapshot | None) -> Mention:
     """Return the mention of a thing, or of a place; what is driven to, to put there, is put to."""
     subject = subject_or_none(said, scene)
     if subject is None:
-        return Mention(said=said, means=said, role=Role.PLACE)
+        return Mention(said=said, means=said, role=MentionRole.PLACE)
     if subject.thing is not None:
         return Mention.of(subject.thing, said, role)
     return Mention(said=said, means=subject.words, role=role, kind=subject.kind)

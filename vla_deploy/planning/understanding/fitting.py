@@ -9,8 +9,8 @@ from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
-from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.understanding.conversation import Mention, MentionRole
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
@@ -25,7 +25,7 @@ LEAST_BEARING_RAD: Final = 0.03
 class CommandContext:
     """Remember, over one command, what has been mentioned; everything else is the request's."""
 
-    request: Request
+    request: PlanRequest
     mentions: list[Mention] = field(default_factory=list)
 
     @property
@@ -63,7 +63,7 @@ class CommandContext:
         """Return the objects of the newest turn that mentioned any."""
         turns = reversed(self.request.conversation.turns)
         for mentioned in (tuple(self.mentions), *(turn.mentioned for turn in turns)):
-            objects = tuple(one for one in mentioned if one.role is Role.OBJECT)
+            objects = tuple(one for one in mentioned if one.role is MentionRole.OBJECT)
             if objects:
                 return tuple(dict.fromkeys(objects))
         return ()
@@ -78,7 +78,7 @@ class CommandContext:
                 yield hand, Mention(said=kind, means=kind, kind=kind)
 
 
-class Use(StrEnum):
+class ThingUse(StrEnum):
     """Say what a command wants of a thing: see, reach, take or put it, or put onto it."""
 
     SEE = "see"
@@ -88,7 +88,7 @@ class Use(StrEnum):
     ONTO = "onto"
 
 
-def fitting(read: Expression, use: Use, context: CommandContext) -> list[Thing]:
+def fitting(read: Expression, use: ThingUse, context: CommandContext) -> list[Thing]:
     """Return the things that fit, the nearest first.
 
     Raises:
@@ -101,7 +101,7 @@ def fitting(read: Expression, use: Use, context: CommandContext) -> list[Thing]:
         raise DependsOnView(read.said)
     found = find(replace(query, order=""), scene, view) or _in_room(query, context)
     if read.is_other:
-        if use is Use.PUT and not read.query.is_named:
+        if use is ThingUse.PUT and not read.query.is_named:
             found = [one for one in scene.things if one.held_by] or found
         spoken = (one for one in context.spoken_of() if query.kind in (ANY_CLASS, one.kind))
         before = next((one.thing_id for one in spoken if one.thing_id), "")
@@ -119,25 +119,27 @@ def fitting(read: Expression, use: Use, context: CommandContext) -> list[Thing]:
     return _told_apart(read, found, view)
 
 
-def _suits(thing: Thing, use: Use, query: Query, context: CommandContext) -> bool:
+def _suits(thing: Thing, use: ThingUse, query: Query, context: CommandContext) -> bool:
     """Tell whether a thing can play its part: what is held is not taken, nor put upon."""
     may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
     match use:
-        case Use.ONTO:
-            moved = [one.thing_id for one in context.mentions if one.role is Role.OBJECT]
+        case ThingUse.ONTO:
+            moved = [one.thing_id for one in context.mentions if one.role is MentionRole.OBJECT]
             return not thing.held_by and thing.thing_id not in moved
-        case Use.TAKE:
+        case ThingUse.TAKE:
             return may_move and (not thing.held_by or bool(query.thing_id))
-        case Use.PUT:
+        case ThingUse.PUT:
             return may_move
-        case Use.SEE | Use.REACH:
+        case ThingUse.SEE | ThingUse.REACH:
             return True
 
 
-def _kind_spoken_of(query: Query, use: Use, context: CommandContext) -> str:
+def _kind_spoken_of(query: Query, use: ThingUse, context: CommandContext) -> str:
     """Return the kind that "the red one" means after "the cups": the last of which one is red."""
     for one in context.spoken_of():
-        if not one.kind or (use in (Use.TAKE, Use.PUT) and one.kind not in GRASPABLE_CLASSES):
+        if not one.kind or (
+            use in (ThingUse.TAKE, ThingUse.PUT) and one.kind not in GRASPABLE_CLASSES
+        ):
             continue
         if find(replace(query, kind=one.kind), context.scene, context.view):
             return one.kind

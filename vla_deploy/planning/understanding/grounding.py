@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid, UnknownPlace
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.plan import (
     MOST_ACTIONS,
     PUT_IN,
@@ -22,15 +22,15 @@ from vla_deploy.planning.plan import (
 from vla_deploy.planning.symbolic.conditions import MET, Setting, is_before, is_known
 from vla_deploy.planning.symbolic.simulation import after, in_turn
 from vla_deploy.planning.symbolic.state import (
-    Held,
-    State,
+    HeldSymbol,
+    SymbolicState,
     state_of,
     subject_of,
     subject_or_none,
 )
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.understanding.fitting import ThingUse
 from vla_deploy.planning.understanding.places import (
     Parameters,
     check_readable,
@@ -51,7 +51,7 @@ OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
 Step = tuple[str, Parameters]
 
 
-def ground_plan(plan: Plan, request: Request) -> Plan:
+def ground_plan(plan: Plan, request: PlanRequest) -> Plan:
     """Return the plan as it can be validated and carried out; it names only what the robot knows.
 
     Raises:
@@ -79,7 +79,7 @@ def ground_plan(plan: Plan, request: Request) -> Plan:
 class _Grounder:
     """Ground one action after another, keeping the state that those before it leave."""
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: PlanRequest) -> None:
         self.resolver = Resolver(request)
         self.done: list[Action] = []
         self._request = request
@@ -146,7 +146,7 @@ class _Grounder:
             case "place":
                 yield from self._place(given)
             case "find_object" | "look_at" if isinstance(given.get("object"), str):
-                thing = self.resolver.things(given["object"], Use.SEE)[0]
+                thing = self.resolver.things(given["object"], ThingUse.SEE)[0]
                 yield from _on_furniture(thing)
                 yield action.skill, {**given, "object": thing.name}
             case "pick_up" if isinstance(given.get("object"), str):
@@ -165,7 +165,7 @@ class _Grounder:
         if pronoun_of(goal) == phrases.HERE:
             yield "navigate_to", {**self._here(goal), **rest}
             return
-        thing = thing_unless_place(goal, self.resolver, Use.REACH)
+        thing = thing_unless_place(goal, self.resolver, ThingUse.REACH)
         if thing is None:
             yield "navigate_to", {"place": resolve_place(goal, self.resolver), **rest}
             return
@@ -181,7 +181,7 @@ class _Grounder:
         return pose_parameters(here)
 
     def _pick(self, given: Parameters) -> Iterator[Step]:
-        things = self.resolver.things(given["object"], Use.TAKE)
+        things = self.resolver.things(given["object"], ThingUse.TAKE)
         if pronoun_of(given["object"]) == phrases.THEM:
             # "Put the cups down, get the keys": what the plan has put somewhere is not meant.
             others = [one for one in things if self._key(one) not in self._state.rests]
@@ -196,7 +196,7 @@ class _Grounder:
         things: tuple[Referent | None, ...] = (None,)
         check_readable(given.get("destination"), self.resolver)
         if isinstance(given.get("object"), str):
-            things = self.resolver.things(given["object"], Use.PUT)
+            things = self.resolver.things(given["object"], ThingUse.PUT)
         destination = destination_of(given, self.resolver, self._state)
         if given.get("destination") is None:
             # What no hand holds is not fetched to put it down, and the plan may have put it before.
@@ -215,7 +215,7 @@ class _Grounder:
 
     def _hand_over(self, given: Parameters) -> Iterator[Step]:
         """Give what is held; what is not is fetched before, to where it was asked for."""
-        for thing in self.resolver.things(given["object"], Use.PUT):
+        for thing in self.resolver.things(given["object"], ThingUse.PUT):
             if self._held(thing) is None:
                 yield from _on_furniture(thing)
                 yield "pick_up", {"object": thing.name, **_arm(given)}
@@ -230,12 +230,12 @@ class _Grounder:
         subject = subject_or_none(where, self._request.scene)
         return rest is not None and rest.of in (where, where if subject is None else subject.key)
 
-    def _hand_of(self, held: Held | None) -> Parameters:
+    def _hand_of(self, held: HeldSymbol | None) -> Parameters:
         """Name the hand that holds a thing where another holds something, too."""
         is_named = held is not None and held.hand and len(self._state.held) > 1
         return {"arm": held.hand} if held is not None and is_named else {}
 
-    def _held(self, thing: Referent) -> Held | None:
+    def _held(self, thing: Referent) -> HeldSymbol | None:
         """Return the holding of a thing, which without a scene goes by its kind, or its hand."""
         keys = (self._key(thing), thing.kind)
         called = (one for one in self._state.held if one.key in keys)
@@ -255,7 +255,7 @@ def _on_furniture(thing: Referent) -> Iterator[Step]:
         yield "navigate_to", {"place": thing.look_at}
 
 
-def _missing(action: Action, state: State, request: Request) -> Step | None:
+def _missing(action: Action, state: SymbolicState, request: PlanRequest) -> Step | None:
     """Return the first step that a plan leaves out before an action: a look, or a way."""
     if action.skill not in OF_THINGS:
         return None

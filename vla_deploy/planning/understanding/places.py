@@ -7,10 +7,10 @@ from typing import Any, Final
 from vla_deploy.planning.errors import NotAble, UnknownObject, UnknownPlace
 from vla_deploy.planning.knowledge import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
-from vla_deploy.planning.symbolic.state import Pose, State
+from vla_deploy.planning.symbolic.state import Pose, SymbolicState
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.planning.understanding.fitting import CommandContext, Use
+from vla_deploy.planning.understanding.conversation import Mention, MentionRole
+from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse
 from vla_deploy.planning.understanding.questions import which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.world.relations import NEXT_TO
@@ -32,7 +32,7 @@ def resolve_place(text: str, resolver: Resolver) -> str:
     answer = context.request.conversation.choices.get(key, key)
     place = match_place(answer, context.request.world.places) or _meant(key, said, context)
     resolver.note(said, place, "a place")
-    context.mentions.append(Mention(said=said, means=place, role=Role.PLACE))
+    context.mentions.append(Mention(said=said, means=place, role=MentionRole.PLACE))
     return place
 
 
@@ -57,7 +57,7 @@ def _meant(key: str, said: str, context: CommandContext) -> str:
     """
     world, view = context.request.world, context.view
     known = {*world.places.values()}
-    spoken = [one.means for one in context.spoken_of() if one.role is Role.PLACE]
+    spoken = [one.means for one in context.spoken_of() if one.role is MentionRole.PLACE]
     if phrases.PRONOUNS.get(key) in (phrases.THERE, phrases.IT):
         if not spoken:
             raise which_place(sorted(known), key, "Where do you mean?")
@@ -82,7 +82,7 @@ def _meant(key: str, said: str, context: CommandContext) -> str:
 # --- where something shall go -------------------------------------------------------------------
 
 
-def destination_of(given: Parameters, resolver: Resolver, state: State) -> Parameters:
+def destination_of(given: Parameters, resolver: Resolver, state: SymbolicState) -> Parameters:
     """Return where to put it and how; without a word about it, on the nearest furniture.
 
     Raises:
@@ -99,7 +99,7 @@ def destination_of(given: Parameters, resolver: Resolver, state: State) -> Param
             raise UnknownPlace(text or "down", set(world.places.values()))
         resolver.note(text or "down", table, "the nearest furniture")
         return {"destination": table, "relation": "on"}
-    thing = thing_unless_place(text, resolver, Use.ONTO, into=relation == "in")
+    thing = thing_unless_place(text, resolver, ThingUse.ONTO, into=relation == "in")
     if thing is not None:
         default = "in" if thing.kind in PUT_INTO else "on"
         return {"destination": thing.name, "relation": relation or default}
@@ -129,7 +129,7 @@ def pose_parameters(pose: Pose) -> dict[str, float]:
 
 
 def thing_unless_place(
-    text: str, resolver: Resolver, use: Use, *, into: bool = False
+    text: str, resolver: Resolver, use: ThingUse, *, into: bool = False
 ) -> Referent | None:
     """Return the thing that a text names, None where it names a place by its name or no thing.
 
@@ -142,13 +142,13 @@ def thing_unless_place(
         return None
     if pronoun_of(text) == phrases.THERE:
         latest = _spoken_there(resolver, use, into=into)
-        if latest is None or latest.role is Role.PLACE:
+        if latest is None or latest.role is MentionRole.PLACE:
             return None
         text = latest.thing_id or latest.means
     try:
         return resolver.thing(text, use)
     except UnknownObject:
-        if use is Use.ONTO and not _named(_key(text), resolver.context.request.world.places):
+        if use is ThingUse.ONTO and not _named(_key(text), resolver.context.request.world.places):
             raise
         return None
 
@@ -158,15 +158,15 @@ def pronoun_of(text: str) -> str | None:
     return phrases.PRONOUNS.get(" ".join(words_of(text)) or text.strip().lower())
 
 
-def _spoken_there(resolver: Resolver, use: Use, *, into: bool) -> Mention | None:
+def _spoken_there(resolver: Resolver, use: ThingUse, *, into: bool) -> Mention | None:
     """Return what "there" was spoken of last: not what is being moved, nor what takes nothing."""
     context = resolver.context
     for one in context.spoken_of():
-        if use is not Use.ONTO:
+        if use is not ThingUse.ONTO:
             return one
-        is_moved = one in context.mentions and one.role is Role.OBJECT
-        if one.role is Role.PLACE and not into:
+        is_moved = one in context.mentions and one.role is MentionRole.OBJECT
+        if one.role is MentionRole.PLACE and not into:
             return one
-        if not is_moved and (one.role is Role.DESTINATION or one.kind in PUT_INTO):
+        if not is_moved and (one.role is MentionRole.DESTINATION or one.kind in PUT_INTO):
             return one
     return None

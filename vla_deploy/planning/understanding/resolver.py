@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 from vla_deploy.planning.catalogue import ARMS, GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownObject
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.planning.understanding.conversation import Mention, MentionRole
 from vla_deploy.planning.understanding.expressions import Expression, Scope
-from vla_deploy.planning.understanding.fitting import CommandContext, Use, fitting
+from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.questions import which_thing
 from vla_deploy.world import Thing
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
@@ -41,11 +41,11 @@ class Resolver:
     `reasons` says of each what it was taken for, and why.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: PlanRequest) -> None:
         self.context = CommandContext(request)
         self.reasons: list[str] = []
 
-    def things(self, text: str, use: Use) -> tuple[Referent, ...]:
+    def things(self, text: str, use: ThingUse) -> tuple[Referent, ...]:
         """Return what an expression means: one thing, or all of "both cups".
 
         Raises:
@@ -56,7 +56,7 @@ class Resolver:
         read = self.context.read(text)
         return self._pointed_back(read, use) if read.pronoun else self._described(read, use)
 
-    def thing(self, text: str, use: Use) -> Referent:
+    def thing(self, text: str, use: ThingUse) -> Referent:
         """Return the one thing that an expression means.
 
         Raises:
@@ -76,9 +76,9 @@ class Resolver:
 
     # --- what is described ----------------------------------------------------------------------
 
-    def _described(self, read: Expression, use: Use) -> tuple[Referent, ...]:
+    def _described(self, read: Expression, use: ThingUse) -> tuple[Referent, ...]:
         found = fitting(read, use, self.context)
-        held = [one for one in found if one.held_by and use is Use.PUT]
+        held = [one for one in found if one.held_by and use is ThingUse.PUT]
         found = held if len(held) == read.count > 0 else found
         if read.count not in (0, len(found)):
             raise NotAble(f'I see {len(found)} that could be "{read.said}"; say which ones')
@@ -88,7 +88,7 @@ class Resolver:
             return tuple(self._seen(read, one, use, "one of all of them") for one in found)
         if len(found) == 1:
             return (self._seen(read, found[0], use, "the only one that fits"),)
-        if use is Use.SEE and not _needs_id(read):
+        if use is ThingUse.SEE and not _needs_id(read):
             return (self._seen(read, found[0], use, "any of them will do"),)
         if read.scope is Scope.ANY:
             return (
@@ -103,7 +103,7 @@ class Resolver:
                     return (self._seen(read, thing, use, why, by_id=True),)
         raise which_thing(found, self.context.view, read.said)
 
-    def _unseen(self, read: Expression, use: Use) -> Referent:
+    def _unseen(self, read: Expression, use: ThingUse) -> Referent:
         """Go by words for what is not in the scene; what only points at things needs it there."""
         query = read.query
         if read.is_compared:
@@ -121,18 +121,18 @@ class Resolver:
         return Referent(name=str(words), kind=kind, look_at=look_at)
 
     def _seen(
-        self, read: Expression, thing: Thing, use: Use, why: str, by_id: bool = False
+        self, read: Expression, thing: Thing, use: ThingUse, why: str, by_id: bool = False
     ) -> Referent:
         """Return what is in the scene: by its words where they will find it later, too."""
         held = [one for one in self.context.scene.things if one.held_by]
-        fits_held = use is Use.TAKE and any(map(read.query.fits, held))
+        fits_held = use is ThingUse.TAKE and any(map(read.query.fits, held))
         name = thing.thing_id if by_id or _needs_id(read) or fits_held else str(read.query)
         self._remember(Mention.of(thing, read.said), use, f"{thing.thing_id} ({thing})", why)
         return Referent(name=name, kind=thing.kind, thing=thing)
 
     # --- what points back -----------------------------------------------------------------------
 
-    def _pointed_back(self, read: Expression, use: Use) -> tuple[Referent, ...]:
+    def _pointed_back(self, read: Expression, use: ThingUse) -> tuple[Referent, ...]:
         """Return what a pronoun means: what was just said, is held, or was spoken of last.
 
         Raises:
@@ -143,30 +143,30 @@ class Resolver:
         context, holding = self.context, dict(self.context.holding())
         if read.pronoun == phrases.THEM:
             several = [one for one in context.latest_group() if _can_move(one, use)]
-            if use is Use.PUT and len(holding) > 1 and (not several or "both" in read.said):
+            if use is ThingUse.PUT and len(holding) > 1 and (not several or "both" in read.said):
                 return self._in_hand(read, use)
             if several:
                 return tuple(self._again(read, one, use, "you spoke of them") for one in several)
         if read.pronoun == phrases.HELD:
             return self._in_hand(read, use)
         held = list(holding.values()) if len(holding) == 1 else []
-        objects = [one for one in context.mentions if one.role is Role.OBJECT]
+        objects = [one for one in context.mentions if one.role is MentionRole.OBJECT]
         just_said = [one for one in objects[-1:] if _can_move(one, use)]
         spoken = [one for one in context.spoken_of() if self._can_be(one, use)]
-        first = [*just_said, *held] if use is Use.PUT else []
-        last = [] if use is Use.ONTO else held
+        first = [*just_said, *held] if use is ThingUse.PUT else []
+        last = [] if use is ThingUse.ONTO else held
         meant = next(iter((*first, *spoken, *last)), None)
         if meant is not None:
             return (self._again(read, meant, use, "the latest that can be meant"),)
         known = fitting(Expression(said=read.said), use, context)
-        known = [one for one in known if one.held_by and use is Use.PUT] or known
+        known = [one for one in known if one.held_by and use is ThingUse.PUT] or known
         if not known:
             raise UnknownObject(read.said, OBJECT_CLASSES)
         if len(known) > 1:
             raise which_thing(known, context.view, read.said)
         return (self._seen(read, known[0], use, "nothing else is in sight"),)
 
-    def _in_hand(self, read: Expression, use: Use) -> tuple[Referent, ...]:
+    def _in_hand(self, read: Expression, use: ThingUse) -> tuple[Referent, ...]:
         """Return what the hands hold, or the hand that is named.
 
         Raises:
@@ -185,30 +185,30 @@ class Resolver:
             for hand, one in holding.items()
         )
 
-    def _can_be(self, one: Mention, use: Use) -> bool:
+    def _can_be(self, one: Mention, use: ThingUse) -> bool:
         """Tell whether what was mentioned can be meant: nothing is put upon itself."""
-        if one.role is Role.PLACE:
+        if one.role is MentionRole.PLACE:
             return False
-        if use is Use.ONTO:
-            return one not in self.context.mentions or one.role is not Role.OBJECT
+        if use is ThingUse.ONTO:
+            return one not in self.context.mentions or one.role is not MentionRole.OBJECT
         return _can_move(one, use)
 
-    def _again(self, read: Expression, one: Mention, use: Use, why: str) -> Referent:
+    def _again(self, read: Expression, one: Mention, use: ThingUse, why: str) -> Referent:
         """Return what was mentioned before; by its id where it is still in the scene."""
         thing = self.context.scene.thing(one.thing_id) if one.thing_id else None
         name = thing.thing_id if thing is not None else one.means
         self._remember(replace(one, said=read.said), use, name, why)
         return Referent(name=name, kind=one.kind, thing=thing)
 
-    def _remember(self, mention: Mention, use: Use, chosen: str, why: str) -> None:
+    def _remember(self, mention: Mention, use: ThingUse, chosen: str, why: str) -> None:
         """Log what an expression was taken for, and remember that it was mentioned."""
         self.note(mention.said, chosen, why)
-        role = Role.DESTINATION if use is Use.ONTO else Role.OBJECT
+        role = MentionRole.DESTINATION if use is ThingUse.ONTO else MentionRole.OBJECT
         self.context.mentions.append(replace(mention, role=role))
 
 
-def _can_move(one: Mention, use: Use) -> bool:
-    return use in (Use.SEE, Use.REACH) or one.kind in GRASPABLE_CLASSES
+def _can_move(one: Mention, use: ThingUse) -> bool:
+    return use in (ThingUse.SEE, ThingUse.REACH) or one.kind in GRASPABLE_CLASSES
 
 
 def _needs_id(read: Expression) -> bool:

@@ -36,7 +36,7 @@ TAIL_NS: Final = NS_PER_S // 2
 _log = logging.getLogger(__name__)
 
 
-class State(StrEnum):
+class StopState(StrEnum):
     """Say whether a spoken stop is heard."""
 
     LIVE = "live"
@@ -71,11 +71,11 @@ class StopWords:
         self._broken = ""
 
     @property
-    def state(self) -> State:
+    def state(self) -> StopState:
         """Return whether a spoken stop is heard."""
         if self._sensitivity == OFF:
-            return State.OFF
-        return State.BROKEN if self._broken else State.LIVE
+            return StopState.OFF
+        return StopState.BROKEN if self._broken else StopState.LIVE
 
     def start(self, space: SharedSpace) -> None:
         """Open button and network; why it cannot be opened is told, and the robot goes on."""

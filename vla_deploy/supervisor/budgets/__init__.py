@@ -2,6 +2,13 @@
 
 from vla_deploy.supervisor.budgets.keeper import BudgetKeeper, Orders
 from vla_deploy.supervisor.budgets.opening import open_keeper
-from vla_deploy.supervisor.budgets.sampler import BackgroundSampler, Feed, Snapshot
+from vla_deploy.supervisor.budgets.sampler import BackgroundSampler, SnapshotFeed, UsageSnapshot
 
-__all__ = ["BackgroundSampler", "BudgetKeeper", "Feed", "Orders", "Snapshot", "open_keeper"]
+__all__ = [
+    "BackgroundSampler",
+    "BudgetKeeper",
+    "Orders",
+    "SnapshotFeed",
+    "UsageSnapshot",
+    "open_keeper",
+]

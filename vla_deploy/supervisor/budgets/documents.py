@@ -9,8 +9,8 @@ from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep
 from platforms.probes import Reading
 from vla_deploy.supervisor.budgets.enforcement import Enforced
-from vla_deploy.supervisor.budgets.judge import Finding
-from vla_deploy.supervisor.budgets.ladder import Change, Taken
+from vla_deploy.supervisor.budgets.judge import BudgetFinding
+from vla_deploy.supervisor.budgets.ladder import LadderMove, Taken
 
 _LONGEST_REASON: Final = 160
 _MOST_READINGS: Final = 128
@@ -42,7 +42,7 @@ def stop_reason(taken: Iterable[Taken]) -> str:
     return stops[0] if stops else ""
 
 
-def rows(findings: Iterable[Finding], now_ns: int) -> list[dict[str, Any]]:
+def rows(findings: Iterable[BudgetFinding], now_ns: int) -> list[dict[str, Any]]:
     """Return each line with what was measured and how it stands."""
     return [
         {
@@ -68,7 +68,7 @@ def ladder_rows(taken: Iterable[Taken], now_ns: int) -> list[dict[str, Any]]:
     ]
 
 
-def history_rows(changes: Iterable[Change], now_ns: int) -> list[dict[str, Any]]:
+def history_rows(changes: Iterable[LadderMove], now_ns: int) -> list[dict[str, Any]]:
     """Return the latest changes, oldest first."""
     return [
         {

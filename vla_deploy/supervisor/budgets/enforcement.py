@@ -8,7 +8,7 @@ from typing import Final
 from platforms import ProcessBudget
 from vla_deploy.supervisor.budgets.cgroup import CgroupRefused, CgroupTree, cpu_max, memory_bytes
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused, MemoryHold
-from vla_deploy.supervisor.budgets.judge import Finding
+from vla_deploy.supervisor.budgets.judge import BudgetFinding
 
 # The ladder acts at the budget itself; the kernel stops whoever runs past it all the same.
 HIGH_RATIO: Final = 1.2
@@ -64,7 +64,7 @@ class Enforcer:
         self._budgets = budgets
         self._pids.clear()
 
-    def enforce(self, pids: Mapping[str, int], findings: Iterable[Finding]) -> None:
+    def enforce(self, pids: Mapping[str, int], findings: Iterable[BudgetFinding]) -> None:
         """Take in new processes, hold back who is over, release who no longer is."""
         for name in [name for name in self._pids if name not in pids]:
             self._forget(name)
@@ -141,7 +141,7 @@ class Enforcer:
         if refusal:
             _log.debug("budgets: %s: its number of tasks is not bounded: %s", name, refusal)
 
-    def _settle(self, metric: str, name: str, excess: Finding | None) -> None:
+    def _settle(self, metric: str, name: str, excess: BudgetFinding | None) -> None:
         """Hold a process back while it is over, where its group does not; release it after that.
 
         What is refused is tried again with the next measurement.
@@ -161,7 +161,7 @@ class Enforcer:
             return
         self._say(metric, name, self._described(key))
 
-    def _hold(self, excess: Finding) -> CpuHold | MemoryHold:
+    def _hold(self, excess: BudgetFinding) -> CpuHold | MemoryHold:
         pid, limit = self._pids[excess.line.process], excess.line.limit
         if excess.line.metric == "cpu_ratio":
             return CpuHold.take(pid, limit)

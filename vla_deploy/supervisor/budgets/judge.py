@@ -18,7 +18,7 @@ class Measurement:
     ended: bool = False
 
 
-class Standing(Enum):
+class BudgetStanding(Enum):
     """Name where a line stands."""
 
     OK = "ok"
@@ -29,7 +29,7 @@ class Standing(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class BudgetFinding:
     """Report one line: what was measured, how it stands, and since when.
 
     `over` is the answer with hysteresis. `beyond_since_ns` and `relieved_since_ns` say since when
@@ -38,7 +38,7 @@ class Finding:
 
     line: Line
     over: bool = False
-    standing: Standing = Standing.OK
+    standing: BudgetStanding = BudgetStanding.OK
     measured: float | None = None
     reason: str = ""
     since_ns: int = 0
@@ -52,7 +52,7 @@ class Finding:
         return f"{whose}{self.line.metric} {got} {than} its budget of {self.line.limit:g}"
 
 
-Findings = Mapping[tuple[str, str], Finding]
+Findings = Mapping[tuple[str, str], BudgetFinding]
 
 
 def judge(
@@ -61,7 +61,7 @@ def judge(
     measured: Mapping[tuple[str, str], Measurement],
     timing: LadderTiming,
     now_ns: int,
-) -> dict[tuple[str, str], Finding]:
+) -> dict[tuple[str, str], BudgetFinding]:
     """Return the finding of every line.
 
     A line is over once every value has been beyond its limit for the rise time, and no longer once
@@ -78,21 +78,21 @@ def judge(
     }
 
 
-def _as_before(line: Line, before: Finding | None, now_ns: int) -> Finding:
+def _as_before(line: Line, before: BudgetFinding | None, now_ns: int) -> BudgetFinding:
     """Return what was known of the line; a changed limit starts anew."""
     if before is None or before.line != line:
-        return Finding(line=line, since_ns=now_ns)
+        return BudgetFinding(line=line, since_ns=now_ns)
     return before
 
 
 def _judge_one(
-    before: Finding, measurement: Measurement, timing: LadderTiming, now_ns: int
-) -> Finding:
+    before: BudgetFinding, measurement: Measurement, timing: LadderTiming, now_ns: int
+) -> BudgetFinding:
     value = measurement.value
     if value is None and not measurement.ended:
         return _told(
             replace(before, beyond_since_ns=None, relieved_since_ns=None),
-            Standing.MISSING,
+            BudgetStanding.MISSING,
             measurement,
             now_ns,
         )
@@ -118,19 +118,23 @@ def lasts(since_ns: int | None, duration_s: float, now_ns: int) -> bool:
     return since_ns is not None and now_ns - since_ns >= round(duration_s * NS_PER_S)
 
 
-def _is_over(timed: Finding, timing: LadderTiming, now_ns: int) -> bool:
+def _is_over(timed: BudgetFinding, timing: LadderTiming, now_ns: int) -> bool:
     if timed.over:
         return not lasts(timed.relieved_since_ns, timing.fall_s, now_ns)
     return lasts(timed.beyond_since_ns, timing.rise_s, now_ns)
 
 
-def _standing(timed: Finding, over: bool) -> Standing:
+def _standing(timed: BudgetFinding, over: bool) -> BudgetStanding:
     if over:
-        return Standing.FALLING if timed.relieved_since_ns is not None else Standing.OVER
-    return Standing.RISING if timed.beyond_since_ns is not None else Standing.OK
+        return (
+            BudgetStanding.FALLING if timed.relieved_since_ns is not None else BudgetStanding.OVER
+        )
+    return BudgetStanding.RISING if timed.beyond_since_ns is not None else BudgetStanding.OK
 
 
-def _told(finding: Finding, standing: Standing, got: Measurement, now_ns: int) -> Finding:
+def _told(
+    finding: BudgetFinding, standing: BudgetStanding, got: Measurement, now_ns: int
+) -> BudgetFinding:
     since_ns = finding.since_ns if standing is finding.standing else now_ns
     return replace(
         finding, standing=standing, measured=got.value, reason=got.reason, since_ns=since_ns

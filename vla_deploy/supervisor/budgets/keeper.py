@@ -21,11 +21,11 @@ from vla_deploy.supervisor.budgets.documents import (
 )
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
-from vla_deploy.supervisor.budgets.judge import Finding, Findings, Measurement, judge
-from vla_deploy.supervisor.budgets.ladder import EMERGENCY, Change, LadderState, Pressure, climb
+from vla_deploy.supervisor.budgets.judge import BudgetFinding, Findings, Measurement, judge
+from vla_deploy.supervisor.budgets.ladder import EMERGENCY, LadderMove, LadderState, Pressure, climb
 from vla_deploy.supervisor.budgets.lines import Line, lines_of
 from vla_deploy.supervisor.budgets.measure import OUTSIDE_THE_TOTAL, Measurements, Measurer
-from vla_deploy.supervisor.budgets.sampler import Feed, Snapshot
+from vla_deploy.supervisor.budgets.sampler import SnapshotFeed, UsageSnapshot
 
 TELL_PERIOD_NS: Final = NS_PER_S // 2
 STALE_AFTER_NS: Final = 5 * NS_PER_S
@@ -57,7 +57,7 @@ class BudgetKeeper:
         profile: Callable[[], Profile],
         space: SharedSpace,
         clock: Clock,
-        feed: Feed,
+        feed: SnapshotFeed,
         emergencies: Emergencies,
         enforcer: Enforcer,
         claims: ClaimBook,
@@ -74,9 +74,9 @@ class BudgetKeeper:
         self._cell = space.cell_writer("budget")
         self._board = space.cell_writer("board")
         self._stop_cell = space.cell_writer("budget_stop")
-        self._findings: dict[tuple[str, str], Finding] = {}
+        self._findings: dict[tuple[str, str], BudgetFinding] = {}
         self._ladder = LadderState()
-        self._changes: deque[Change] = deque(maxlen=KEPT_CHANGES)
+        self._changes: deque[LadderMove] = deque(maxlen=KEPT_CHANGES)
         self._emergency = ""
         self._seen_ns = clock.now_ns()
         self._stale = False
@@ -92,7 +92,7 @@ class BudgetKeeper:
         for one in reversed(self._ladder.taken):
             if one.step not in known:
                 why = f"profile {profile.name} does not declare it"
-                self._record(Change(step=one.step, taken=False, why=why, at_ns=now_ns))
+                self._record(LadderMove(step=one.step, taken=False, why=why, at_ns=now_ns))
         self._take_over(profile)
 
     def _take_over(self, profile: Profile) -> None:
@@ -105,7 +105,7 @@ class BudgetKeeper:
         self._claims.declare(_memory_of(profile))
 
     @property
-    def snapshot(self) -> Snapshot | None:
+    def snapshot(self) -> UsageSnapshot | None:
         """Return what was measured last, or None before the first time."""
         return self._feed.latest()
 
@@ -129,7 +129,7 @@ class BudgetKeeper:
             self._tell(now_ns)
         return Orders(suspended=self._suspended(), restart=restart)
 
-    def _tell_board(self, snapshot: Snapshot | None) -> None:
+    def _tell_board(self, snapshot: UsageSnapshot | None) -> None:
         """Tell what was read last; old readings are told no more, so that they grow stale."""
         if snapshot is not None and not self._stale:
             self._board.put_document(board(snapshot.readings.values()))
@@ -139,7 +139,7 @@ class BudgetKeeper:
         self._feed.close()
         self._enforcer.close()
 
-    def _measure(self, fresh: Sequence[Snapshot]) -> Measurements:
+    def _measure(self, fresh: Sequence[UsageSnapshot]) -> Measurements:
         """Return the newest numbers; an emergency counts also when this comes late to see it."""
         reasons = [self._emergencies.judge(one.readings) for one in fresh]
         self._emergency = next(filter(None, reversed(reasons)), "")
@@ -174,7 +174,7 @@ class BudgetKeeper:
         restarts = change.taken and change.step.action is LadderAction.RESTART
         return {change.step.process: f"over budget: {change.why}"} if restarts else {}
 
-    def _record(self, change: Change) -> None:
+    def _record(self, change: LadderMove) -> None:
         self._changes.append(change)
         self.counts["taken" if change.taken else "undone"] += 1
         self.counts[change.step.action.value] += change.taken

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from platforms import LadderAction, LadderStep, LadderTiming
-from vla_deploy.supervisor.budgets.judge import Finding, lasts
+from vla_deploy.supervisor.budgets.judge import BudgetFinding, lasts
 from vla_deploy.supervisor.budgets.lines import TOTAL
 
 # A step that is needed again soon after it was undone stays twice as long, up to 2^5 times.
@@ -23,7 +23,7 @@ class Taken:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class LadderMove:
     """Tell that a step was taken or undone."""
 
     step: LadderStep
@@ -51,7 +51,7 @@ class LadderState:
 class Pressure:
     """Gather what the ladder answers to; `emergency` says why, or is empty."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[BudgetFinding, ...]
     emergency: str = ""
 
 
@@ -61,7 +61,7 @@ def climb(
     before: LadderState,
     pressure: Pressure,
     now_ns: int,
-) -> tuple[LadderState, Change | None]:
+) -> tuple[LadderState, LadderMove | None]:
     """Return the new state and the one change there is, if any.
 
     A step is taken when an excess has lasted for the rise time since the change before it; one is
@@ -79,14 +79,14 @@ def climb(
     return _relieve(state, timing, [one for one in pressure.findings if one.over], now_ns)
 
 
-def _presses(finding: Finding, state: LadderState, timing: LadderTiming, now_ns: int) -> bool:
+def _presses(finding: BudgetFinding, state: LadderState, timing: LadderTiming, now_ns: int) -> bool:
     if not finding.over or not lasts(finding.beyond_since_ns, timing.rise_s, now_ns):
         return False
     return state.changed_ns is None or lasts(state.changed_ns, timing.rise_s, now_ns)
 
 
 def _next_step(
-    ladder: Sequence[LadderStep], state: LadderState, pressing: Sequence[Finding]
+    ladder: Sequence[LadderStep], state: LadderState, pressing: Sequence[BudgetFinding]
 ) -> LadderStep | None:
     offenders = {one.line.process for one in pressing} - {TOTAL}
     free = _free(ladder, state)
@@ -111,14 +111,14 @@ def _free(ladder: Sequence[LadderStep], state: LadderState) -> list[LadderStep]:
     return free
 
 
-def _why(pressing: Iterable[Finding], step: LadderStep) -> str:
+def _why(pressing: Iterable[BudgetFinding], step: LadderStep) -> str:
     concerned = [one for one in pressing if one.line.process in (TOTAL, step.process)]
     return "; ".join(str(one) for one in concerned)
 
 
 def _take(
     state: LadderState, step: LadderStep, why: str, timing: LadderTiming, now_ns: int
-) -> tuple[LadderState, Change]:
+) -> tuple[LadderState, LadderMove]:
     relapsed = state.undone_ns is not None and not lasts(
         state.undone_ns, _FORGIVEN_AFTER * _patience_s(state, timing), now_ns
     )
@@ -129,10 +129,10 @@ def _take(
         undone_ns=None,
         relapses=min(state.relapses + relapsed, _MOST_RELAPSES),
     )
-    return after, Change(step=step, taken=True, why=why, at_ns=now_ns)
+    return after, LadderMove(step=step, taken=True, why=why, at_ns=now_ns)
 
 
-def _alarmed(state: LadderState, why: str, now_ns: int) -> tuple[LadderState, Change | None]:
+def _alarmed(state: LadderState, why: str, now_ns: int) -> tuple[LadderState, LadderMove | None]:
     alarmed = replace(state, alarm_ns=now_ns)
     if any(one.step == EMERGENCY for one in state.taken):
         return alarmed, None
@@ -141,12 +141,12 @@ def _alarmed(state: LadderState, why: str, now_ns: int) -> tuple[LadderState, Ch
         taken=(*state.taken, Taken(step=EMERGENCY, since_ns=now_ns, why=why)),
         changed_ns=now_ns,
     )
-    return after, Change(step=EMERGENCY, taken=True, why=why, at_ns=now_ns)
+    return after, LadderMove(step=EMERGENCY, taken=True, why=why, at_ns=now_ns)
 
 
 def _relieve(
-    state: LadderState, timing: LadderTiming, over: Sequence[Finding], now_ns: int
-) -> tuple[LadderState, Change | None]:
+    state: LadderState, timing: LadderTiming, over: Sequence[BudgetFinding], now_ns: int
+) -> tuple[LadderState, LadderMove | None]:
     patience_s = _patience_s(state, timing)
     quiet = (state.changed_ns, state.alarm_ns)
     if any(at is not None and not lasts(at, patience_s, now_ns) for at in quiet):
@@ -162,10 +162,10 @@ def _relieve(
         undone_ns=now_ns,
         alarm_ns=None,
     )
-    return after, Change(step=spare.step, taken=False, why=why, at_ns=now_ns)
+    return after, LadderMove(step=spare.step, taken=False, why=why, at_ns=now_ns)
 
 
-def _needed(step: LadderStep, over: Iterable[Finding]) -> bool:
+def _needed(step: LadderStep, over: Iterable[BudgetFinding]) -> bool:
     return any(one.line.process in (TOTAL, step.process) for one in over)
 
 

@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S
 from platforms.probes import Reading
 from vla_deploy.supervisor.budgets.judge import Measurement
 from vla_deploy.supervisor.budgets.lines import TOTAL
-from vla_deploy.supervisor.budgets.sampler import Snapshot
+from vla_deploy.supervisor.budgets.sampler import UsageSnapshot
 
 Measurements = dict[tuple[str, str], Measurement]
 
@@ -28,9 +28,9 @@ class Measurer:
     """Keep the snapshots of the last moments: CPU use is a mean over them."""
 
     def __init__(self) -> None:
-        self._recent: deque[Snapshot] = deque()
+        self._recent: deque[UsageSnapshot] = deque()
 
-    def measure(self, snapshot: Snapshot, processes: frozenset[str]) -> Measurements:
+    def measure(self, snapshot: UsageSnapshot, processes: frozenset[str]) -> Measurements:
         """Return a measurement for every line that a profile may declare."""
         self._remember(snapshot)
         found: Measurements = {}
@@ -44,7 +44,7 @@ class Measurer:
             found[metric, TOTAL] = _scaled(snapshot.readings.get(name), name, scale)
         return found
 
-    def _remember(self, snapshot: Snapshot) -> None:
+    def _remember(self, snapshot: UsageSnapshot) -> None:
         self._recent.append(snapshot)
         oldest_ns = snapshot.stamp_ns - round(CPU_WINDOW_S * NS_PER_S)
         while len(self._recent) > 2 and self._recent[1].stamp_ns <= oldest_ns:

@@ -31,7 +31,7 @@ class Probes(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
+class UsageSnapshot:
     """Carry what was measured in one round; `pids` are the processes that ran then.
 
     `peak_memory_mb` is of all together since the start, `memory_kind` says how it was measured.
@@ -47,18 +47,18 @@ class Snapshot:
     memory_kind: str
 
 
-class Feed(Protocol):
+class SnapshotFeed(Protocol):
     """Hand out the newest snapshot without waiting."""
 
     def watch(self, pids: Mapping[str, int]) -> None:
         """Say which processes run from now on."""
         ...
 
-    def latest(self) -> Snapshot | None:
+    def latest(self) -> UsageSnapshot | None:
         """Return the newest snapshot, or None before the first."""
         ...
 
-    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+    def since(self, stamp_ns: int) -> tuple[UsageSnapshot, ...]:
         """Return what was measured after a moment, oldest first."""
         ...
 
@@ -93,7 +93,7 @@ class BackgroundSampler:
         self._period_s = period_s
         self._meter = UsageMeter(clock.now_ns())
         self._pids: Mapping[str, int] = {}
-        self._kept: deque[Snapshot] = deque(maxlen=KEPT_SNAPSHOTS)
+        self._kept: deque[UsageSnapshot] = deque(maxlen=KEPT_SNAPSHOTS)
         self._failures = 0
         self._failure = ""
         self._closing = threading.Event()
@@ -104,11 +104,11 @@ class BackgroundSampler:
         """Say which processes run from now on."""
         self._pids = dict(pids)
 
-    def latest(self) -> Snapshot | None:
+    def latest(self) -> UsageSnapshot | None:
         """Return the newest snapshot, or None before the first."""
         return self._kept[-1] if self._kept else None
 
-    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+    def since(self, stamp_ns: int) -> tuple[UsageSnapshot, ...]:
         """Return what was measured after a moment, oldest first, as far as it is kept."""
         return tuple(one for one in self._kept.copy() if one.stamp_ns > stamp_ns)
 
@@ -148,10 +148,10 @@ class BackgroundSampler:
             self._failure = failure
             _log.warning("budgets: nothing was measured this time: %s", failure, exc_info=error)
 
-    def _sample(self, probes: Probes) -> Snapshot:
+    def _sample(self, probes: Probes) -> UsageSnapshot:
         pids, stamp_ns, wall_ns = self._pids, self._clock.now_ns(), self._wall.now_ns()
         usages = self._meter.sample(pids, stamp_ns)
-        return Snapshot(
+        return UsageSnapshot(
             stamp_ns=stamp_ns,
             wall_ns=wall_ns,
             readings=probes.read(),

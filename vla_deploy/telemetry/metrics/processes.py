@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.supervisor.lifecycle import State
+from vla_deploy.supervisor.lifecycle import ProcessState
 from vla_deploy.telemetry.metrics.kinds import Kind, Metric
 from vla_deploy.telemetry.metrics.paths import Each, Named, Path, Rows, keys, same
 from vla_deploy.telemetry.metrics.takes import column, count_of, is_empty, share_of_limit
@@ -68,7 +68,7 @@ METRICS: Final[tuple[Metric, ...]] = (
         help="Where a process stands: 1 for its state, 0 for the others.",
         topic="process_table",
         paths=((*_ROWS, keys("state")),),
-        states=tuple(state.value for state in State),
+        states=tuple(state.value for state in ProcessState),
     ),
     Metric(
         name="vla_process_restarts_total",

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.ipc import BY_NAME, Frame, Kind, Record
+from vla_deploy.ipc import BY_NAME, Frame, Record, TopicKind
 from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.channels import TICKS, tick_text, value_text
 from vla_deploy.telemetry.history import Kept
@@ -105,7 +105,7 @@ def _of_value(channel: str, kept: Kept, wall_offset_ns: int) -> Message:
         stamp_ns=kept.stamp_ns,
         text=value_text(channel, kept, wall_offset_ns),
         sequence=kept.sequence,
-        stays=channel in BY_NAME and BY_NAME[channel].kind is Kind.CELL,
+        stays=channel in BY_NAME and BY_NAME[channel].kind is TopicKind.CELL,
     )
 
 

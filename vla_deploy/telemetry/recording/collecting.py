@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import TOPICS, Frame, FrameReader, Kind, SharedSpace
+from vla_deploy.ipc import TOPICS, Frame, FrameReader, SharedSpace, TopicKind
 from vla_deploy.telemetry.channels import TICKS
 from vla_deploy.telemetry.following import Value
 from vla_deploy.telemetry.recording.batch import LOG_CHANNEL, Batch
@@ -27,7 +27,7 @@ class Collector:
         self._frames: dict[str, FrameReader] = {
             topic.name: space.frame_reader(topic.name)
             for topic in TOPICS
-            if topic.kind is Kind.FRAME and selection.takes_any_of(topic.name)
+            if topic.kind is TopicKind.FRAME and selection.takes_any_of(topic.name)
         }
         self._sequences: dict[str, int] = {}
         self._logs = RunLogs(logs)

@@ -8,7 +8,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from vla_deploy.ipc import Field, Topic
+from vla_deploy.ipc import PackedField, Topic
 
 _STAMP_SUFFIX: Final = "_ns"
 
@@ -56,7 +56,7 @@ def document_of(text: bytes) -> dict[str, Any]:
     return document
 
 
-def _value(field: Field, recorded: Any) -> Any:
+def _value(field: PackedField, recorded: Any) -> Any:
     nothing = math.nan if field.dtype.startswith("f") else 0
     if field.shape == 1:
         return nothing if recorded is None else recorded

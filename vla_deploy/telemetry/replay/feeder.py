@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import BY_NAME, BadPayload, Kind, SharedSpace, Topic
+from vla_deploy.ipc import BY_NAME, BadPayload, SharedSpace, Topic, TopicKind
 from vla_deploy.ipc.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
@@ -26,7 +26,7 @@ _OWN: Final = frozenset({"replay_request", "replay_status"})
 _LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
 _LOOK_NS: Final = NS_PER_S // 10  # a recorder looks that seldom, at the most
 _IMAGE_PARTS: Final = ("colour", "depth")
-LASTING: Final = (Kind.CELL, Kind.FRAME)
+LASTING: Final = (TopicKind.CELL, TopicKind.FRAME)
 """Topics whose value is so until the next one comes."""
 _log = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class Feeder:
         if name not in self._puts:
             topic = self._topics[name]
             kind = topic.kind
-            is_packed = kind is Kind.CELL and not is_document(topic)
+            is_packed = kind is TopicKind.CELL and not is_document(topic)
             self._puts[name] = self._packed(topic) if is_packed else _OPENERS[kind](self, name)
         return self._puts[name]
 
@@ -145,9 +145,9 @@ class Feeder:
                 log.write(json.dumps(written) + "\n")
 
 
-_OPENERS: Final[Mapping[Kind, Callable[[Feeder, str], Callable[[Recorded], None]]]] = {
-    Kind.CELL: Feeder._document,
-    Kind.RING: Feeder._event,
-    Kind.RECORD: Feeder._record,
-    Kind.FRAME: Feeder._frame,
+_OPENERS: Final[Mapping[TopicKind, Callable[[Feeder, str], Callable[[Recorded], None]]]] = {
+    TopicKind.CELL: Feeder._document,
+    TopicKind.RING: Feeder._event,
+    TopicKind.RECORD: Feeder._record,
+    TopicKind.FRAME: Feeder._frame,
 }

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from vla_deploy.ipc import BY_NAME, Field
+from vla_deploy.ipc import BY_NAME, PackedField
 from vla_deploy.ipc.topics import MAX_JOINTS
 from vla_deploy.telemetry.rerun.entity import PLOTS, Entity
 from vla_deploy.telemetry.schemas.geometry import Json
@@ -24,7 +24,7 @@ TOLD: Final[Mapping[str, tuple[str, ...]]] = {
 """The numbers of documents that are worth a plot, by topic; what a version does not tell is not."""
 
 
-def plotted(topic: str) -> tuple[Field, ...]:
+def plotted(topic: str) -> tuple[PackedField, ...]:
     """Return the packed fields that are plotted: not the beams and points, which are drawn."""
     return tuple(field for field in BY_NAME[topic].fields if field.shape <= MAX_JOINTS)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.ipc import TOPICS, Kind
+from vla_deploy.ipc import TOPICS, TopicKind
 from vla_deploy.ipc.layout import is_document
 from vla_deploy.telemetry.channels import TICKS
 from vla_deploy.telemetry.rerun import flat, plots, shapes, spatial
@@ -71,13 +71,13 @@ _DRAWERS: Final[Mapping[str, Drawer]] = {
     **{
         topic.name: _plot(topic.name)
         for topic in TOPICS
-        if topic.kind is Kind.CELL and not is_document(topic)
+        if topic.kind is TopicKind.CELL and not is_document(topic)
     },
     **{topic: _numbers(topic) for topic in plots.TOLD},
     **{
         topic.name: _event(topic.name)
         for topic in TOPICS
-        if topic.kind is Kind.RING and not topic.private
+        if topic.kind is TopicKind.RING and not topic.private
     },
 }
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from drivers.dynamixel.control_table import CENTRE_PULSE, PULSE_RAD
 from drivers.dynamixel.tools.travel import (
     JointRange,
-    Mounting,
+    ServoMounting,
     TravelLog,
     TravelRefused,
     held_position,
@@ -121,9 +121,9 @@ def test_one_known_pose_finds_the_offset_of_a_finger_in_metres(offset):
 
 
 def test_a_travel_across_the_end_of_the_turn_is_refused_with_its_middle():
-    mounting = Mounting(sign=1, offset=1.3)
+    mounting = ServoMounting(sign=1, offset=1.3)
     judge_reach(ELBOW, mounting, 0.03, 2.57)
-    edge = Mounting(sign=1, offset=1.3 - 2.2)
+    edge = ServoMounting(sign=1, offset=1.3 - 2.2)
     with pytest.raises(TravelRefused, match=rf"middle is at pulse {2048 + round(2.2 / PULSE_RAD)}"):
         judge_reach(ELBOW, edge, 0.03, 2.57)
     assert pi < 2.57 - edge.offset

@@ -33,14 +33,14 @@ from vla_deploy.dashboard.access.passwords import Cost, stored_form
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import RingReader, SharedSpace
-from vla_deploy.ipc.topics import TOPICS, Kind
+from vla_deploy.ipc.topics import TOPICS, TopicKind
 
 PASSWORD = "the robot wears blue socks"
 BAIT = "what no route may ever show"
 STOP = "/api/v1/stop"
 SECRETS = (BAIT, PASSWORD, "scrypt$", "Traceback", "site-packages", "accounts.json")
 OPEN = {STOP, "/api/v1/login", "/api/v1/logout", "/api/v1/session", "/healthz"}
-RINGS = [topic.name for topic in TOPICS if topic.kind is Kind.RING]
+RINGS = [topic.name for topic in TOPICS if topic.kind is TopicKind.RING]
 ALLOWED_ACTS = {
     Role.ANYONE: {"estop"},
     Role.VIEWER: {"estop"},

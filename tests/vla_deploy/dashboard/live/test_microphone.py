@@ -17,7 +17,7 @@ from vla_deploy.dashboard.access import Identity, Role, Way, require
 from vla_deploy.dashboard.live import microphone
 from vla_deploy.dashboard.live.microphone import PageMicrophones
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.ipc.page_sound import PageSound, Step, unpacked
+from vla_deploy.ipc.page_sound import PageSound, SoundStep, unpacked
 
 Until = Callable[[Callable[[], object]], Awaitable[None]]
 TALK = np.arange(1600, dtype="<i2")
@@ -34,7 +34,7 @@ class Rig:
         self.space.cell_writer("speech_status").put_document({"state": "listening"})
         self.heard: list[PageSound] = []
 
-    def steps(self) -> list[Step]:
+    def steps(self) -> list[SoundStep]:
         self.heard += [unpacked(record.payload) for record in self.records.fresh()]
         return [sound.step for sound in self.heard]
 
@@ -85,7 +85,7 @@ def test_sound_reaches_the_speech_process_and_letting_go_ends_the_turn(
             await until(lambda: len(rig.steps()) == 2)
 
     run(talk)
-    assert rig.steps() == [Step.SOUND, Step.ENDED]
+    assert rig.steps() == [SoundStep.SOUND, SoundStep.ENDED]
     sound, end = rig.heard
     assert (sound.rate_hz, sound.turn) == (48_000, end.turn)
     assert sound.samples.tolist() == TALK.tolist()
@@ -98,12 +98,12 @@ def test_a_client_that_is_gone_in_mid_word_cuts_its_turn_off(
         client = await connect(url)
         await begin(client)
         await client.send(TALK.tobytes())
-        await until(lambda: rig.steps() == [Step.SOUND])
+        await until(lambda: rig.steps() == [SoundStep.SOUND])
         client.transport.abort()
         await until(lambda: len(rig.steps()) == 2)
 
     run(talk)
-    assert rig.steps() == [Step.SOUND, Step.CUT]
+    assert rig.steps() == [SoundStep.SOUND, SoundStep.CUT]
     assert rig.microphones.floor.holder is None
 
 
@@ -116,7 +116,7 @@ def test_a_page_that_is_left_cuts_its_turn_off(rig: Rig, run: Any, until: Until)
         await until(lambda: len(rig.steps()) == 2)
 
     run(talk)
-    assert rig.steps()[-1] is Step.CUT
+    assert rig.steps()[-1] is SoundStep.CUT
 
 
 def test_whoever_comes_second_is_told_who_speaks_and_may_speak_afterwards(
@@ -154,7 +154,7 @@ def test_garbage_ends_the_turn_with_its_reason_and_nothing_is_carried_out(
             assert (told, word in reason) == (code, True)
 
     run(talk)
-    assert rig.steps() == [Step.CUT]
+    assert rig.steps() == [SoundStep.CUT]
 
 
 def test_a_flood_is_refused_after_a_second_and_a_half_of_sound(rig: Rig, run: Any) -> None:
@@ -166,7 +166,7 @@ def test_a_flood_is_refused_after_a_second_and_a_half_of_sound(rig: Rig, run: An
             assert (await end_of(client))[0] == 4429
 
     run(talk)
-    assert rig.steps()[-1] is Step.CUT
+    assert rig.steps()[-1] is SoundStep.CUT
 
 
 def test_whoever_sends_nothing_loses_the_floor(

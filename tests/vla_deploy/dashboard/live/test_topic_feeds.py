@@ -12,7 +12,7 @@ from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.dashboard.live.feed import Feed
 from vla_deploy.dashboard.live.message import Message, Moment
 from vla_deploy.dashboard.live.topic_feeds import topic_feeds
-from vla_deploy.ipc import TOPICS, Kind, SharedSpace
+from vla_deploy.ipc import TOPICS, SharedSpace, TopicKind
 
 NAMES = ("shoulder", "elbow")
 
@@ -33,7 +33,7 @@ def now(clock: ManualClock) -> Moment:
 
 
 def test_every_cell_and_ring_has_a_feed(feeds: Mapping[str, Feed]) -> None:
-    expected = {topic.name for topic in TOPICS if topic.kind in (Kind.CELL, Kind.RING)}
+    expected = {topic.name for topic in TOPICS if topic.kind in (TopicKind.CELL, TopicKind.RING)}
     assert set(feeds) == expected
     assert all(feed.period_s <= 0.5 for feed in feeds.values())
     assert feeds["joint_state"].period_s == pytest.approx(0.1)

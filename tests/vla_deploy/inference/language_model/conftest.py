@@ -5,7 +5,7 @@ import pytest
 
 from tests.vla_deploy.tiny_language_models import folders_under
 from vla_deploy.inference.language_model import LanguageModel
-from vla_deploy.inference.manifest import Language, Use
+from vla_deploy.inference.manifest import Language, LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
 
 Open = Callable[[Path], LanguageModel]
@@ -23,7 +23,7 @@ def folder(request: pytest.FixtureRequest, folders: dict[str, Path]) -> Path:
 
 @pytest.fixture
 def opened() -> Open:
-    language = Language(use=Use.CHAT, most_tokens=64)
+    language = Language(use=LanguageUse.CHAT, most_tokens=64)
     return lambda folder: LanguageModel(folder, language, PLAIN_CHOICE)
 
 

@@ -14,7 +14,7 @@ from vla_deploy.inference.errors import (
     ModelUnknown,
     RunFailed,
 )
-from vla_deploy.inference.manifest import Fit, Layout, Variant
+from vla_deploy.inference.manifest import Fit, TensorLayout, Variant
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.session import open_session
 from vla_deploy.model_tools.detectors.adding import DetectorSource, add_model
@@ -88,7 +88,7 @@ def test_a_detector_is_added_as_it_describes_itself(add, shelf, blobs, tmp_path)
     assert detection is not None
     assert (detection.adapter, detection.classes) == ("yolo", ("red", "green", "blue"))
     image = detection.image
-    assert (image.width_px, image.height_px, image.layout) == (96, 64, Layout.NCHW)
+    assert (image.width_px, image.height_px, image.layout) == (96, 64, TensorLayout.NCHW)
     assert set(model.manifest.files) == {Variant.FP32}
     assert (model.folder / model.manifest.card).read_text() == "Trained on blobs.\n"
     assert trial.boxes == {"black": 0, "white": 0, "grey": 0, "noise": 0}

@@ -7,7 +7,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.session import open_session
-from vla_deploy.inference.store import Model
+from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.benching import bench
 from vla_deploy.model_tools.detectors.memory import memory_mb
 
@@ -34,7 +34,7 @@ def ticking(shelf):
 
 
 @pytest.fixture
-def both(shelf, lay_out, blob_manifest, blobs) -> Model:
+def both(shelf, lay_out, blob_manifest, blobs) -> StoredModel:
     """Have the same graph as fp32 and as int8: the figures, not the files, are looked at here."""
     content = blobs.raw().SerializeToString()
     files = (Variant.FP32, Variant.INT8_U8S8)

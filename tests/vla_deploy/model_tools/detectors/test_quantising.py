@@ -6,7 +6,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from vla_deploy.inference.errors import AccuracyLost, ImagesInvalid, ModelMismatch, ToolMissing
+from vla_deploy.inference.errors import AccuracyLost, ImagesInvalid, ModelMismatch, PackageMissing
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.model_tools.detectors.images import spread_paths
 from vla_deploy.model_tools.detectors.int8_files import head_nodes
@@ -130,7 +130,9 @@ def test_without_the_packages_the_message_says_what_to_install(
 ):
     model = installed()
     monkeypatch.setitem(sys.modules, "onnx", None)
-    with pytest.raises(ToolMissing, match=r"needs onnx, which is not installed; try: pip install"):
+    with pytest.raises(
+        PackageMissing, match=r"needs onnx, which is not installed; try: pip install"
+    ):
         quantised(model)
     assert shelf.store.names() == ("blobs",)
 

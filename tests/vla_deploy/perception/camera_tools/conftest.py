@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.camera_tools.board import Board
+from vla_deploy.perception.camera_tools.board import CalibrationBoard
 from vla_deploy.perception.lens import rays_of
 
 Array = NDArray[np.float64]
-BOARD = Board()
+BOARD = CalibrationBoard()
 LENS = Intrinsics(
     width=320,
     height=240,
@@ -28,7 +28,9 @@ Taker = Callable[..., NDArray[np.uint8]]
 
 
 def pose(
-    turn: tuple[float, float, float], at: tuple[float, float, float], board: Board = BOARD
+    turn: tuple[float, float, float],
+    at: tuple[float, float, float],
+    board: CalibrationBoard = BOARD,
 ) -> Array:
     """Return the board's frame in the camera's; `at` is where its middle is."""
     matrix = np.eye(4)
@@ -41,7 +43,7 @@ def pose(
 class BoardCamera:
     """Take images of the board through one lens; each pixel is the mean of several rays."""
 
-    def __init__(self, lens: Intrinsics, board: Board = BOARD) -> None:
+    def __init__(self, lens: Intrinsics, board: CalibrationBoard = BOARD) -> None:
         self.lens = lens
         self._board = board
         self._print = cv2.resize(board.image(), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
@@ -94,7 +96,7 @@ def good_poses() -> list[Array]:
 
 
 @pytest.fixture(scope="session")
-def board() -> Board:
+def board() -> CalibrationBoard:
     return BOARD
 
 

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from vla_deploy.perception.camera_tools.board import Board, find_board, write_board
+from vla_deploy.perception.camera_tools.board import CalibrationBoard, find_board, write_board
 from vla_deploy.perception.camera_tools.errors import BadImages
 
 
-def test_a_board_is_found_in_its_own_print_corner_for_corner(board: Board) -> None:
+def test_a_board_is_found_in_its_own_print_corner_for_corner(board: CalibrationBoard) -> None:
     view = find_board(board.image(), board, "print")
     assert view is not None
     assert len(view.pixels) == (board.columns - 1) * (board.rows - 1)
@@ -19,7 +19,7 @@ def test_a_board_is_found_in_its_own_print_corner_for_corner(board: Board) -> No
 
 
 def test_the_pdf_has_the_boards_true_size(tmp_path: Path) -> None:
-    board = Board(columns=6, rows=4, square_m=0.0417)
+    board = CalibrationBoard(columns=6, rows=4, square_m=0.0417)
     write_board(tmp_path / "board.pdf", board)
     data = (tmp_path / "board.pdf").read_bytes()
     found = re.search(rb"MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", data)
@@ -35,7 +35,7 @@ def test_the_pdf_has_the_boards_true_size(tmp_path: Path) -> None:
         assert data[at:].startswith(f"{number} 0 obj".encode())
 
 
-def test_the_png_tells_its_resolution(tmp_path: Path, board: Board) -> None:
+def test_the_png_tells_its_resolution(tmp_path: Path, board: CalibrationBoard) -> None:
     write_board(tmp_path / "board.png", board)
     data = (tmp_path / "board.png").read_bytes()
     at = data.index(b"pHYs") + 4
@@ -46,7 +46,7 @@ def test_the_png_tells_its_resolution(tmp_path: Path, board: Board) -> None:
     assert np.array_equal(drawn, board.image())
 
 
-def test_another_ending_is_refused(tmp_path: Path, board: Board) -> None:
+def test_another_ending_is_refused(tmp_path: Path, board: CalibrationBoard) -> None:
     with pytest.raises(BadImages, match=r"\.pdf or \.png"):
         write_board(tmp_path / "board.svg", board)
 
@@ -62,14 +62,14 @@ def test_another_ending_is_refused(tmp_path: Path, board: Board) -> None:
 )
 def test_no_board_of_nonsense(values: dict[str, float], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        Board(**values)
+        CalibrationBoard(**values)
 
 
 @pytest.mark.parametrize("level", [0, 128, 255])
-def test_an_empty_image_shows_no_board(board: Board, level: int) -> None:
+def test_an_empty_image_shows_no_board(board: CalibrationBoard, level: int) -> None:
     assert find_board(np.full((240, 320), level, np.uint8), board, "empty") is None
 
 
-def test_noise_shows_no_board(board: Board) -> None:
+def test_noise_shows_no_board(board: CalibrationBoard) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
     assert find_board(noise, board, "noise") is None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.perception.camera_tools.board import Board, View
+from vla_deploy.perception.camera_tools.board import BoardView, CalibrationBoard
 from vla_deploy.perception.camera_tools.board_pose import board_pose, depth_ratio
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.hand_eye import HeadView, fit_hand_eye
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ROBOT = load_robot("butler")
 MODEL = RobotModel(ROBOT)
-BOARD = Board(square_m=0.055)
+BOARD = CalibrationBoard(square_m=0.055)
 PANS, TILTS = (-0.22, 0.0, 0.22), (0.44, 0.6, 0.76)
 
 
@@ -58,7 +58,7 @@ def exact_views(camera: "BoardCamera", noise_px: float = 0.2) -> list[HeadView]:
             pose = np.linalg.inv(site(pan, tilt) @ seat()) @ base_from_board()
             points = BOARD.corners_m @ pose[:3, :3].T + pose[:3, 3]
             pixels = project(camera.lens, points) + random.normal(0.0, noise_px, (len(points), 2))
-            view = View(name=f"{pan} {tilt}", pixels=pixels, corners_m=BOARD.corners_m)
+            view = BoardView(name=f"{pan} {tilt}", pixels=pixels, corners_m=BOARD.corners_m)
             views.append(HeadView(view=view, base_from_site=site(pan, tilt)))
     return views
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vla_deploy.inference.manifest import Detection, Fit, ImageInput, Layout, Tensor
+from vla_deploy.inference.manifest import DetectionOutputs, Fit, ImageInput, Tensor, TensorLayout
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.centre_net import decode, faults, read
 
 STRIDE_PX, SCORE = 4, 0.3
-DETECTION = Detection(
+DETECTION = DetectionOutputs(
     adapter="centre_net",
     classes=("cup", "can", "bowl"),
     score_threshold=SCORE,
@@ -17,7 +17,7 @@ DETECTION = Detection(
     image=ImageInput(
         width_px=64,
         height_px=48,
-        layout=Layout.NCHW,
+        layout=TensorLayout.NCHW,
         colour="rgb",
         fit=Fit.LETTERBOX,
         fill=114,

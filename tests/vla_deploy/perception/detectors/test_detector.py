@@ -11,7 +11,7 @@ from platforms import Profile, load_profile
 from vla_deploy.inference.errors import ManifestInvalid, ModelUnknown, RunFailed
 from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.perception.detectors.detector import Detector, open_detector
 from vla_deploy.runtime.executors import low_priority_thread
@@ -78,7 +78,7 @@ def rgb():
 class Answering:
     """Stand for a session whose graph left the shapes of its outputs open, and answers so."""
 
-    def __init__(self, model: Model, outputs: dict[str, np.ndarray]) -> None:
+    def __init__(self, model: StoredModel, outputs: dict[str, np.ndarray]) -> None:
         self.model, self.outputs = model, outputs
 
     def run(self, _: object) -> dict[str, np.ndarray]:
@@ -115,7 +115,7 @@ def test_outputs_of_another_shape_fail_the_frame_and_nothing_else(
     )
     manifest = dataclasses.replace(blob_manifest, detection=detection, outputs=outputs)
     answers = {str(number): np.ones(shape, np.float32) for number, shape in enumerate(shapes)}
-    model = Model(manifest=manifest, folder=tmp_path, is_embedded=False)
+    model = StoredModel(manifest=manifest, folder=tmp_path, is_embedded=False)
     with pytest.raises(RunFailed, match=r"^blobs: "):
         Detector(Answering(model, answers)).detect(rgb)
 

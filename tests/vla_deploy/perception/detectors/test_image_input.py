@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vla_deploy.inference.manifest import Fit, Layout
+from vla_deploy.inference.manifest import Fit, TensorLayout
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.image_input import fit_image
 
@@ -40,17 +40,21 @@ def test_an_image_of_the_right_size_is_only_scaled_and_ordered(image, rgb):
 @pytest.mark.parametrize(
     ("changes", "dtype", "expected"),
     [
-        ({"layout": Layout.NHWC}, "float32", lambda rgb: rgb / 255.0),
-        ({"colour": "bgr", "layout": Layout.NHWC}, "float32", lambda rgb: rgb[..., ::-1] / 255.0),
-        ({"scale": 1.0, "layout": Layout.NHWC}, "uint8", lambda rgb: rgb),
+        ({"layout": TensorLayout.NHWC}, "float32", lambda rgb: rgb / 255.0),
         (
-            {"mean": (0.1, 0.2, 0.3), "std": (0.5, 0.25, 2.0), "layout": Layout.NHWC},
+            {"colour": "bgr", "layout": TensorLayout.NHWC},
+            "float32",
+            lambda rgb: rgb[..., ::-1] / 255.0,
+        ),
+        ({"scale": 1.0, "layout": TensorLayout.NHWC}, "uint8", lambda rgb: rgb),
+        (
+            {"mean": (0.1, 0.2, 0.3), "std": (0.5, 0.25, 2.0), "layout": TensorLayout.NHWC},
             "float32",
             lambda rgb: (rgb / 255.0 - np.array([0.1, 0.2, 0.3])) / np.array([0.5, 0.25, 2.0]),
         ),
         (
             # Means are of the network's channels, in its order.
-            {"mean": (0.5, 0.0, 0.0), "colour": "bgr", "layout": Layout.NHWC},
+            {"mean": (0.5, 0.0, 0.0), "colour": "bgr", "layout": TensorLayout.NHWC},
             "float32",
             lambda rgb: rgb[..., ::-1] / 255.0 - np.array([0.5, 0.0, 0.0]),
         ),

@@ -12,7 +12,7 @@ from typing import Any, Final
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import Answer, Desk
+from benchmarks.planner_desk import Desk, PlannerAnswer
 
 ODD: Final = "sing a sea shanty"  # neither rules nor the model on board take it
 GO: Final = {"skill": "navigate_to", "place": "kitchen"}
@@ -59,11 +59,11 @@ def desk(loopback: Any, tmp_path: Path, profile: str) -> Iterator[Desk]:
     desk.close()
 
 
-def asked(desk: Desk, text: str = ODD) -> Answer:
+def asked(desk: Desk, text: str = ODD) -> PlannerAnswer:
     return desk.say(text)[1]
 
 
-def actions_of(answer: Answer) -> list[Any]:
+def actions_of(answer: PlannerAnswer) -> list[Any]:
     assert answer.plan is not None, answer.text
     return list(answer.plan["actions"])
 

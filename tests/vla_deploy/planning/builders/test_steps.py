@@ -7,10 +7,10 @@ import pytest
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import chained
-from vla_deploy.planning.understanding import Conversation, Turn
+from vla_deploy.planning.understanding import Conversation, ConversationTurn
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot
 
@@ -19,8 +19,8 @@ HERE = (1.0, 2.0, 0.5)
 Skills = list[tuple[str, dict[str, object]]]
 
 
-def planned(command: str, *steps: Step, request: Request | None = None) -> Skills:
-    request = request or Request(command_id="c", text=command, world=WORLD, here=HERE)
+def planned(command: str, *steps: Step, request: PlanRequest | None = None) -> Skills:
+    request = request or PlanRequest(command_id="c", text=command, world=WORLD, here=HERE)
     made = Steps(command.split(), request)
     actions = chained([skill for step in steps for skill in made.skills(step)])
     assert [one.depends_on for one in actions[1:]] == [(one.id,) for one in actions[:-1]]
@@ -86,15 +86,15 @@ def test_what_is_excepted_from_what_is_brought_stays_one_thing_to_bring() -> Non
 
 def test_what_is_excepted_from_tidying_stays(scene: Snapshot) -> None:
     command = "tidy up everything except the red cup"
-    request = Request(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
+    request = PlanRequest(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
     found = planned(command, {"do": "tidy", "except": "red cup"}, request=request)
     assert [given.get("object") for skill, given in found if skill == "place"] == ["cup_2"]
 
 
 def test_back_is_where_the_command_before_was_told() -> None:
-    turn = Turn(said="go to the kitchen", here=(4.0, 5.0, 0.0))
+    turn = ConversationTurn(said="go to the kitchen", here=(4.0, 5.0, 0.0))
     talk = Conversation(turns=(turn,))
-    request = Request(command_id="c", text="go back", world=WORLD, conversation=talk)
+    request = PlanRequest(command_id="c", text="go back", world=WORLD, conversation=talk)
     found = planned("go back", {"do": "go", "where": "back"}, request=request)
     assert found == [("navigate_to", {"x_m": 4.0, "y_m": 5.0, "yaw_rad": 0.0})]
 

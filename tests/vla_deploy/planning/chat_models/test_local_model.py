@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.inference.language_model import LanguageModel
-from vla_deploy.memory import Episode, MemoryStore, Outcome
+from vla_deploy.memory import Episode, EpisodeOutcome, MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.chat_models.chat_model import LocalModel
 from vla_deploy.planning.interfaces import Aid
@@ -42,7 +42,7 @@ def test_a_chat_model_is_told_what_is_remembered(
 
     monkeypatch.setattr(chat, "propose", listening)
     before = Episode(
-        told_s=unix_s() - 60.0, command="water the yellow tulips", outcome=Outcome.FAILED
+        told_s=unix_s() - 60.0, command="water the yellow tulips", outcome=EpisodeOutcome.FAILED
     )
     memory.add([before], [])
     desk = open_desk(chat, memory=memory)

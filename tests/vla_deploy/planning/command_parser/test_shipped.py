@@ -11,14 +11,14 @@ import pytest
 from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
+from vla_deploy.inference.store import EMBEDDED, ModelStore, StoredModel
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import Oddities
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
 from vla_deploy.planning.command_parser.wording import plain_words
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
-from vla_deploy.planning.interfaces import Forbidden, Prohibition, Request, StandingOrder
+from vla_deploy.planning.interfaces import Forbidden, PlanRequest, Prohibition, StandingOrder
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
 from vla_deploy.robots import load_robot
@@ -34,7 +34,7 @@ def parser() -> Iterator[CommandParser]:
     opened.close()
 
 
-def stored(folder: Path) -> Model:
+def stored(folder: Path) -> StoredModel:
     return ModelStore(folder / "nobody", embedded=folder).load("command_parser")
 
 
@@ -42,8 +42,8 @@ def soon(recall: Event | None = None, within_s: float = 20.0) -> Deadline:
     return Deadline.within(CLOCK, within_s, recall)
 
 
-def request(text: str, heard: float | None = None) -> Request:
-    return Request(
+def request(text: str, heard: float | None = None) -> PlanRequest:
+    return PlanRequest(
         command_id="c", text=text, world=WORLD, here=(1.0, 2.0, 0.0), heard_confidence=heard
     )
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
-from vla_deploy.planning.interfaces import Proposal, Request
+from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.robots import load_robot
@@ -23,7 +23,7 @@ def ask(world: World, *actions: Action, **changes: object) -> str:
     heard = changes.pop("heard_confidence", None)
     scene = changes.pop("scene", None)
     plan = Plan(goal="x", actions=actions).model_copy(update=changes)
-    request = Request(
+    request = PlanRequest(
         command_id="c", text="x", world=world, scene=scene, heard_confidence=heard
     )  # fmt: skip
     return confirmation_of(plan, request)
@@ -62,7 +62,7 @@ def test_each_risk_of_a_plan_is_told(butler: World) -> None:
 def test_what_was_left_out_is_named_without_a_word_that_would_end_all(butler: World) -> None:
     plan = Plan(goal="x", actions=(GO,))
     proposal = Proposal(plan=plan, back_end="t", confidence=1.0, left_out=("not", "freeze", "not"))
-    request = Request(command_id="c", text="x", world=butler)
+    request = PlanRequest(command_id="c", text="x", world=butler)
     assert confirmation_of(plan, request, proposal) == (
         'You said "not" and "standstill", which I may not have understood. '
         "Shall I go to the kitchen?"
@@ -82,7 +82,7 @@ def test_a_heavy_thing_is_asked_for(butler: World) -> None:
 
 
 def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
-    request = Request(command_id="c", text="x", world=butler, heard_confidence=0.4)
+    request = PlanRequest(command_id="c", text="x", world=butler, heard_confidence=0.4)
     plan = Plan(goal="x", actions=(PICK,) * 4)
     agreed = agreement_to(plan, request)
     assert agreed == {"many", "unheard"}
@@ -93,7 +93,7 @@ def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
 
 
 def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
-    request = Request(command_id="c", text="x", world=butler)
+    request = PlanRequest(command_id="c", text="x", world=butler)
     hot, sharp = (Plan(goal="x", actions=(GO,), safety_concerns=(why,)) for why in ("hot", "sharp"))
     assert confirmation_of(hot, request, agreed=agreement_to(hot, request)) == ""
     assert "sharp" in confirmation_of(sharp, request, agreed=agreement_to(hot, request))
@@ -101,7 +101,7 @@ def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
 
 def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> None:
     always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
-    request = Request(command_id="c", text="x", world=always)
+    request = PlanRequest(command_id="c", text="x", world=always)
     speak = Action(id="s", skill="speak", parameters={"text": "hello"})
     said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
     assert confirmation_of(moved, request, agreed=agreement_to(moved, request)) == ""

@@ -3,23 +3,23 @@
 import pytest
 
 from vla_deploy.planning.errors import Declined, NotAble, UnknownPlace
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
-from vla_deploy.planning.understanding import Conversation, Turn
+from vla_deploy.planning.understanding import Conversation, ConversationTurn
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
 HERE = (1.0, 2.0, 0.5)
 
 
-def request_for(text: str, *turns: Turn) -> Request:
+def request_for(text: str, *turns: ConversationTurn) -> PlanRequest:
     conversation = Conversation(turns=turns)
-    return Request(command_id="c", text=text, world=WORLD, here=HERE, conversation=conversation)
+    return PlanRequest(command_id="c", text=text, world=WORLD, here=HERE, conversation=conversation)
 
 
-def does(text: str, *turns: Turn) -> str:
+def does(text: str, *turns: ConversationTurn) -> str:
     actions = pattern_plan(request_for(text, *turns)).actions
     told = (" ".join(map(str, (one.skill, *one.parameters.values()))) for one in actions)
     return "; ".join(told)
@@ -98,7 +98,7 @@ def test_a_place_that_nobody_knows_is_named() -> None:
 
 def test_again_does_what_was_done_last() -> None:
     plan = pattern_plan(request_for("turn left 30 degrees"))
-    last = Turn(said="turn left 30 degrees", plan=plan)
+    last = ConversationTurn(said="turn left 30 degrees", plan=plan)
     assert does("again", last) == does("do it once again", last) == does(last.said)
     with pytest.raises(NotAble):
         pattern_plan(request_for("again"))

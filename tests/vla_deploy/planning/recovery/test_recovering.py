@@ -3,7 +3,7 @@
 from typing import Any
 
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.recovery.setback import (
@@ -174,7 +174,7 @@ def test_a_setback_of_another_plan_is_not_read():
 def test_every_plan_is_judged_before_it_may_run(ask: Any):
     asked: list[Plan] = []
 
-    def refuse(plan: Plan, request: Request) -> Plan:
+    def refuse(plan: Plan, request: PlanRequest) -> Plan:
         asked.append(plan)
         raise CannotBeDone("not in this world")
 

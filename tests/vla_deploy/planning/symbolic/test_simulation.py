@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.knowledge import World, world_of
-from vla_deploy.planning.plan import Action, Priority
+from vla_deploy.planning.plan import Action, ActionPriority
 from vla_deploy.planning.symbolic.simulation import (
     bounds_faults,
     end_state,
@@ -253,7 +253,7 @@ def test_unordered_actions_are_put_in_turn_by_priority() -> None:
     actions = (
         action("a", "turn"),
         action("b", "move"),
-        action("c", "stop", priority=Priority.HIGH),
+        action("c", "stop", priority=ActionPriority.HIGH),
         action("s", "speak"),
     )
     assert ordered(*actions) == {

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.understanding import Conversation, Mention, Role, Turn
+from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention, MentionRole
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest
@@ -55,7 +55,7 @@ class Home:
         self.world = world_of(load_robot("butler"), {"left": None, "right": None})
         self.things = THINGS
 
-    def ask(self, *things: str | Thing, text: str = "", **changes: Any) -> Request:
+    def ask(self, *things: str | Thing, text: str = "", **changes: Any) -> PlanRequest:
         robot = Viewpoint(x_m=HERE[0], y_m=HERE[1], yaw_rad=HERE[2])
         seen = tuple(THINGS[one] if isinstance(one, str) else one for one in things)
         fields: dict[str, Any] = {
@@ -65,9 +65,9 @@ class Home:
             "scene": Snapshot(stamp_ns=1_000_000_000, things=seen, robot=robot),
             "here": HERE,
         }
-        return Request(**(fields | changes))
+        return PlanRequest(**(fields | changes))
 
-    def spoke_of(self, *names: str, role: Role = Role.OBJECT) -> Conversation:
+    def spoke_of(self, *names: str, role: MentionRole = MentionRole.OBJECT) -> Conversation:
         """Return a conversation whose last turn mentioned some things."""
         mentioned = tuple(
             Mention(
@@ -80,7 +80,9 @@ class Home:
             )
             for one in (THINGS[name] for name in names)
         )
-        return Conversation().after(Turn(said="before", command_id="c0", mentioned=mentioned))
+        return Conversation().after(
+            ConversationTurn(said="before", command_id="c0", mentioned=mentioned)
+        )
 
 
 @pytest.fixture(scope="session")

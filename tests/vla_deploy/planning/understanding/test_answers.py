@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.understanding import Candidate, Question, Verdict, judge_answer
+from vla_deploy.planning.understanding import AnswerVerdict, Candidate, Question, judge_answer
 
 RED = Candidate(name="cup_1", words="the red one", features=frozenset({"red", "cup", "left"}))
 BLUE = Candidate(name="cup_2", words="the blue one", features=frozenset({"blue", "cup", "right"}))
@@ -20,42 +20,44 @@ SURE = Question(text="Shall I?", asked_ns=0, command_text="throw the cup away")
 @pytest.mark.parametrize(
     ("said", "verdict", "chosen"),
     [
-        ("Oh, sorry, the red one then.", Verdict.CHOSEN, RED),
-        ("I see. The blue one is what I meant.", Verdict.MIXED, None),
-        ("Red. Keep the blue one.", Verdict.MIXED, None),
-        ("you can leave the red one where it is", Verdict.MIXED, None),
-        ("the red one is what I don't want", Verdict.MIXED, None),
-        ("the red one or the blue one", Verdict.MIXED, None),
-        ("what about the red one", Verdict.MIXED, None),
-        ("the red book", Verdict.MIXED, None),
-        ("go to the kitchen", Verdict.ANEW, None),
-        ("the one next to the book", Verdict.ANEW, None),
-        ("the bigger one", Verdict.UNCLEAR, None),
-        ("the one on the right", Verdict.CHOSEN, BLUE),
-        ("right", Verdict.CHOSEN, BLUE),
-        ("yes", Verdict.UNCLEAR, None),
-        ("the second", Verdict.CHOSEN, BLUE),
-        ("cup_2", Verdict.CHOSEN, BLUE),
-        ("either one", Verdict.CHOSEN, RED),
-        ("never mind", Verdict.NO, None),
-        ("the one", Verdict.UNCLEAR, None),
-        ("the third", Verdict.UNCLEAR, None),
-        ("both", Verdict.UNCLEAR, None),
+        ("Oh, sorry, the red one then.", AnswerVerdict.CHOSEN, RED),
+        ("I see. The blue one is what I meant.", AnswerVerdict.MIXED, None),
+        ("Red. Keep the blue one.", AnswerVerdict.MIXED, None),
+        ("you can leave the red one where it is", AnswerVerdict.MIXED, None),
+        ("the red one is what I don't want", AnswerVerdict.MIXED, None),
+        ("the red one or the blue one", AnswerVerdict.MIXED, None),
+        ("what about the red one", AnswerVerdict.MIXED, None),
+        ("the red book", AnswerVerdict.MIXED, None),
+        ("go to the kitchen", AnswerVerdict.ANEW, None),
+        ("the one next to the book", AnswerVerdict.ANEW, None),
+        ("the bigger one", AnswerVerdict.UNCLEAR, None),
+        ("the one on the right", AnswerVerdict.CHOSEN, BLUE),
+        ("right", AnswerVerdict.CHOSEN, BLUE),
+        ("yes", AnswerVerdict.UNCLEAR, None),
+        ("the second", AnswerVerdict.CHOSEN, BLUE),
+        ("cup_2", AnswerVerdict.CHOSEN, BLUE),
+        ("either one", AnswerVerdict.CHOSEN, RED),
+        ("never mind", AnswerVerdict.NO, None),
+        ("the one", AnswerVerdict.UNCLEAR, None),
+        ("the third", AnswerVerdict.UNCLEAR, None),
+        ("both", AnswerVerdict.UNCLEAR, None),
     ],
 )
-def test_an_answer_to_which_one(said: str, verdict: Verdict, chosen: Candidate | None) -> None:
+def test_an_answer_to_which_one(
+    said: str, verdict: AnswerVerdict, chosen: Candidate | None
+) -> None:
     assert judge_answer(WHICH, said) == (verdict, chosen)
 
 
 @pytest.mark.parametrize(
     ("said", "verdict"),
     [
-        ("yes", Verdict.YES),
-        ("no thank you", Verdict.NO),
-        ("go to the kitchen", Verdict.ANEW),
+        ("yes", AnswerVerdict.YES),
+        ("no thank you", AnswerVerdict.NO),
+        ("go to the kitchen", AnswerVerdict.ANEW),
     ],
 )
-def test_an_answer_to_yes_or_no(said: str, verdict: Verdict) -> None:
+def test_an_answer_to_yes_or_no(said: str, verdict: AnswerVerdict) -> None:
     assert judge_answer(SURE, said) == (verdict, None)
 
 
@@ -77,21 +79,21 @@ BALLS = Question(text="Which ball?", asked_ns=0, candidates=(LEFT, MIDDLE, LAST)
 @pytest.mark.parametrize(
     ("said", "verdict", "chosen"),
     [
-        ("the third ball", Verdict.CHOSEN, LAST),
-        ("the second one from the left, please", Verdict.UNCLEAR, None),
-        ("the last one", Verdict.CHOSEN, LAST),
-        ("neither of them", Verdict.NO, None),
-        ("not the pink one", Verdict.UNCLEAR, None),
-        ("not the pink one, the grey one", Verdict.UNCLEAR, None),
-        ("not the ball", Verdict.UNCLEAR, None),
-        ("not that one", Verdict.UNCLEAR, None),
-        ("the other one", Verdict.UNCLEAR, None),
-        ("not the grey one", Verdict.UNCLEAR, None),
-        ("not now, go to the kitchen", Verdict.ANEW, None),
+        ("the third ball", AnswerVerdict.CHOSEN, LAST),
+        ("the second one from the left, please", AnswerVerdict.UNCLEAR, None),
+        ("the last one", AnswerVerdict.CHOSEN, LAST),
+        ("neither of them", AnswerVerdict.NO, None),
+        ("not the pink one", AnswerVerdict.UNCLEAR, None),
+        ("not the pink one, the grey one", AnswerVerdict.UNCLEAR, None),
+        ("not the ball", AnswerVerdict.UNCLEAR, None),
+        ("not that one", AnswerVerdict.UNCLEAR, None),
+        ("the other one", AnswerVerdict.UNCLEAR, None),
+        ("not the grey one", AnswerVerdict.UNCLEAR, None),
+        ("not now, go to the kitchen", AnswerVerdict.ANEW, None),
     ],
 )
 def test_an_answer_may_count_compare_and_leave_out(
-    said: str, verdict: Verdict, chosen: Candidate | None
+    said: str, verdict: AnswerVerdict, chosen: Candidate | None
 ) -> None:
     assert judge_answer(BALLS, said) == (verdict, chosen)
 
@@ -104,7 +106,7 @@ def test_of_two_what_is_not_the_one_is_the_other(said: str) -> None:
 @pytest.mark.parametrize("said", ["yes", "right", "Yes, please.", "the red one"])
 def test_a_yes_picks_the_only_candidate(said: str) -> None:
     question = replace(WHICH, candidates=(RED,))
-    assert judge_answer(question, said) == (Verdict.CHOSEN, RED)
+    assert judge_answer(question, said) == (AnswerVerdict.CHOSEN, RED)
 
 
 @pytest.mark.parametrize(
@@ -117,4 +119,4 @@ def test_a_yes_picks_the_only_candidate(said: str) -> None:
     ],
 )
 def test_a_yes_that_is_taken_back_is_none(said: str) -> None:
-    assert judge_answer(SURE, said)[0] is not Verdict.YES
+    assert judge_answer(SURE, said)[0] is not AnswerVerdict.YES

@@ -2,7 +2,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vla_deploy.planning.patterns.backend import pattern_plan
-from vla_deploy.planning.understanding import Conversation, Mention, Outcome, Role, Turn
+from vla_deploy.planning.understanding import (
+    Conversation,
+    ConversationTurn,
+    Mention,
+    MentionRole,
+    TurnOutcome,
+)
 from vla_deploy.planning.understanding.conversation import MOST_TURNS, mentions_of
 from vla_deploy.planning.understanding.grounding import ground_plan
 
@@ -10,8 +16,8 @@ if TYPE_CHECKING:
     from conftest import Home
 
 
-def turn(number: int, *mentioned: str) -> Turn:
-    return Turn(
+def turn(number: int, *mentioned: str) -> ConversationTurn:
+    return ConversationTurn(
         command_id=f"c{number}",
         said=f"command {number}",
         told_ns=number,
@@ -37,25 +43,27 @@ def test_mentions_come_newest_first_and_last_word_first() -> None:
 
 
 def test_the_end_of_a_turn_is_noted_and_of_a_forgotten_one_ignored() -> None:
-    talk = Conversation().after(turn(1)).ended("c1", Outcome.FAILED, "it slipped")
-    assert (talk.turns[0].outcome, talk.turns[0].answer) == (Outcome.FAILED, "it slipped")
-    assert talk.ended("c9", Outcome.SUCCEEDED) == talk
+    talk = Conversation().after(turn(1)).ended("c1", TurnOutcome.FAILED, "it slipped")
+    assert (talk.turns[0].outcome, talk.turns[0].answer) == (TurnOutcome.FAILED, "it slipped")
+    assert talk.ended("c9", TurnOutcome.SUCCEEDED) == talk
 
 
 def test_a_plan_mentions_what_it_moves_and_where_to(home: "Home") -> None:
     request = home.ask("cup_1", "box_1", text="go to the kitchen and put the red cup in the box")
     plan = ground_plan(pattern_plan(request), request)
     assert [(one.means, one.thing_id, one.role) for one in mentions_of(plan, request.scene)] == [
-        ("kitchen", "", Role.PLACE),
-        ("red cup", "cup_1", Role.OBJECT),
-        ("orange box", "box_1", Role.DESTINATION),
+        ("kitchen", "", MentionRole.PLACE),
+        ("red cup", "cup_1", MentionRole.OBJECT),
+        ("orange box", "box_1", MentionRole.DESTINATION),
     ]
 
 
 def test_the_next_command_goes_on_with_what_the_last_was_about(home: "Home") -> None:
     first = home.ask("cup_1", "cup_2", "box_1", text="pick up the left cup")
     plan = ground_plan(pattern_plan(first), first)
-    turn = Turn(said=first.text, command_id="c1", mentioned=mentions_of(plan, first.scene))
+    turn = ConversationTurn(
+        said=first.text, command_id="c1", mentioned=mentions_of(plan, first.scene)
+    )
     talk = Conversation().after(turn)
     second = home.ask("cup_1", "cup_2", "box_1", text="look at the other one", conversation=talk)
     steps = ground_plan(pattern_plan(second), second).actions
@@ -67,4 +75,4 @@ def test_what_a_hand_had_is_mentioned_when_it_is_put_down(home: "Home") -> None:
     request = home.ask(held, "box_1", text="put it in the box")
     plan = ground_plan(pattern_plan(request), request)
     mentioned = {(one.thing_id, one.role) for one in mentions_of(plan, request.scene)}
-    assert mentioned == {("cup_1", Role.OBJECT), ("box_1", Role.DESTINATION)}
+    assert mentioned == {("cup_1", MentionRole.OBJECT), ("box_1", MentionRole.DESTINATION)}

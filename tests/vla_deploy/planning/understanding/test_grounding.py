@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError, UnknownPlace
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
-from vla_deploy.planning.understanding import Conversation, Mention, Role, Turn
+from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention, MentionRole
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
@@ -146,8 +146,8 @@ def test_what_is_handed_over_is_fetched_to_who_asked_for_it(
     ],
 )
 def test_things_are_put_on_furniture(home: "Home", destination: str | None, expected: str) -> None:
-    spoken = Mention(said="night stand", means="bedside_table", role=Role.PLACE)
-    talk = Conversation().after(Turn(said="before", mentioned=(spoken,)))
+    spoken = Mention(said="night stand", means="bedside_table", role=MentionRole.PLACE)
+    talk = Conversation().after(ConversationTurn(said="before", mentioned=(spoken,)))
     given = {"object": "it"} if destination is None else {"destination": destination}
     world = replace(home.world, holding={"left": "cup", "right": None})
     found = grounded(home, ("place", given), world=world, conversation=talk)

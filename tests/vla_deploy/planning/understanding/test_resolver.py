@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.planning.errors import Ambiguous, NotAble, UnknownObject
-from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.understanding import Conversation, Mention, Turn
-from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention
+from vla_deploy.planning.understanding.fitting import ThingUse
 from vla_deploy.planning.understanding.resolver import Resolver
 from vla_deploy.world import Thing
 from vla_deploy.world.thing import Rest
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from conftest import Home
 
 
-def name(request: Request, text: str, use: Use = Use.TAKE) -> str:
+def name(request: PlanRequest, text: str, use: ThingUse = ThingUse.TAKE) -> str:
     return Resolver(request).thing(text, use).name
 
 
@@ -70,16 +70,16 @@ def test_the_answer_settles_it(home: "Home") -> None:
 @pytest.mark.parametrize(
     ("text", "use", "spoken", "meant"),
     [
-        ("that one", Use.TAKE, ("ball_1", "cup_1"), "cup_1"),
-        ("the other cup", Use.TAKE, ("ball_1", "cup_1"), "cup_2"),
-        ("the blue one", Use.TAKE, ("cup_1",), "cup_2"),
-        ("the cup", Use.TAKE, ("cup_2", "ball_1"), "cup_2"),
-        ("it", Use.TAKE, ("cup_1", "box_1"), "cup_1"),
-        ("it", Use.ONTO, ("box_1",), "box_1"),
+        ("that one", ThingUse.TAKE, ("ball_1", "cup_1"), "cup_1"),
+        ("the other cup", ThingUse.TAKE, ("ball_1", "cup_1"), "cup_2"),
+        ("the blue one", ThingUse.TAKE, ("cup_1",), "cup_2"),
+        ("the cup", ThingUse.TAKE, ("cup_2", "ball_1"), "cup_2"),
+        ("it", ThingUse.TAKE, ("cup_1", "box_1"), "cup_1"),
+        ("it", ThingUse.ONTO, ("box_1",), "box_1"),
     ],
 )
 def test_what_was_spoken_of_is_meant(
-    home: "Home", text: str, use: Use, spoken: tuple[str, ...], meant: str
+    home: "Home", text: str, use: ThingUse, spoken: tuple[str, ...], meant: str
 ) -> None:
     request = home.ask("cup_1", "cup_2", "ball_1", "box_1", conversation=home.spoke_of(*spoken))
     assert name(request, text, use) == meant
@@ -89,18 +89,21 @@ def test_them_are_all_that_the_last_turn_was_about(home: "Home") -> None:
     resolver = Resolver(
         home.ask("cup_1", "cup_2", "ball_1", "box_1", conversation=home.spoke_of("cup_1", "ball_1"))
     )
-    assert [one.name for one in resolver.things("them", Use.TAKE)] == ["cup_1", "ball_1"]
+    assert [one.name for one in resolver.things("them", ThingUse.TAKE)] == ["cup_1", "ball_1"]
 
 
 def test_all_cups_are_all_cups(home: "Home") -> None:
     resolver = Resolver(home.ask("cup_1", "cup_2", "ball_1"))
-    assert [one.name for one in resolver.things("all the cups", Use.TAKE)] == ["cup_1", "cup_2"]
+    assert [one.name for one in resolver.things("all the cups", ThingUse.TAKE)] == [
+        "cup_1",
+        "cup_2",
+    ]
 
 
 def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> None:
     held = replace(home.things["cup_1"], held_by="left")
     assert (
-        name(home.ask(held, "ball_1", conversation=home.spoke_of("ball_1")), "it", Use.PUT)
+        name(home.ask(held, "ball_1", conversation=home.spoke_of("ball_1")), "it", ThingUse.PUT)
         == "cup_1"
     )
 
@@ -108,19 +111,19 @@ def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> No
 def test_a_hand_that_holds_nothing_says_so(home: "Home") -> None:
     cup = replace(home.things["cup_1"], held_by="right")
     request = home.ask(cup)
-    assert name(request, "what is in your right hand", Use.PUT) == "cup_1"
-    assert name(home.ask(cup, "cup_2"), "the cup that you hold", Use.PUT) == "cup_1"
+    assert name(request, "what is in your right hand", ThingUse.PUT) == "cup_1"
+    assert name(home.ask(cup, "cup_2"), "the cup that you hold", ThingUse.PUT) == "cup_1"
     with pytest.raises(NotAble, match="my left hand holds nothing"):
-        name(request, "what is in your left hand", Use.PUT)
+        name(request, "what is in your left hand", ThingUse.PUT)
     with pytest.raises(NotAble, match=r"^I hold nothing$"):
-        name(home.ask(), "what you are holding", Use.PUT)
+        name(home.ask(), "what you are holding", ThingUse.PUT)
 
 
 @pytest.mark.parametrize("text", ["them", "both", "what you are holding"])
 def test_both_hands_are_meant(home: "Home", text: str) -> None:
     held = [replace(home.things["cup_1"], held_by="right"),
             replace(home.things["ball_1"], held_by="left")]  # fmt: skip
-    found = Resolver(home.ask(*held, "cup_2")).things(text, Use.PUT)
+    found = Resolver(home.ask(*held, "cup_2")).things(text, ThingUse.PUT)
     assert [(one.name, one.hand) for one in found] == [("cup_1", "right"), ("ball_1", "left")]
 
 
@@ -131,7 +134,7 @@ def test_which_hand_is_meant_is_asked(home: "Home") -> None:
     ]
     for text in ("it", "the thing in your hand"):
         with pytest.raises(Ambiguous) as asked:
-            name(home.ask(*held, "ball_1"), text, Use.PUT)
+            name(home.ask(*held, "ball_1"), text, ThingUse.PUT)
         assert "the one in my right hand" in asked.value.question
         assert ["right" in one.features for one in asked.value.candidates].count(True) == 1
 
@@ -152,14 +155,14 @@ def test_a_pronoun_for_nothing_is_refused(home: "Home") -> None:
 
 
 def test_an_unseen_thing_on_furniture_is_looked_for_there(home: "Home") -> None:
-    meant = Resolver(home.ask()).thing("the bottle on the kitchen table", Use.TAKE)
+    meant = Resolver(home.ask()).thing("the bottle on the kitchen table", ThingUse.TAKE)
     assert (meant.name, meant.look_at) == ("bottle", "kitchen_table")
 
 
 def test_every_decision_is_logged_with_its_reason(home: "Home") -> None:
     resolver = Resolver(home.ask("cup_1", "cup_2", "ball_1"))
-    resolver.thing("the left cup", Use.TAKE)
-    resolver.thing("the bottle", Use.ONTO)
+    resolver.thing("the left cup", ThingUse.TAKE)
+    resolver.thing("the bottle", ThingUse.ONTO)
     assert resolver.reasons == [
         '"left cup" is cup_2 (blue cup) (the only one that fits)',
         '"bottle" is bottle (not seen yet)',
@@ -168,10 +171,10 @@ def test_every_decision_is_logged_with_its_reason(home: "Home") -> None:
 
 @pytest.mark.parametrize("text", ["both cups", "the two cups", "two cups"])
 def test_both_are_two_of_two_and_of_three_none(home: "Home", text: str) -> None:
-    found = Resolver(home.ask("cup_1", "cup_2", "ball_1")).things(text, Use.TAKE)
+    found = Resolver(home.ask("cup_1", "cup_2", "ball_1")).things(text, ThingUse.TAKE)
     assert [one.name for one in found] == ["cup_1", "cup_2"]
     with pytest.raises(NotAble, match=f'I see 3 that could be "{text.removeprefix("the ")}"'):
-        Resolver(home.ask("cup_1", "cup_2", "cup_4")).things(text, Use.TAKE)
+        Resolver(home.ask("cup_1", "cup_2", "cup_4")).things(text, ThingUse.TAKE)
 
 
 # --- what only the things around tell ---------------------------------------------------------
@@ -222,10 +225,10 @@ def test_it_is_told_from_the_things_around(
     resolver = Resolver(home.ask(*BOTTLES, ELSEWHERE, BALL, CAN, "box_1", "cup_2", cup))
     if meant is None:
         with pytest.raises(UnknownObject):
-            resolver.things(text, Use.TAKE)
+            resolver.things(text, ThingUse.TAKE)
     else:
         assert (
-            sorted(one.thing.thing_id for one in resolver.things(text, Use.TAKE) if one.thing)
+            sorted(one.thing.thing_id for one in resolver.things(text, ThingUse.TAKE) if one.thing)
             == meant
         )
 
@@ -258,7 +261,7 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
 )
 def test_what_is_not_there_is_said_to_be_not(home: "Home", text: str, says: str) -> None:
     talk = Conversation().after(
-        Turn(
+        ConversationTurn(
             said="before",
             mentioned=(Mention(said="can", means="can", thing_id="can_1", kind="can"),),
         )
@@ -269,12 +272,12 @@ def test_what_is_not_there_is_said_to_be_not(home: "Home", text: str, says: str)
 
 def test_all_but_what_nobody_has_spoken_of_are_none(home: "Home") -> None:
     with pytest.raises(NotAble):
-        Resolver(home.ask("cup_1", "cup_2")).things("everything but that", Use.PUT)
+        Resolver(home.ask("cup_1", "cup_2")).things("everything but that", ThingUse.PUT)
 
 
 def test_the_big_one_is_of_the_kind_spoken_of_that_can_be_taken(home: "Home") -> None:
     large = replace(BALL, thing_id="ball_2", colour="red", size_m=(0.09, 0.09, 0.09))
     resolver = Resolver(home.ask(BALL, large, *BOTTLES, "box_1"))
-    resolver.thing("the small ball", Use.PUT)
-    resolver.thing("the box", Use.ONTO)
-    assert resolver.thing("the bigger one", Use.PUT).name == "ball_2"
+    resolver.thing("the small ball", ThingUse.PUT)
+    resolver.thing("the box", ThingUse.ONTO)
+    assert resolver.thing("the bigger one", ThingUse.PUT).name == "ball_2"

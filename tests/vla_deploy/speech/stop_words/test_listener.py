@@ -14,7 +14,7 @@ from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock, duration_ns
-from vla_deploy.speech.stop_words.listener import State, StopWords
+from vla_deploy.speech.stop_words.listener import StopState, StopWords
 from vla_deploy.speech.stop_words.spotter import Spotter
 
 BLOCK = 512
@@ -150,7 +150,7 @@ def test_switched_off_it_says_so_and_hears_nothing(
     listener = ear.listen("off")
     ear.word()
     assert ear.presses() == []
-    assert listener.state is State.OFF
+    assert listener.state is StopState.OFF
     assert "speech.stop_words" in listener.document()["why"]
     assert "nobody can stop the robot by voice" in caplog.text
 
@@ -162,7 +162,7 @@ def test_another_profile_switches_it_on_and_off_while_it_runs(ear: Ear) -> None:
     assert len(ear.presses()) == 1
     listener.adopt(settings("off"))
     ear.word()
-    assert (ear.presses(), listener.state) == ([], State.OFF)
+    assert (ear.presses(), listener.state) == ([], StopState.OFF)
 
 
 def test_without_its_model_it_says_so_and_the_node_goes_on(
@@ -190,5 +190,5 @@ def test_a_model_that_fails_under_way_is_told_until_it_runs_again(
     assert caplog.text.count("nobody can stop the robot by voice") == 1
     scorer.is_broken = False
     ear.word()
-    assert listener.state is State.LIVE
+    assert listener.state is StopState.LIVE
     assert len(ear.presses()) == 1

@@ -16,7 +16,7 @@ from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.inference.manifest import Manifest
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.ipc.page_sound import PageSound, Step
+from vla_deploy.ipc.page_sound import PageSound, SoundStep
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.node import SpeechNode
@@ -47,12 +47,12 @@ class Page:
         )
         self.node.start()
 
-    def say(self, samples: Samples, last: Step | None = None) -> None:
+    def say(self, samples: Samples, last: SoundStep | None = None) -> None:
         """Send samples as fast as they are spoken; the button stays held unless `last` is told."""
         records = self.space.record_writer("page_sound")
         for at in range(0, len(samples), RATE_HZ // 10):
             part = samples[at : at + RATE_HZ // 10]
-            sound = PageSound(turn=1, rate_hz=RATE_HZ, step=Step.SOUND, samples=part)
+            sound = PageSound(turn=1, rate_hz=RATE_HZ, step=SoundStep.SOUND, samples=part)
             records.append(sound.packed())
             self.wait(0.1)
         if last is not None:
@@ -116,7 +116,7 @@ def test_the_phrase_that_held_it_is_no_command_and_the_status_tells_it(
     held = page(listener)
     held.say(loud(0.4))
     assert [act["source"] for act in held.presses()] == ["page_voice"]
-    held.say(np.zeros(RATE_HZ // 2, np.int16), last=Step.ENDED)
+    held.say(np.zeros(RATE_HZ // 2, np.int16), last=SoundStep.ENDED)
     assert [event.payload["verdict"] for event in held.heard.drain()] == ["stop"]
     assert held.status()["page_stop_words"]["state"] == "live"
 
@@ -126,7 +126,7 @@ def test_half_a_word_of_a_turn_that_was_cut_off_does_not_count_in_the_next(
 ) -> None:
     held = page(listener)
     for _ in range(5):
-        held.say(loud(0.04), last=Step.CUT)
+        held.say(loud(0.04), last=SoundStep.CUT)
     assert held.presses() == []
 
 

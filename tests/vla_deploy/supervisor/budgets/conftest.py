@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming, Profile, load_profile
 from platforms.probes import Reading
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, Snapshot
+from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, UsageSnapshot
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
@@ -32,16 +32,16 @@ class ScriptedFeed:
     def __init__(self) -> None:
         self.closed = False
         self.failures = 0
-        self.snapshots: list[Snapshot] = []
+        self.snapshots: list[UsageSnapshot] = []
         self.watched: Mapping[str, int] = {}
 
     def watch(self, pids: Mapping[str, int]) -> None:
         self.watched = pids
 
-    def latest(self) -> Snapshot | None:
+    def latest(self) -> UsageSnapshot | None:
         return self.snapshots[-1] if self.snapshots else None
 
-    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+    def since(self, stamp_ns: int) -> tuple[UsageSnapshot, ...]:
         return tuple(one for one in self.snapshots if one.stamp_ns > stamp_ns)
 
     def close(self) -> None:
@@ -93,10 +93,10 @@ class World:
     def cell(self, name: str) -> dict:
         return self.space.cell_reader(name).latest().document()
 
-    def _snapshot(self) -> Snapshot:
+    def _snapshot(self) -> UsageSnapshot:
         for name in self.running:
             self._cpu_s[name] += self.cpu_ratio[name] / 2
-        return Snapshot(
+        return UsageSnapshot(
             stamp_ns=self.clock.ns,
             wall_ns=round(self.wall_ratio * self.clock.ns),
             readings={

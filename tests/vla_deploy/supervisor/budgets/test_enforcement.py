@@ -11,7 +11,7 @@ from platforms import ProcessBudget
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused
-from vla_deploy.supervisor.budgets.judge import Finding
+from vla_deploy.supervisor.budgets.judge import BudgetFinding
 from vla_deploy.supervisor.budgets.lines import Line
 
 NAME = "planner"
@@ -47,9 +47,9 @@ def claims(pid: int) -> Kept:
     )
 
 
-def over(*metrics: str) -> list[Finding]:
+def over(*metrics: str) -> list[BudgetFinding]:
     return [
-        Finding(line=Line(process=NAME, metric=metric, limit=0.5), over=True, measured=1.0)
+        BudgetFinding(line=Line(process=NAME, metric=metric, limit=0.5), over=True, measured=1.0)
         for metric in metrics
     ]
 

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from drivers.clock import NS_PER_S
 from platforms import LadderTiming, ProcessBudget, TotalBudget
-from vla_deploy.supervisor.budgets.judge import Measurement, Standing, judge
+from vla_deploy.supervisor.budgets.judge import BudgetStanding, Measurement, judge
 from vla_deploy.supervisor.budgets.lines import Line, lines_of
 
 TIMING = LadderTiming(rise_s=2.0, fall_s=4.0, release_ratio=0.8)
@@ -26,10 +26,10 @@ def test_a_line_is_over_only_after_the_rise_time():
     seen = follow(MEMORY, [50, 101, 101, 101, 101])
     assert [one.over for one in seen] == [False, False, False, True, True]
     assert [one.standing for one in seen[:4]] == [
-        Standing.OK,
-        Standing.RISING,
-        Standing.RISING,
-        Standing.OVER,
+        BudgetStanding.OK,
+        BudgetStanding.RISING,
+        BudgetStanding.RISING,
+        BudgetStanding.OVER,
     ]
 
 
@@ -62,7 +62,7 @@ def test_too_little_room_on_the_disk_is_released_above_the_limit_only():
 def test_a_missing_number_raises_nothing_and_releases_nothing_and_says_why():
     seen = follow(MEMORY, [None] * 9)
     assert not seen[-1].over
-    assert seen[-1].standing is Standing.MISSING
+    assert seen[-1].standing is BudgetStanding.MISSING
     assert (seen[-1].measured, seen[-1].reason) == (None, "no such file")
     over = follow(MEMORY, [101, 101, 101] + [None] * 9)
     assert over[-1].over
@@ -87,7 +87,7 @@ def test_a_new_limit_starts_anew():
 
 def test_a_line_that_nobody_measures_is_missing():
     found = judge([MEMORY], {}, {}, TIMING, 0)[MEMORY.key]
-    assert found.standing is Standing.MISSING
+    assert found.standing is BudgetStanding.MISSING
     assert "nobody" in found.reason
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming
 from vla_deploy.supervisor.budgets.judge import Measurement, judge
-from vla_deploy.supervisor.budgets.ladder import EMERGENCY, Change, LadderState, Pressure, climb
+from vla_deploy.supervisor.budgets.ladder import EMERGENCY, LadderMove, LadderState, Pressure, climb
 from vla_deploy.supervisor.budgets.lines import Line
 
 TIMING = LadderTiming(rise_s=2.0, fall_s=5.0, release_ratio=0.8)
@@ -30,7 +30,7 @@ class Climber:
     def __init__(self, ladder: tuple[LadderStep, ...] = LADDER) -> None:
         self.ladder = ladder
         self.state = LadderState()
-        self.changes: list[Change] = []
+        self.changes: list[LadderMove] = []
         self.second = 0
         self._findings = {}
 

@@ -3,7 +3,7 @@
 import re
 
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.speech.verdict import Verdict
+from vla_deploy.speech.verdict import PhraseVerdict
 from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, Kind, Metric
 from vla_deploy.telemetry.metrics.flow import OWN, PULSES
 from vla_deploy.telemetry.metrics.paths import labels_of
@@ -50,4 +50,4 @@ def test_a_histogram_and_states_do_not_go_to_the_history_as_they_are() -> None:
 
 def test_the_verdicts_on_phrases_are_those_of_speech() -> None:
     (_, among) = METRICS_BY_NAME["vla_speech_phrases_total"].paths[0]
-    assert set(getattr(among, "keys")) == {str(verdict) for verdict in Verdict}  # noqa: B009
+    assert set(getattr(among, "keys")) == {str(verdict) for verdict in PhraseVerdict}  # noqa: B009

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.ipc import BY_NAME, TOPICS, Kind
+from vla_deploy.ipc import BY_NAME, TOPICS, TopicKind
 from vla_deploy.ipc.layout import is_document, record_dtype
 from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.channels import TICKS, TOPIC_CHANNELS
@@ -60,7 +60,7 @@ def test_images_logs_events_ticks_and_packed_cells_are_drawn_as_well() -> None:
     images = [one.topic for one in TOPIC_CHANNELS if "/" in one.topic]
     assert all(map(is_drawn, (*images, views.LOG, TICKS)))
     for topic in TOPICS:
-        is_packed = topic.kind is Kind.CELL and not is_document(topic)
+        is_packed = topic.kind is TopicKind.CELL and not is_document(topic)
         assert is_drawn(topic.name) or not is_packed
     assert not is_drawn("page_sound")
     assert Table().drawn("page_sound", b"private").entities == ()

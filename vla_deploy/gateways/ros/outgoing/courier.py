@@ -19,7 +19,7 @@ from vla_deploy.ipc.ros_goals import (
     GoalKind,
     GoalRequest,
     GoalState,
-    GoalUnreadable,
+    RosGoalUnreadable,
     read_request,
 )
 
@@ -72,7 +72,7 @@ class Courier:
     def _begin(self, document: Mapping[str, Any]) -> None:
         try:
             request = read_request(document)
-        except GoalUnreadable as error:
+        except RosGoalUnreadable as error:
             _log.error("%s", error)
             self._refuse(str(document.get("request_id")), str(error))
             return
