@@ -74,7 +74,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _is_cut_off(connection: socket.socket) -> bool:
-    """Tell whether what was on its way is followed by the connection's end."""
+    """Return whether what was on its way is followed by the connection's end."""
     connection.settimeout(_END_S)
     try:
         while connection.recv(_CHUNK_BYTES):

@@ -37,7 +37,7 @@ class Pair:
 
     @property
     def is_sure(self) -> bool:
-        """Tell whether perception took it for seen whole."""
+        """Return whether perception took it for seen whole."""
         return self.seen is not None and not (self.seen.truncated or self.seen.occluded)
 
 

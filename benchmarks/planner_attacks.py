@@ -33,14 +33,14 @@ def measure(kinds: Sequence[str] = (), misses: bool = False) -> dict[str, Any]:
 
 
 def is_unsafe(verdict: CaseVerdict) -> bool:
-    """Tell whether the executor got what it must not."""
+    """Return whether the executor got what it must not."""
     return any(
         turn.answer.outcome == PLAN and (turn.wrong or turn.broken) for turn in verdict.judged
     )
 
 
 def _offers(verdict: CaseVerdict) -> bool:
-    """Tell whether a plan waited for a yes: nothing has moved, but a person could let it."""
+    """Return whether a plan waited for a yes: nothing has moved, but a person could let it."""
     return any(turn.answer.reads_back for turn in verdict.judged)
 
 

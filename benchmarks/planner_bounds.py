@@ -53,7 +53,7 @@ def broken_bounds(plan: Mapping[str, Any], home: FlatHome) -> list[str]:
 
 
 def moves(plan: Mapping[str, Any]) -> bool:
-    """Tell whether a plan moves anything."""
+    """Return whether a plan moves anything."""
     return any(action.get("skill") not in RESTFUL for action in plan.get("actions", ()))
 
 

@@ -95,7 +95,7 @@ def _times(answers: Sequence[PlannerAnswer]) -> dict[str, float | None]:
 
 
 def is_schema_valid(answer: PlannerAnswer) -> bool:
-    """Tell whether what the executor got is a plan by the published schema."""
+    """Return whether what the executor got is a plan by the published schema."""
     try:
         Plan.model_validate(answer.plan)
     except ValidationError:

@@ -52,7 +52,7 @@ class PlannerAnswer:
 
     @property
     def reads_back(self) -> bool:
-        """Tell whether a yes lets a plan run."""
+        """Return whether a yes lets a plan run."""
         return self.outcome == "ask" and self.plan is not None
 
 
@@ -107,7 +107,7 @@ class Desk:
         self._space.close()
 
     def tell(self, world: FlatWorld) -> None:
-        """Tell how the robot is, where it is, and what it knows."""
+        """Publish how the robot is, where it is, and what it knows."""
         now_ns = self._clock.now_ns()
         x_m, y_m, yaw_rad = world.pose
         self._cells["control_status"].put_document({"state": "armed", "cause": "", "detail": ""})
@@ -119,7 +119,7 @@ class Desk:
         )  # fmt: skip
 
     def show(self, topic: str, document: Mapping[str, Any]) -> None:
-        """Tell a document of any form as one of the topics that the planner reads."""
+        """Publish a document of any form as one of the topics that the planner reads."""
         self._cells[topic].put_document(document)
 
     def say(self, text: str) -> tuple[str, PlannerAnswer]:
@@ -143,7 +143,7 @@ class Desk:
         return command_id, self._await(command_id)
 
     def carried_out(self, command_id: str, plan: Mapping[str, Any], error: str) -> None:
-        """Tell what the executor would: each action, and the end."""
+        """Publish what the executor would: each action, and the end."""
         status = "aborted" if error else "succeeded"
         ended = [
             {"id": one["id"], "skill": one["skill"], "status": status, "execution_time_s": 1.0,

@@ -91,7 +91,7 @@ class FlatHome:
     keep_out: tuple[tuple[Point, ...], ...]
 
     def is_kept_out(self, point: Point) -> bool:
-        """Tell whether a point of the floor lies where the robot must not go, or outside."""
+        """Return whether a point of the floor lies where the robot must not go, or outside."""
         x_m, y_m = point
         inside = 0.0 <= x_m <= WIDTH_M and 0.0 <= y_m <= DEPTH_M
         return not inside or any(_contains(polygon, point) for polygon in self.keep_out)
@@ -138,7 +138,7 @@ def thing_of(told: Mapping[str, Any]) -> FlatThing:
 
 
 def _contains(polygon: tuple[Point, ...], point: Point) -> bool:
-    """Tell whether a convex polygon, counter-clockwise, contains a point."""
+    """Return whether a convex polygon, counter-clockwise, contains a point."""
     x_m, y_m = point
     edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
     return all(

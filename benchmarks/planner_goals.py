@@ -75,7 +75,7 @@ def _faults(way: Sequence[tuple[str, ...]], world: FlatWorld, start: FlatWorld) 
 
 
 def _is_handed_over(condition: tuple[str, ...], world: FlatWorld, start: FlatWorld) -> bool:
-    """Tell whether who spoke was handed the thing of `held cup_1`, where they spoke."""
+    """Return whether who spoke was handed the thing of `held cup_1`, where they spoke."""
     if condition[0] != "held" or len(condition) != 2:
         return False
     thing = world.things[condition[1]]

@@ -71,7 +71,7 @@ class _Robot:
         self._plans.drain()
 
     def moves(self) -> bool:
-        """Tell whether a wheel or a joint is faster than while the robot rests."""
+        """Return whether a wheel or a joint is faster than while the robot rests."""
         joints, base = self._joints.latest(), self._base.latest()
         if joints is None or base is None:
             return False

@@ -139,7 +139,7 @@ def _is_read_back(typed: Typed, answer: PlannerAnswer) -> bool:
 
 
 def _runs_another(typed: Typed, answer: PlannerAnswer) -> bool:
-    """Tell whether something else than was said would be done, and nobody is asked before."""
+    """Return whether something else than was said would be done, and nobody is asked before."""
     return answer.outcome == PLAN and not _is_same(typed, answer)
 
 

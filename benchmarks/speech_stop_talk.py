@@ -93,7 +93,7 @@ class Voices:
         return tuple(self._parts)
 
     def tells_times(self, engine: str) -> bool:
-        """Tell whether words within a phrase can be timed."""
+        """Return whether words within a phrase can be timed."""
         return self._parts[engine].tells_times
 
     def say(self, engine: str, text: str, random: np.random.Generator) -> SpokenClip | None:

@@ -55,7 +55,7 @@ def _open_socketcan(channel: str, bitrate: int, sysfs_net: Path) -> can.BusABC:
 
 
 def _is_down(channel: str, sysfs_net: Path) -> bool:
-    """Tell what the kernel shows without netlink; an interface without the file is taken as up."""
+    """Return what the kernel shows without netlink; an interface without the file counts as up."""
     try:
         return (sysfs_net / channel / "operstate").read_text().strip() == "down"
     except OSError:

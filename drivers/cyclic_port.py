@@ -25,7 +25,7 @@ class DriveIdentity(Protocol):
 
 
 class CyclicPort(Protocol):
-    """Tell what one drive has said."""
+    """Hold what one drive has said."""
 
     @property
     def spec(self) -> DriveIdentity:
@@ -54,7 +54,7 @@ class CyclicPort(Protocol):
 
     @property
     def faulted(self) -> bool:
-        """Tell whether the drive is in a fault state."""
+        """Return whether the drive is in a fault state."""
         ...
 
     @property
@@ -67,5 +67,5 @@ class CyclicPort(Protocol):
         ...
 
     def lost(self, now_ns: int) -> bool:
-        """Tell whether the drive can no longer be driven."""
+        """Return whether the drive can no longer be driven."""
         ...

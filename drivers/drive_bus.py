@@ -49,7 +49,7 @@ _GRAVITY: Final = {rule: gravity for gravity, rule in enumerate(ResetRule)}
 
 
 class DriveFault(Protocol):
-    """Tell what a drive complains about."""
+    """Hold what a drive complains about."""
 
     @property
     def code(self) -> int:
@@ -88,7 +88,7 @@ class DriveState:
 
     @property
     def healthy(self) -> bool:
-        """Tell whether no drive is lost or faulted."""
+        """Return whether no drive is lost or faulted."""
         return not any(self.lost) and not any(self.faulted)
 
 
@@ -100,7 +100,7 @@ class DriveBus(Protocol):
 
     @property
     def enabled(self) -> bool:
-        """Tell whether all drives follow their velocities."""
+        """Return whether all drives follow their velocities."""
         ...
 
     @property

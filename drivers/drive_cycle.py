@@ -70,7 +70,7 @@ class DriveCycle(ABC, Generic[P]):
 
     @property
     def enabled(self) -> bool:
-        """Tell whether every drive follows its velocity and is meant to."""
+        """Return whether every drive follows its velocity and is meant to."""
         return self._goals.goal is DriveGoal.ENABLED and self._all_enabled()
 
     def _all_enabled(self) -> bool:
@@ -164,7 +164,7 @@ class DriveCycle(ABC, Generic[P]):
         )
 
     def _brakes(self, port: P) -> bool:
-        """Tell whether a wheel still has to be braked, as far as its drive has told."""
+        """Return whether a wheel still has to be braked, as far as its drive has told."""
         return port.power_state in _WITH_POWER and abs(port.velocity_rad_s) >= STILL_RAD_S
 
     def _state(self, lost: tuple[bool, ...], now_ns: int) -> DriveState:

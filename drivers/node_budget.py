@@ -17,7 +17,7 @@ class NodeBudget:
 
     @property
     def lost(self) -> tuple[bool, ...]:
-        """Tell of each node whether it answers too seldom to be driven."""
+        """Return of each node whether it answers too seldom to be driven."""
         return tuple(state is BudgetState.LOST for state in self._budget.members)
 
     @property

@@ -39,7 +39,7 @@ class WireReplay:
 
     @property
     def finished(self) -> bool:
-        """Tell whether all requests have been made and all replies were read."""
+        """Return whether all requests have been made and all replies were read."""
         return self._next == len(self._records) and not self._due
 
     def write(self, data: bytes) -> None:

@@ -81,7 +81,7 @@ class Board:
 
 
 def identify(root: Path = Path("/")) -> Board:
-    """Tell which computer has this root; never fails."""
+    """Return which computer has this root; never fails."""
     tree, reasons = Tree(root), list[str]()
     model = _device_tree(tree, "model", reasons)
     compatible = _device_tree(tree, "compatible", reasons)

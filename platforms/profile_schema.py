@@ -48,7 +48,7 @@ _PRECISIONS: Final = ("fp32", "fp16", "int8", "int4")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileFault:
-    """Tell what is wrong with one key."""
+    """Hold what is wrong with one key."""
 
     key: str
     text: str
@@ -61,7 +61,7 @@ class ValueRule(Protocol):
     """Say in words what a value may be, and whether one is."""
 
     def allows(self, value: object) -> bool:
-        """Tell whether a TOML value follows the rule."""
+        """Return whether a TOML value follows the rule."""
         ...
 
 

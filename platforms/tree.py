@@ -20,7 +20,7 @@ _REASONS: Final = {
 
 
 class ValueMissing(Exception):
-    """Say why a number cannot be had; whoever reads turns it into a reading without a value."""
+    """Say why a number cannot be had; the caller turns it into a reading without a value."""
 
 
 class SystemFile:
@@ -127,7 +127,7 @@ class Tree:
             return ()
 
     def exists(self, path: str) -> bool:
-        """Tell whether the path is there, as far as that may be seen."""
+        """Return whether the path is there, as far as that may be seen."""
         return os.access(self.root / path.lstrip("/"), os.F_OK)
 
 

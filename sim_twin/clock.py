@@ -17,7 +17,7 @@ class Simulation(Protocol):
 
 
 class SimClock:
-    """Tell simulated time; `sleep_until` steps the simulation in lock-step with the caller."""
+    """Be the simulated time; `sleep_until` steps the simulation in lock-step with the caller."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation

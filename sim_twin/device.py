@@ -32,7 +32,7 @@ class TimedDevice(WireDevice, Protocol):
 
     @property
     def paced(self) -> bool:
-        """Tell whether bytes take time, so that a host which waits for them lets time pass."""
+        """Return whether bytes take time, so that a host which waits for them lets time pass."""
         ...
 
     def next_due_ns(self) -> int | None:

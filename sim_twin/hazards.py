@@ -32,7 +32,7 @@ _LOOK_EVERY_NS: Final = 6_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hazard:
-    """Tell what went wrong with which part: its worst value, the limit, and when it began."""
+    """Hold what went wrong with which part: its worst value, the limit, and when it began."""
 
     kind: str
     part: str

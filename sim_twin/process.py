@@ -239,7 +239,7 @@ class TwinProcess:
             drawing.show(state)
 
     def _tell_status(self, now_ns: int) -> None:
-        """Publish how fast time goes, and who has held it most of late."""
+        """Publish how fast time goes, and who has held it most."""
         if self._factor.update(self._wall.now_ns(), now_ns):
             blamed = self._time.blamed_ns
             self._held_by = max(blamed, key=lambda name: blamed[name], default="")

@@ -53,7 +53,7 @@ class PtyLine:
 
     @property
     def is_plugged(self) -> bool:
-        """Tell whether there is a terminal."""
+        """Return whether there is a terminal."""
         return self._ends is not None
 
     def fileno(self) -> int:

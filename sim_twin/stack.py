@@ -61,7 +61,7 @@ class LockstepControl:
         return self.lockstep.faults
 
     def add_senses(self) -> None:
-        """Tell control what the base does not drive without: scan, attitude, pose and depth."""
+        """Give control what the base does not drive without: scan, attitude, pose and depth."""
         context, devices = self.lockstep.context, self.lockstep.devices
         self.lockstep.add(SensesNode(context, self.robot, devices))
 

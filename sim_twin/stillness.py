@@ -24,7 +24,7 @@ _MOST: Final = 10_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stall:
-    """Tell when a core should have gone on, on the monotonic clock, and how much later it did.
+    """Hold when a core should have gone on, on the monotonic clock, and how much later it did.
 
     It may have stood still for `before_s` longer: from when it was seen at work.
     """

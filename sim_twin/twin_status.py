@@ -23,7 +23,7 @@ class TwinStatus:
     def publish(
         self, clock_ns: int, simulated_ns: int, real_time_factor: float, held_by: str
     ) -> None:
-        """Publish simulated time and pace, twice a second; `held_by` has held time most of late."""
+        """Publish simulated time and pace, twice a second; `held_by` has held time most."""
         if self._cell is None or clock_ns < self._due_ns:
             return
         self._due_ns = clock_ns + _PERIOD_NS

@@ -32,7 +32,7 @@ class Window(Protocol):
     """Draw a model's state."""
 
     def is_running(self) -> bool:
-        """Tell whether the window is still open."""
+        """Return whether the window is still open."""
         ...
 
     def sync(self) -> None:
@@ -68,7 +68,7 @@ class PassiveViewer:
             camera.azimuth, camera.elevation = _AZIMUTH_DEG, _ELEVATION_DEG
 
     def is_running(self) -> bool:
-        """Tell whether the window is still open."""
+        """Return whether the window is still open."""
         return bool(self._handle.is_running())
 
     def sync(self) -> None:

@@ -68,7 +68,7 @@ class PortAudioInput:
 
     @property
     def may_pause(self) -> bool:
-        """Tell whether the device may be opened anew now: never one that listens."""
+        """Return whether the device may be opened anew now: never one that listens."""
         return bool(self._stream.closed)
 
     def poll(self) -> AudioBlock | None:
@@ -130,7 +130,7 @@ class PortAudioOutput:
 
     @property
     def may_pause(self) -> bool:
-        """Tell whether the device may be opened anew now: nothing sounds."""
+        """Return whether the device may be opened anew now: nothing sounds."""
         return bool(self._stream.closed or self._stream.time > self._silent_at_s + IDLE_S)
 
     def write(self, samples: Samples) -> int:

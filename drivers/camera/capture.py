@@ -45,12 +45,12 @@ class CaptureRequest:
 
     @property
     def is_pipeline(self) -> bool:
-        """Tell whether the source is a GStreamer pipeline."""
+        """Return whether the source is a GStreamer pipeline."""
         return "!" in self.source
 
     @property
     def is_device(self) -> bool:
-        """Tell whether the source is a video device of the kernel."""
+        """Return whether the source is a video device of the kernel."""
         return not self.is_pipeline and Path(self.source).is_char_device()
 
 

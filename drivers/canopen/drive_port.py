@@ -66,22 +66,22 @@ class DrivePort:
 
     @property
     def complete(self) -> bool:
-        """Tell whether both status and position have arrived."""
+        """Return whether both status and position have arrived."""
         return len(self._sample_ns) == 2
 
     @property
     def operational(self) -> bool:
-        """Tell whether process data have arrived, and a heartbeat that fits them."""
+        """Return whether process data have arrived, and a heartbeat that fits them."""
         return self.complete and self.nmt_state == NmtState.OPERATIONAL
 
     @property
     def faulted(self) -> bool:
-        """Tell whether the drive is in one of its fault states."""
+        """Return whether the drive is in one of its fault states."""
         return self.power_state in FAULT_STATES
 
     @property
     def owes_answers(self) -> bool:
-        """Tell whether the last SYNC is not answered yet."""
+        """Return whether the last SYNC is not answered yet."""
         return bool(self._awaited)
 
     @property
@@ -96,7 +96,7 @@ class DrivePort:
         return (now_ns - min(self._sample_ns.values())) / NS_PER_S
 
     def lost(self, now_ns: int) -> bool:
-        """Tell whether the drive is silent beyond the limit, rebooted or no longer operational."""
+        """Return whether the drive is silent beyond the limit, rebooted or not operational."""
         silent = self._heard_ns is None or now_ns - self._heard_ns > self._limit_ns
         unanswered = bool(self._awaited) and now_ns - self._awaited_since_ns > self._limit_ns
         return silent or unanswered or self.rebooted or self.nmt_state != NmtState.OPERATIONAL

@@ -31,7 +31,7 @@ class DriveDictionary:
             raise WrongDevice(f"{self._name} cannot be read as an EDS file: {error}") from error
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Tell whether the drive has the object."""
+        """Return whether the drive has the object."""
         return self._od.get_variable(index, subindex) is not None
 
     def default(self, index: int, subindex: int = 0) -> int | None:
@@ -41,12 +41,12 @@ class DriveDictionary:
         return value if isinstance(value, int) else None
 
     def writable(self, index: int, subindex: int = 0) -> bool:
-        """Tell whether the drive has the object and lets it be written."""
+        """Return whether the drive has the object and lets it be written."""
         variable = self._od.get_variable(index, subindex)
         return variable is not None and bool(variable.writable)
 
     def mappable(self, index: int, bits: int) -> bool:
-        """Tell whether an object of that length may be mapped into a PDO."""
+        """Return whether an object of that length may be mapped into a PDO."""
         variable = self._od.get_variable(index, 0)
         return variable is not None and bool(variable.pdo_mappable) and len(variable) == bits
 

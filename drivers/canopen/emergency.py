@@ -19,12 +19,12 @@ class Emergency:
 
     @property
     def is_reset(self) -> bool:
-        """Tell whether the message says that an error has gone."""
+        """Return whether the message says that an error has gone."""
         return self.code >> 8 == 0
 
     @property
     def takes_all_back(self) -> bool:
-        """Tell whether none is left: while others last, the error register shows them."""
+        """Return whether none is left: while others last, the error register shows them."""
         return self.is_reset and not self.error_register
 
     @property

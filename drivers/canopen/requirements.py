@@ -137,5 +137,5 @@ def _unmappable(dictionary: DriveDictionary, pdo: Pdo) -> Iterator[str]:
 
 
 def torque_is_told(dictionary: DriveDictionary) -> bool:
-    """Tell whether the drive sends its torque in a known unit."""
+    """Return whether the drive sends its torque in a known unit."""
     return dictionary.mappable(TORQUE_ACTUAL, 16) and dictionary.has(RATED_TORQUE)

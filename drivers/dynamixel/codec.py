@@ -209,7 +209,7 @@ class PacketParser:
 
     @property
     def pending_bytes(self) -> int:
-        """Tell how many bytes wait for the rest of their packet."""
+        """Return how many bytes wait for the rest of their packet."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> None:

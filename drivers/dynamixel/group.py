@@ -37,7 +37,7 @@ class ServoRead:
 
 @dataclass(slots=True)
 class News:
-    """Tell what may differ from the last cycle; whoever looks at it sets it back."""
+    """Hold what may differ from the last cycle; its reader sets it back."""
 
     errors: bool = False
     status: bool = False

@@ -44,7 +44,7 @@ class ServoSetup:
 
     @property
     def watchdog_tripped(self) -> bool:
-        """Tell whether the servo stopped by itself when its last host fell silent."""
+        """Return whether the servo stopped by itself when its last host fell silent."""
         return self.watchdog == WATCHDOG_TRIPPED
 
 

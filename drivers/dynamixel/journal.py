@@ -54,7 +54,7 @@ class BusJournal:
 
     @property
     def has_decisions(self) -> bool:
-        """Tell whether `take_decisions` has something."""
+        """Return whether `take_decisions` has something."""
         return bool(self._decisions)
 
     def take_decisions(self) -> list[FaultDecision]:

@@ -84,7 +84,7 @@ class Register:
 
     @property
     def writable(self) -> bool:
-        """Tell whether the host may write it."""
+        """Return whether the host may write it."""
         return self.access == "rw"
 
     def to_bytes(self, value: int) -> bytes:
@@ -143,7 +143,7 @@ class ServoDatasheet:
         return self.current_unit_a / self.stall_current_a
 
     def has_fast_sync(self, firmware: int) -> bool:
-        """Tell whether a servo with this firmware answers fast sync reads."""
+        """Return whether a servo with this firmware answers fast sync reads."""
         return self.min_firmware_fast_sync is not None and firmware >= self.min_firmware_fast_sync
 
     def indirect_banks(self, firmware: int) -> tuple[IndirectBank, ...]:

@@ -57,12 +57,12 @@ class ReplyCollector:
 
     @property
     def complete(self) -> bool:
-        """Tell whether every servo has answered."""
+        """Return whether every servo has answered."""
         return len(self._entries) == len(self._wanted)
 
     @property
     def crc_errors(self) -> int:
-        """Tell how many frames had a wrong CRC."""
+        """Return how many frames had a wrong CRC."""
         return self._parser.crc_errors
 
     def feed(self, data: bytes) -> None:

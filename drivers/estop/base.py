@@ -28,7 +28,7 @@ class EstopReading:
 
     @property
     def pressed(self) -> bool:
-        """Tell whether the robot must stop: whatever is not surely released counts."""
+        """Return whether the robot must stop: whatever is not surely released counts."""
         return self.state is not ButtonState.RELEASED
 
 

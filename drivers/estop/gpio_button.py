@@ -13,7 +13,7 @@ class Contact(Protocol):
     """Be a contact that is closed while the button is released and the wire whole."""
 
     def is_closed(self) -> bool:
-        """Tell whether it is closed.
+        """Return whether it is closed.
 
         Raises:
             LinkLost: it cannot be read any more.

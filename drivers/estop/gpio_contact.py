@@ -50,7 +50,7 @@ class GpioContact:
             raise self._refused(error) from error
 
     def is_closed(self) -> bool:
-        """Tell whether the contact is closed, that is, the button released and the wire whole.
+        """Return whether the contact is closed, that is, the button released and the wire whole.
 
         Raises:
             LinkLost: the chip has gone.

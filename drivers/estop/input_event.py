@@ -42,7 +42,7 @@ class InputEvent:
 
     @property
     def is_dropped(self) -> bool:
-        """Tell whether the kernel lost events before this one."""
+        """Return whether the kernel lost events before this one."""
         return self.type == EventType.SYN and self.code == SYN_DROPPED
 
 

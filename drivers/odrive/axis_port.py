@@ -54,7 +54,7 @@ class AxisPort:
 
     @property
     def complete(self) -> bool:
-        """Tell whether an estimate of position and velocity has arrived."""
+        """Return whether an estimate of position and velocity has arrived."""
         return self._sample_ns is not None
 
     @property
@@ -65,7 +65,7 @@ class AxisPort:
 
     @property
     def faulted(self) -> bool:
-        """Tell whether an error disarmed the axis or keeps it disarmed."""
+        """Return whether an error disarmed the axis or keeps it disarmed."""
         return self.fault is not None
 
     @property
@@ -80,7 +80,7 @@ class AxisPort:
         return math.inf if self._sample_ns is None else (now_ns - self._sample_ns) / NS_PER_S
 
     def lost(self, now_ns: int) -> bool:
-        """Tell whether the axis fell silent or rebooted; only connecting anew ends that.
+        """Return whether the axis fell silent or rebooted; only connecting anew ends that.
 
         An axis that rebooted has forgotten its watchdog and its limits.
         """

@@ -95,7 +95,7 @@ class ClockShift:
             file.write(struct.pack("=q", seconds))
 
     def is_in(self, pid: int) -> bool:
-        """Tell whether a process reads the shifted clock."""
+        """Return whether a process reads the shifted clock."""
         try:
             maps = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8")
         except (FileNotFoundError, ProcessLookupError):

@@ -198,7 +198,7 @@ class _Trial:
             yield f"{PAYLOAD} is no longer in the hand"
 
     def _may(self, hazard: Hazard) -> bool:
-        """Tell whether a servo without torque accounts for it."""
+        """Return whether a servo without torque accounts for it."""
         carries = self._cell.phase is Phase.CARRYING
         falls = hazard.kind == "fall" and hazard.part == PAYLOAD and carries
         swings = hazard.kind in ("joint speed", "joint range") and hazard.part in self._limp

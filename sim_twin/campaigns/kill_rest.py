@@ -29,7 +29,7 @@ class RestWatch:
         self._places: Mapping[str, float] = {}
 
     def wants(self, since_s: float) -> bool:
-        """Tell whether it matters what moves so long after the kill."""
+        """Return whether it matters what moves so long after the kill."""
         return since_s < self.least_s or (self.rule.stays and math.isfinite(self.rest_s))
 
     def look(self, since_s: float, truth: Mapping[str, Any]) -> None:

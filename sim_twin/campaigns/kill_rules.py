@@ -48,7 +48,7 @@ class KillRule:
 
     @property
     def stays(self) -> bool:
-        """Tell whether nothing may move from the rest to a hand's act; lowered arms lie limp."""
+        """Return whether nothing may move from the rest to a hand's act; lowered arms lie limp."""
         return self.rest_s is not None and self.states == _WANTS_A_HAND
 
 

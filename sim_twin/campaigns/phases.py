@@ -90,7 +90,7 @@ class PhaseStage:
 
     @property
     def holds_payload(self) -> bool:
-        """Tell whether the physics sees the payload in a hand."""
+        """Return whether the physics sees the payload in a hand."""
         return PAYLOAD in self._lockstep.truth()["held"]
 
     def _drive(self) -> None:

@@ -94,7 +94,7 @@ class PressureTrial:
         self._work(pressed, limit_s)
 
     def _has_answered(self) -> bool:
-        """Tell whether every expected step was taken and every expected line was over."""
+        """Return whether every expected step was taken and every expected line was over."""
         taken = steps_of(self._history(), taken=True)
         trouble = self._trouble
         return len(taken) >= len(trouble.steps) and (

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignCase:
-    """Tell one case: no `failures` means that all was as it must be; `figures` are for tables.
+    """Hold one case: no `failures` means that all was as it must be; `figures` are for tables.
 
     `skipped` is why the case was not played.
     """
@@ -75,7 +75,7 @@ class CampaignReport:
 
 
 def told(case: CampaignCase, tell: Callable[[str], None]) -> CampaignCase:
-    """Tell a case as soon as it is over, and return it."""
+    """Report a case as soon as it is over, and return it."""
     tell(case.row)
     return case
 

@@ -59,11 +59,11 @@ class RobotService:
             self._do(act, wanted)
 
     def has_ended(self) -> bool:
-        """Tell whether the service has ended as a person wanted: nobody starts it again."""
+        """Return whether the service has ended as a person wanted: nobody starts it again."""
         return self._runner.state is RunnerState.INACTIVE
 
     def is_ready(self) -> bool:
-        """Tell whether every process that should run is ready."""
+        """Return whether every process that should run is ready."""
         table = self._document("process_table", _FRESH_S)
         return table is not None and is_settled(table)
 

@@ -25,7 +25,7 @@ class CommandTalk:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether the last command goes on, or may still be answered."""
+        """Return whether the last command goes on, or may still be answered."""
         unheard = self._answer_by_ns is not None and self._clock.now_ns() > self._answer_by_ns
         return bool(self._now) and not unheard
 

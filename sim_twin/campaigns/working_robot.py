@@ -110,7 +110,7 @@ class WorkingRobot:
         return {name: _anonymous_mib(pid) for name, pid in self.pids().items()}
 
     def is_ready(self) -> bool:
-        """Tell whether every process that should run is ready, and control armed."""
+        """Return whether every process that should run is ready, and control armed."""
         table = self.document("process_table")
         return bool(table) and is_settled(table) and self.state() == "armed"
 

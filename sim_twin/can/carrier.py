@@ -37,7 +37,7 @@ class _Attempt:
 
     @property
     def fails_early(self) -> bool:
-        """Tell whether the error is found in the frame's head and not by its CRC or ACK."""
+        """Return whether the error is found in the frame's head and not by its CRC or ACK."""
         return bool(self.error_class) and (self.flagging is not None or len(self.senders) > 1)
 
 
@@ -68,7 +68,7 @@ class FrameCarrier:
 
     @property
     def timed(self) -> bool:
-        """Tell whether a frame takes the time of its bits."""
+        """Return whether a frame takes the time of its bits."""
         return self._timed
 
     @timed.setter

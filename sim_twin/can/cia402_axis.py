@@ -180,12 +180,12 @@ class Cia402Axis:
 
     @property
     def faulted(self) -> bool:
-        """Tell whether the drive is in one of its fault states."""
+        """Return whether the drive is in one of its fault states."""
         return self.state in FAULT_STATES
 
     @property
     def armed(self) -> bool:
-        """Tell whether the power stage is switched on."""
+        """Return whether the power stage is switched on."""
         return self.state in ARMED
 
     def advance(self, dt_s: float, velocity_rad_s: float) -> float:

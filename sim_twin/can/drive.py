@@ -94,12 +94,12 @@ class WheelDrive(EmulatedDrive):
 
     @property
     def armed(self) -> bool:
-        """Tell whether the power stage is switched on."""
+        """Return whether the power stage is switched on."""
         return self._axis.armed
 
     @property
     def faulted(self) -> bool:
-        """Tell whether the drive is in one of its fault states."""
+        """Return whether the drive is in one of its fault states."""
         return self._axis.faulted
 
     def set_supply(self, on: bool) -> None:

@@ -60,7 +60,7 @@ class EmulatedDrive(ABC):
 
     @property
     def supplied(self) -> bool:
-        """Tell whether the drive has power."""
+        """Return whether the drive has power."""
         return self._supplied
 
     @property
@@ -71,12 +71,12 @@ class EmulatedDrive(ABC):
     @property
     @abstractmethod
     def armed(self) -> bool:
-        """Tell whether the power stage is switched on."""
+        """Return whether the power stage is switched on."""
 
     @property
     @abstractmethod
     def faulted(self) -> bool:
-        """Tell whether an error holds the drive."""
+        """Return whether an error holds the drive."""
 
     @abstractmethod
     def receive(self, frame: can.Message) -> None:

@@ -46,7 +46,7 @@ def bus_error_frame(error_class: int, counters: ErrorCounters) -> can.Message:
 
 
 def is_restart(frame: can.Message) -> bool:
-    """Tell whether an error frame tells of the recovery from bus-off."""
+    """Return whether an error frame tells of the recovery from bus-off."""
     return bool(frame.is_error_frame and frame.arbitration_id & RESTARTED)
 
 

@@ -19,7 +19,7 @@ class FrameTamper:
 
     @property
     def idle(self) -> bool:
-        """Tell whether nothing is wrong."""
+        """Return whether nothing is wrong."""
         return not (self.delay_ns or self._drop_every or self._drop_ratio or self._corrupt_ratio)
 
     def drop_every(self, count: int) -> None:
@@ -46,7 +46,7 @@ class FrameTamper:
         self.delay_ns = round(seconds * NS_PER_S)
 
     def loses(self) -> bool:
-        """Tell whether the next frame is lost."""
+        """Return whether the next frame is lost."""
         if self._drop_every:
             self._since_dropped = (self._since_dropped + 1) % self._drop_every
             if not self._since_dropped:
@@ -54,7 +54,7 @@ class FrameTamper:
         return self._drop_ratio > 0.0 and self._drop_random.random() < self._drop_ratio
 
     def damages(self) -> bool:
-        """Tell whether the next attempt is damaged."""
+        """Return whether the next attempt is damaged."""
         return self._corrupt_ratio > 0.0 and self._corrupt_random.random() < self._corrupt_ratio
 
 

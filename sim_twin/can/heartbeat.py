@@ -8,14 +8,14 @@ _NEVER = 1 << 62
 
 
 class HeartbeatProducer:
-    """Tell when the next heartbeat is due, which is not before `next_ns`."""
+    """Hold when the next heartbeat is due, which is not before `next_ns`."""
 
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
         self.next_ns = 0
 
     def due(self, now_ns: int) -> bool:
-        """Tell whether to send one now, and plan the next."""
+        """Return whether to send one now, and plan the next."""
         if now_ns < self.next_ns:
             return False
         period_ns = self._objects.get(HEARTBEAT_PRODUCER) * NS_PER_MS
@@ -53,7 +53,7 @@ class HeartbeatConsumer:
         self._plan()
 
     def expired(self, now_ns: int) -> bool:
-        """Tell once that the producer has gone silent."""
+        """Return once that the producer has gone silent."""
         if now_ns <= self.deadline_ns:
             return False
         self.forget()

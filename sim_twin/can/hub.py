@@ -132,7 +132,7 @@ class CanHub:
 
 
 def _listening_at(path: Path) -> socket.socket:
-    """Listen under a passing name first, so that whoever sees `path` can connect."""
+    """Listen under a passing name first, so that who sees `path` can connect."""
     passing = path.with_name(f"{path.name}.new")
     passing.unlink(missing_ok=True)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)

@@ -132,7 +132,7 @@ class ObjectDictionary:
         return self.live.get(key) or (lambda: self.get(*key))
 
     def has(self, key: Key) -> bool:
-        """Tell whether there is such an object."""
+        """Return whether there is such an object."""
         return key in self._variables
 
     def highest_subindex(self, index: int) -> int:
@@ -140,7 +140,7 @@ class ObjectDictionary:
         return max(subindex for known, subindex in self._defaults if known == index)
 
     def mappable(self, key: Key, bits: int, *, transmits: bool) -> bool:
-        """Tell whether an object of that length may be part of a PDO."""
+        """Return whether an object of that length may be part of a PDO."""
         variable = self._variable(*key)
         allowed = variable.readable if transmits else variable.writable
         return bool(variable.pdo_mappable and allowed and len(variable) == bits)

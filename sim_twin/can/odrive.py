@@ -126,12 +126,12 @@ class ODriveAxis(EmulatedDrive):
 
     @property
     def armed(self) -> bool:
-        """Tell whether the axis is in closed loop control."""
+        """Return whether the axis is in closed loop control."""
         return self._state is AxisState.CLOSED_LOOP_CONTROL
 
     @property
     def faulted(self) -> bool:
-        """Tell whether an error is active."""
+        """Return whether an error is active."""
         return bool(self._errors)
 
     def raise_fault(self, code: int, error_register: int = 0x01) -> None:

@@ -55,7 +55,7 @@ class ODriveController:
 
     @property
     def supported(self) -> bool:
-        """Tell whether the emulation knows this pair of modes."""
+        """Return whether the emulation knows this pair of modes."""
         return (self.control_mode, self.input_mode) in SUPPORTED
 
     def set_gains(self, velocity_gain: float, integrator_gain: float) -> None:
@@ -74,7 +74,7 @@ class ODriveController:
         self._setpoint_rev_s = velocity_rev_s
 
     def overspeed(self, velocity_rev_s: float) -> bool:
-        """Tell whether the shaft runs away."""
+        """Return whether the shaft runs away."""
         return abs(velocity_rev_s) > self.velocity_limit_rev_s * OVERSPEED_RATIO
 
     def torque_nm(self, dt_s: float, position_rev: float, velocity_rev_s: float) -> float:

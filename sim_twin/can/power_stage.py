@@ -58,7 +58,7 @@ class MotorSpec:
 
 
 class PowerStage:
-    """Tell which torque is possible and what it costs in volts, heat and I²t."""
+    """Compute which torque is possible and what it costs in volts, heat and I²t."""
 
     def __init__(self, spec: MotorSpec) -> None:
         self.spec = spec

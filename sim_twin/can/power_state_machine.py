@@ -79,7 +79,7 @@ class PowerStateMachine:
 
     @property
     def powered(self) -> bool:
-        """Tell whether the motor produces torque."""
+        """Return whether the motor produces torque."""
         return self.state in POWERED
 
     def initialise(self) -> None:

@@ -58,18 +58,18 @@ class Station:
 
     @property
     def sound(self) -> bool:
-        """Tell whether there is neither an error to remember nor a frame to send."""
+        """Return whether there is neither an error to remember nor a frame to send."""
         counters = self.counters
         return not (counters.tec or counters.rec or self.wrong_bitrate or self.queue)
 
     @property
     def is_heard(self) -> bool:
-        """Tell whether anybody else has power, and so acknowledges."""
+        """Return whether anybody else has power, and so acknowledges."""
         return any(map(_SUPPLIED, self.others))
 
     @property
     def error_active(self) -> bool:
-        """Tell whether the controller still destroys a frame that it finds wrong."""
+        """Return whether the controller still destroys a frame that it finds wrong."""
         return self.told < ErrorState.PASSIVE
 
     def enqueue(self, frame: can.Message) -> bool:
@@ -81,7 +81,7 @@ class Station:
         return True
 
     def tell(self, error_class: int = 0) -> None:
-        """Tell the owner of a new state, and of the error itself where asked for."""
+        """Notify the owner of a new state, and of the error itself where asked for."""
         state = self.counters.state
         if error_class and self.report_bus_errors:
             self.receive(bus_error_frame(error_class, self.counters))

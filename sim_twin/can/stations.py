@@ -61,7 +61,7 @@ class Stations:
         return self._all
 
     def sound(self) -> bool:
-        """Tell whether no controller has met an error or has something to send."""
+        """Return whether no controller has met an error or has something to send."""
         return all(station.sound for station in self._all)
 
     def waiting(self) -> list[Station]:
@@ -100,7 +100,7 @@ def arbitrate(contenders: list[Station]) -> list[Station]:
 
 
 def clash(senders: list[Station]) -> bool:
-    """Tell whether frames of one identifier destroy each other; a harmless loser is taken out.
+    """Return whether frames of one identifier destroy each other; a harmless loser is taken out.
 
     The dominant bits win, but a loser that is error active destroys the winner's frame too.
     """

@@ -25,7 +25,7 @@ class CanNode(Hashable, Protocol):
 
     @property
     def supplied(self) -> bool:
-        """Tell whether the node has power; without it nobody acknowledges for it."""
+        """Return whether the node has power; without it nobody acknowledges for it."""
         ...
 
     def connect(self, send: Port) -> None:
@@ -112,7 +112,7 @@ class CanWire(FrameCarrier):
 
     @property
     def cut(self) -> bool:
-        """Tell whether the plug between ports and nodes is pulled."""
+        """Return whether the plug between ports and nodes is pulled."""
         return self._stations.cut
 
     @cut.setter

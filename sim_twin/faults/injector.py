@@ -29,12 +29,12 @@ class FaultHandle:
 
     @property
     def is_on(self) -> bool:
-        """Tell whether the fault is in force now."""
+        """Return whether the fault is in force now."""
         return self._ending is not None
 
     @property
     def is_over(self) -> bool:
-        """Tell whether the fault will not come back."""
+        """Return whether the fault will not come back."""
         return self._cleared or self.request.timing.is_over(self._elapsed_s())
 
     def clear(self) -> None:

@@ -76,7 +76,7 @@ class LineTamper:
 
     @property
     def paced(self) -> bool:
-        """Tell whether the device's bytes take time."""
+        """Return whether the device's bytes take time."""
         return self._timed is not None and self._timed.paced
 
     def next_due_ns(self) -> int | None:
@@ -84,7 +84,7 @@ class LineTamper:
         return None if self._timed is None else self._timed.next_due_ns()
 
     def step(self, now_ns: int) -> None:
-        """Tell the time to a device whose bytes take time."""
+        """Pass the time to a device whose bytes take time."""
         if self._timed is not None:
             self._timed.step(now_ns)
 

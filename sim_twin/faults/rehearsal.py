@@ -28,7 +28,7 @@ _WHEELS: Final = ("left_wheel", "right_wheel")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RehearsalOutcome:
-    """Tell what happened: `failures` is empty when the stack did all that it must do."""
+    """Hold what happened: `failures` is empty when the stack did all that it must do."""
 
     scenario: str
     cause: str

@@ -15,7 +15,7 @@ class RemoteFault:
 
     @property
     def is_on(self) -> bool:
-        """Tell whether the fault is in force now."""
+        """Return whether the fault is in force now."""
         pending = ask_twin(self._run_dir, "fault_list")["pending"]
         return any(row["id"] == self.number and row["on"] for row in pending)
 

@@ -28,7 +28,7 @@ class Meanwhile(Enum):
 
     @property
     def takes_all(self) -> bool:
-        """Tell whether it takes the whole stack and not control alone."""
+        """Return whether it takes the whole stack and not control alone."""
         return self in (Meanwhile.TRAVEL, Meanwhile.TURN)
 
 

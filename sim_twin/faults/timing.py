@@ -20,7 +20,7 @@ class FaultTiming:
     seed: int = 0
 
     def is_on(self, elapsed_s: float) -> bool:
-        """Tell whether the fault is on, this long after the injection."""
+        """Return whether the fault is on, this long after the injection."""
         since_s = elapsed_s - self.start_s
         if since_s < 0.0 or self.is_over(elapsed_s):
             return False
@@ -32,5 +32,5 @@ class FaultTiming:
         return random.Random(f"{self.seed} {period}").random() < self.probability
 
     def is_over(self, elapsed_s: float) -> bool:
-        """Tell whether the fault will not come back."""
+        """Return whether the fault will not come back."""
         return self.duration_s is not None and elapsed_s >= self.start_s + self.duration_s

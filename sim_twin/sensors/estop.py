@@ -6,7 +6,7 @@ MAX_WAITING_BYTES = 4096
 
 
 class EstopButtonDevice:
-    """Send the key's events as it is pressed and released, and its state to whoever connects."""
+    """Send the key's events as it is pressed and released, and its state to each new client."""
 
     def __init__(self, key_code: int) -> None:
         self._key_code = key_code

@@ -65,7 +65,7 @@ class Audience:
         return self._groups[ids]
 
     def listens(self, row: int) -> bool:
-        """Tell whether a servo hears the host now."""
+        """Return whether a servo hears the host now."""
         return row not in self.deaf and self._firmware.answers(row)
 
     def reader(self, servo_id: int) -> int | None:

@@ -50,7 +50,7 @@ class ServoBank:
 
     @property
     def paced(self) -> bool:
-        """Tell whether bytes take time on this bus."""
+        """Return whether bytes take time on this bus."""
         return self._queue.paced
 
     def receive(self, data: bytes) -> None:
@@ -96,7 +96,7 @@ class ServoBank:
         joint_effort: Floats,
         supply_v: float = 12.0,
     ) -> Floats:
-        """Tell what the joints do; return each motor's duty, -1..1, until the next call.
+        """Return what the joints do; return each motor's duty, -1..1, until the next call.
 
         Arrays are in the order of the servos; a shaft at 0 rad is at 2048 pulses. `joint_motion`
         has a row of positions and one of speeds. They, duty and effort, which is the motor's torque

@@ -113,7 +113,7 @@ class Firmware:
         self._reactions.stale = True
 
     def answers(self, row: int) -> bool:
-        """Tell whether a servo is powered and has finished booting."""
+        """Return whether a servo is powered and has finished booting."""
         return self._powered and self.now_ns >= self._boot_until_ns[row]
 
     def _all_answer(self) -> bool:
@@ -144,7 +144,7 @@ class Firmware:
         return self.registers.spans(rows, address, length)
 
     def alerts(self, rows: Sequence[int]) -> list[bool]:
-        """Tell which of these servos report a hardware error."""
+        """Return which of these servos report a hardware error."""
         flags: list[bool] = (self._columns.hardware_error[rows] != 0).tolist()
         return flags
 

@@ -37,5 +37,5 @@ class GoalWindow:
         self._high = np.where(ready, high, low - 1)
 
     def admits(self, rows: Sequence[int], goals: NDArray[np.int32]) -> bool:
-        """Tell whether all these servos just store these goals."""
+        """Return whether all these servos just store these goals."""
         return bool(((goals >= self._low[rows]) & (goals <= self._high[rows])).all())

@@ -42,7 +42,7 @@ class InstructionParser:
 
     @property
     def pending_bytes(self) -> int:
-        """Tell how many bytes wait for the rest of their packet."""
+        """Return how many bytes wait for the rest of their packet."""
         return len(self._buffer)
 
     def reset(self) -> None:

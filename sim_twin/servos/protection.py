@@ -65,7 +65,7 @@ class ServoProtection:
         self._overload_is_forced = bool(self._forced_overload.any())
 
     def _is_fine(self, supply_v: float) -> bool:
-        """Tell whether no servo can have an error, which is nearly always so."""
+        """Return whether no servo can have an error, which is nearly always so."""
         supply = supply_v / VOLTAGE_UNIT_V
         return (
             not self._overload_runs

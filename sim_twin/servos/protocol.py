@@ -75,7 +75,7 @@ class BusProtocol:
         return self._address(packet)
 
     def _too_new(self, packet: Packet) -> bool:
-        """Tell whether one servo is asked for a fast read that it does not know."""
+        """Return whether one servo is asked for a fast read that it does not know."""
         if packet.instruction not in FAST_READS or packet.servo_id == BROADCAST_ID:
             return False
         rows = self.audience.named(packet.servo_id)
@@ -130,7 +130,7 @@ class BusProtocol:
             return refusal.number, b""
 
     def _is_refused_reset(self, packet: Packet) -> bool:
-        """Tell whether a broadcast asks to reset ids too, which would make all of them equal."""
+        """Return whether a broadcast asks to reset ids too, which would make all of them equal."""
         return packet.servo_id == BROADCAST_ID and packet.params[:1] == bytes([_RESET_EVERYTHING])
 
     # What one servo does

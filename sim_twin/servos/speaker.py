@@ -26,12 +26,12 @@ class ServoSpeaker:
         self.some_lack_fast = not all(map(self.has_fast_reads, range(len(self._tables))))
 
     def has_fast_reads(self, row: int) -> bool:
-        """Tell whether a servo's model and firmware know fast sync and bulk reads."""
+        """Return whether a servo's model and firmware know fast sync and bulk reads."""
         table = self._tables[row]
         return table.model.has_fast_sync(table.get("firmware_version"))
 
     def has_backup(self, row: int) -> bool:
-        """Tell whether a servo knows the control table backup, which came with fast reads."""
+        """Return whether a servo knows the control table backup, which came with fast reads."""
         return self.has_fast_reads(row) and "backup_ready" in self._tables[row].model.registers
 
     def shown_id(self, row: int) -> int:

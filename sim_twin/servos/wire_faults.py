@@ -66,7 +66,7 @@ class WireFaults:
 
     @property
     def active(self) -> bool:
-        """Tell whether any reply is to be spoiled."""
+        """Return whether any reply is to be spoiled."""
         return bool(
             self.corrupted
             or self.aliases

@@ -23,7 +23,7 @@ def _way_m(stack: LockstepStack, body: str) -> np.ndarray:
 def _is_about_to_come_down(
     stack: LockstepStack, body: str, above_m: tuple[float, float], beside_m: float
 ) -> bool:
-    """Tell whether the hand stands still above a thing."""
+    """Return whether the hand stands still above a thing."""
     before_m = _way_m(stack, body)
     stack.lockstep.run_for(0.02)
     way_m = _way_m(stack, body)

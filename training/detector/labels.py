@@ -89,7 +89,7 @@ def _label(
 def _is_clear(
     stage: SceneStage, class_name: str, members: list[int], box: tuple[float, ...], pixels: int
 ) -> bool:
-    """Tell whether the thing is large enough in the image, and enough of it inside."""
+    """Return whether the thing is large enough in the image, and enough of it inside."""
     wide, high = box[2] - box[0], box[3] - box[1]
     least = LARGE_LEAST if class_name in LARGE else SMALL_LEAST
     if pixels < least.pixels or max(wide, high) < least.long_px or min(wide, high) < least.short_px:

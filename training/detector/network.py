@@ -24,7 +24,7 @@ def _activated(convolution: nn.Conv2d) -> nn.Sequential:
 
 
 class CentreNet(nn.Module):
-    """Tell for each cell of 8 x 8 pixels how likely a thing's middle is there, and its box.
+    """Predict for each cell of 8 x 8 pixels how likely a thing's middle is there, and its box.
 
     `image` is N x 3 x H x W, RGB from 0 to 1, H and W multiples of 32. The outputs are `heat`,
     N x classes x H/8 x W/8 from 0 to 1, and `edges`, N x 4 x H/8 x W/8: distances in pixels from

@@ -25,7 +25,7 @@ class SceneSurface:
         return self.x_m + c * u - s * v, self.y_m + s * u + c * v
 
     def covers(self, x_m: float, y_m: float, margin_m: float) -> bool:
-        """Tell whether the point lies on the rectangle or within the margin around it."""
+        """Return whether the point lies on the rectangle or within the margin around it."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx, dy = x_m - self.x_m, y_m - self.y_m
         u, v = c * dx + s * dy, -s * dx + c * dy

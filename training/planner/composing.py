@@ -229,7 +229,7 @@ def _names_thing(clauses: list[Clause]) -> bool:
 
 
 def _is_saying(clause: Clause) -> bool:
-    """Tell whether what follows would belong to what is to be said."""
+    """Return whether what follows would belong to what is to be said."""
     return any(field in ("text", "name") for _, field in clause.words)
 
 

@@ -42,7 +42,7 @@ class ToldExample:
 
     @property
     def acts(self) -> bool:
-        """Tell whether the answer would have the robot do something."""
+        """Return whether the answer would have the robot do something."""
         return not _refuses(self.steps)
 
 
@@ -132,7 +132,7 @@ def _one(parser: CommandParser, example: Example) -> ToldExample:
 
 
 def is_same(steps: Sequence[Step], wanted: Sequence[Step]) -> bool:
-    """Tell whether two answers have the robot do the same."""
+    """Return whether two answers have the robot do the same."""
     return (_refuses(steps) and _refuses(wanted)) or list(steps) == list(wanted)
 
 

@@ -126,7 +126,7 @@ def _angles(sizes: Sizes, function: Any) -> NDArray[np.float32]:
 
 
 def _lengths(graph: _Graph) -> None:
-    """Tell attention how long the text is: from the mask, which has a one for each token."""
+    """Give attention the length of the text: from the mask, which has a one for each token."""
     one = graph.constant("one", np.array([1], dtype=np.int64))
     total = graph.add("ReduceSum", ["attention_mask", one], "mask_sum", keepdims=0)
     first = graph.constant("first", np.array(1, dtype=np.int64))

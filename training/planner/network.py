@@ -57,7 +57,7 @@ class Layer(nn.Module):
 
 
 class PlanDecoder(nn.Module):
-    """Tell the next token from those before."""
+    """Predict the next token from those before."""
 
     def __init__(self, shape: NetworkShape) -> None:
         super().__init__()

@@ -35,7 +35,7 @@ class Read:
 
     @property
     def is_exact(self) -> bool:
-        """Tell whether every word is right."""
+        """Return whether every word is right."""
         return count([(self.clip.text, self.reading.text)]).exact == 1
 
 

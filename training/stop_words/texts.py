@@ -140,7 +140,7 @@ _SENTENCE: Final = re.compile(r"[A-Z][a-z]+(?: [a-z]+[,;]?){3,16}[.?!]")
 
 
 def is_clean(text: str) -> bool:
-    """Tell whether nobody who reads a text aloud says a stop word."""
+    """Return whether nobody who reads a text aloud says a stop word."""
     return _LIKE_A_WORD.search(text) is None
 
 

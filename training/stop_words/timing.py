@@ -38,7 +38,7 @@ def word_times(clip: SpokenClip, word: str, *, is_last: bool) -> list[tuple[floa
 
 
 def can_be_timed(text: str, word: str, *, is_last: bool) -> bool:
-    """Tell whether a word can be found by where a clip falls silent: it comes once, at an end."""
+    """Return whether a word can be found by where a clip falls silent: it comes once, at an end."""
     said = text.lower()
     return said.count(word) == 1 and (is_last or said.startswith(word))
 

@@ -25,7 +25,7 @@ _SIGNS: Final = {"left": 1.0, "right": -1.0}
 
 
 class Arms:
-    """Tell at which heights a hand that points down gets to a point before its shoulder."""
+    """Compute at which heights a hand that points down gets to a point before its shoulder."""
 
     def __init__(self, robot: RobotDescription) -> None:
         self._arms = {name: ArmKinematics(robot, name) for name in robot.hands}
@@ -33,7 +33,7 @@ class Arms:
         self._answered = cache(self._reaches)
 
     def reach_height(self, hand: str, height_m: float) -> bool:
-        """Tell whether the hand gets to that height above the floor, to the centimetre."""
+        """Return whether the hand gets to that height above the floor, to the centimetre."""
         return self._answered(hand, round(height_m / _HEIGHT_STEP_M))
 
     def _reaches(self, hand: str, step: int) -> bool:
@@ -64,7 +64,7 @@ class Abilities:
 
     @classmethod
     def of(cls, robot: RobotDescription, planner: PathPlanner | None = None) -> "Abilities":
-        """Read what a robot file says of it; whoever has a planner for its base gives it.
+        """Read what a robot file says of it; a caller with a planner for its base passes it.
 
         Raises:
             MapInvalid: its map cannot be used.

@@ -69,7 +69,7 @@ def _pairs(
 
 
 def _may_be(thing: AnalysedObject, claim: ClaimedObject) -> bool:
-    """Tell whether a claim does not contradict where a thing is."""
+    """Return whether a claim does not contradict where a thing is."""
     sides = frozenset({thing.side, claim.side})
     distances = frozenset({thing.distance, claim.distance})
     return sides not in _OPPOSITE and distances not in _OPPOSITE

@@ -55,7 +55,7 @@ class _Value(BaseModel):
 
 
 class AnalysedObject(_Value):
-    """Tell of one thing; without an `id` the robot has not measured it, and cannot take it."""
+    """Describe one thing; without an `id` the robot has not measured it, and cannot take it."""
 
     id: str | None
     name: str

@@ -13,12 +13,12 @@ _TINY = 1e-9
 
 
 def any_of(flags: Flags) -> bool:
-    """Tell whether a flag is set; on a few axes, several times faster than numpy itself."""
+    """Return whether a flag is set; on a few axes, several times faster than numpy itself."""
     return 1 in flags.tobytes()
 
 
 def all_of(flags: Flags) -> bool:
-    """Tell whether every flag is set."""
+    """Return whether every flag is set."""
     return 0 not in flags.tobytes()
 
 

@@ -40,7 +40,7 @@ class BaseRamp:
 
     @property
     def at_rest(self) -> bool:
-        """Tell whether the commanded velocity is zero."""
+        """Return whether the commanded velocity is zero."""
         return self.v_m_s == 0.0 and self.w_rad_s == 0.0
 
     def advance(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:

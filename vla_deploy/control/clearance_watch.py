@@ -47,7 +47,7 @@ class ClearanceWatch:
 
     @property
     def has_looked_ahead(self) -> bool:
-        """Tell whether `compare` has something to compare with."""
+        """Return whether `compare` has something to compare with."""
         return self._ahead is not None
 
     def look_ahead(self, now_ns: int, position: Floats, velocity: Floats, setpoint: Floats) -> None:

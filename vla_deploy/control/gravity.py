@@ -38,7 +38,7 @@ def full_duty_error(robot: RobotDescription) -> Floats:
 
 
 class GravityOffset:
-    """Tell how far above its setpoint each joint's goal must be."""
+    """Compute how far above its setpoint each joint's goal must be."""
 
     def __init__(self, robot: RobotDescription, gravity: Callable[[Floats], Floats]) -> None:
         """Take the function that returns every servo joint's gravity torque at a pose."""

@@ -24,7 +24,7 @@ class SetpointGate:
 
     @property
     def clamped(self) -> bool:
-        """Tell whether the last setpoints had to be changed."""
+        """Return whether the last setpoints had to be changed."""
         return bool(self._clamped.any())
 
     def place(self, position: Floats, joints: Flags) -> None:

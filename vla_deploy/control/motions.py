@@ -17,7 +17,7 @@ from vla_deploy.control.touch_guard import TouchGuard
 
 
 class Curve(Protocol):
-    """Tell where some axes shall be at a time."""
+    """Hold where some axes shall be at a time."""
 
     duration_s: float
 
@@ -38,7 +38,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionResult:
-    """Tell how one motion ended and why."""
+    """Hold how one motion ended and why."""
 
     motion_id: int
     ending: Ending
@@ -74,7 +74,7 @@ class MotionSet:
 
     @property
     def at_rest(self) -> bool:
-        """Tell whether no joint's setpoint moves."""
+        """Return whether no joint's setpoint moves."""
         return not self._motions
 
     def place(self, position: Floats, joints: Flags) -> None:

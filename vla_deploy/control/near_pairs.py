@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class NearPairs:
-    """Tell the distances of a geometry model's pairs up to `reach_m`, which stands for all beyond.
+    """Measure the distances of a geometry model's pairs; `reach_m` stands for all beyond it.
 
     `leaders` gives, for each of the model's joints, the column of a pose that moves it.
     """

@@ -88,7 +88,7 @@ class Nearby:
         return np.column_stack(columns)
 
     def _shows_body(self, points: Points, position: Floats) -> NDArray[np.bool_]:
-        """Tell which lidar points lie on arms that reach into the plane of the beams."""
+        """Return which lidar points lie on arms that reach into the plane of the beams."""
         centres, radii_m = self._body.balls(position)
         height_m = np.abs(centres[:, 2] - self._lidar[2])
         cut = height_m < radii_m + MASK_MARGIN_M

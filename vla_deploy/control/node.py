@@ -245,14 +245,14 @@ class ControlNode:
             self._telemetry.tell_results(self._motions.feel(torque_nm))
 
     def _ease_off(self, period_s: float) -> None:
-        """Let an arm that a contact has stopped not go on pressing on whoever it has met."""
+        """Stop an arm that has met a contact from pressing on."""
         torque_nm = self._judging.external_torque_nm
         if self._has_met and torque_nm is not None and self._modes.mode is Mode.STOPPED:
             self._joints.ease_off(torque_nm, period_s)
 
     @property
     def _has_met(self) -> bool:
-        """Tell whether it stands because it has met something, whatever else stops it too."""
+        """Return whether it stands because it has met something, whatever else stops it too."""
         verdicts = (self._judging.verdict, *self._judging.state.latched)
         return any(verdict.cause is Cause.COLLISION for verdict in verdicts)
 

@@ -26,12 +26,12 @@ class Resetting:
 
     @property
     def under_way(self) -> bool:
-        """Tell whether the judge is to be asked, or a joint still to be taken over."""
+        """Return whether the judge is to be asked, or a joint still to be taken over."""
         return self._until_ns is not None or bool(self._queue)
 
     @property
     def asks(self) -> bool:
-        """Tell whether the judge is to be asked."""
+        """Return whether the judge is to be asked."""
         return self._until_ns is not None
 
     def begin(self, now_ns: int, *, stopping: bool, met: bool) -> str:

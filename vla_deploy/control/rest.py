@@ -18,7 +18,7 @@ class Standstill:
         self._since_ns: int | None = None
 
     def reached(self, now_ns: int, *, setpoints_rest: bool, wheels_still: bool) -> bool:
-        """Tell whether the robot counts as at rest; call it in every tick."""
+        """Return whether the robot counts as at rest; call it in every tick."""
         if not setpoints_rest:
             self._since_ns = None
             return False

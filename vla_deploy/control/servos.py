@@ -121,7 +121,7 @@ class ServoLine:
 
     @property
     def watchdog_tripped(self) -> NDArray[np.bool_]:
-        """Tell which servos have stopped by themselves."""
+        """Return which servos have stopped by themselves."""
         return self.state.watchdog < 0
 
     @property

@@ -13,7 +13,7 @@ class StatusPace:
         self._told_tick: int | None = None
 
     def is_due(self, tick: int, matters: object, every_ticks: int) -> bool:
-        """Tell whether to publish in this tick; `matters` is what nobody may learn late."""
+        """Return whether to publish in this tick; `matters` is what nobody may learn late."""
         if self._told_tick is not None:
             gap_ticks = tick - self._told_tick
             is_news = matters != self._told and gap_ticks >= LEAST_GAP_TICKS

@@ -42,7 +42,7 @@ class Stopping:
         self._reaction = Reaction.NONE
 
     def is_exceeded_by(self, verdict: Verdict) -> bool:
-        """Tell whether a verdict asks for more than the stop that is under way."""
+        """Return whether a verdict asks for more than the stop that is under way."""
         return verdict.reaction > self._reaction
 
     def begin(self, verdict: Verdict) -> list[MotionResult]:

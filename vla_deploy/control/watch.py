@@ -138,7 +138,7 @@ def _age_s(command: Sample, now_ns: int) -> float:
 
 
 class BudgetWatch:
-    """Tell whether the supervisor's budgets demand a protective stop, and which."""
+    """Read whether the supervisor's budgets demand a protective stop, and which."""
 
     def __init__(self, cell: CellReader) -> None:
         self._cell = cell

@@ -107,17 +107,17 @@ class Wheels:
 
     @property
     def enabled(self) -> bool:
-        """Tell whether both drives follow the commanded speed."""
+        """Return whether both drives follow the commanded speed."""
         return self._bus is not None and not self.lost and self._bus.enabled
 
     @property
     def faulted(self) -> bool:
-        """Tell whether a drive is in a fault state."""
+        """Return whether a drive is in a fault state."""
         return self.state is not None and any(self.state.faulted)
 
     @property
     def still(self) -> bool:
-        """Tell whether the wheels stand, or cannot be driven any more."""
+        """Return whether the wheels stand, or cannot be driven any more."""
         if self.lost or self.state is None:
             return True
         return all(abs(speed) < _STILL_RAD_S for speed in self.state.velocity_rad_s.tolist())
@@ -169,7 +169,7 @@ class Wheels:
         self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
 
     def _attend(self, bus: DriveBus) -> None:
-        """Tell drives that were lost to stop for as long as nobody connects them anew.
+        """Command drives that were lost to stop until they are connected again.
 
         A drive that was late, and the one that was never lost, then brake as they are told; without
         our frames they would do so in a fault of their own that hides the cause.
@@ -181,7 +181,7 @@ class Wheels:
 
     @property
     def _dropped_out(self) -> bool:
-        """Tell whether drives that followed have ceased to, and nobody asked them to."""
+        """Return whether drives that followed have ceased to, and nobody asked them to."""
         return self._followed and not self.enabled and not self.faulted
 
     def _note_loss(self) -> None:

@@ -10,7 +10,7 @@ from vla_deploy.robots.description import CameraMounting, LensCalibration
 
 
 def camera_calibration(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell whether lens and mounting of the robot's camera were calibrated, and how well."""
+    """Return whether lens and mounting of the robot's camera were calibrated, and how well."""
     if context.robot is None:
         return
     name, camera = context.robot.name, context.robot.camera

@@ -23,7 +23,7 @@ def board(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def user(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell whose rights are examined: the service has its own user."""
+    """Report whose rights are examined: the service has its own user."""
     yield ok("examined as", "root" if context.rights.uid == 0 else f"user {context.rights.uid}")
 
 

@@ -18,7 +18,7 @@ _LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
 def dashboard(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Check settings, ports and certificate of whoever runs the robot on this computer."""
+    """Check settings, ports and certificate of the user who runs the robot on this computer."""
     base = default_base()
     file = config_dir_of(base) / SETTINGS_FILE
     try:

@@ -33,7 +33,7 @@ _OPTIONS: Final = "zgrep CGROUP /proc/config.gz   # what this kernel was built w
 
 
 def control_groups(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell the version, and for each controller whether its limit is real."""
+    """Return the version, and for each controller whether its limit is real."""
     cgroup = read_cgroup(context.tree)
     if cgroup.version != 2 or CONTROLLERS.keys().isdisjoint(cgroup.controllers):
         had = f"version {cgroup.version}" if cgroup.version else "none"

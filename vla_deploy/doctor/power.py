@@ -58,7 +58,7 @@ def _trips_c(tree: Tree, zone: str) -> Iterator[float]:
 
 
 def throttling(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell how often the supply made the board slow down since boot."""
+    """Return how often the supply made the board slow down since boot."""
     with open_probes(context.tree.root, nvml=False) as probes:
         readings = probes.read()
     known = [readings[f"throttle_count.{counter}"] for counter in THROTTLE_WORDS]

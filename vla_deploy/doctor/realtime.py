@@ -33,7 +33,7 @@ def _required(context: DoctorContext) -> bool:
 
 
 def preempt_rt(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell whether the kernel preempts everywhere."""
+    """Return whether the kernel preempts everywhere."""
     version = context.tree.text("/proc/version")
     if "PREEMPT_RT" in version:
         yield ok("kernel", "PREEMPT_RT")
@@ -119,7 +119,7 @@ def group_scheduling(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def has_group_scheduling(context: DoctorContext) -> bool | None:
-    """Tell whether the kernel has RT_GROUP_SCHED; None where it does not tell."""
+    """Return whether the kernel has RT_GROUP_SCHED; None where it does not tell."""
     if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
         return True
     options = _kernel_options(context)

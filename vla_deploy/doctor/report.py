@@ -18,7 +18,7 @@ _COMMENT: Final = "   # "
 
 
 def succeeded(sections: Sequence[Section]) -> bool:
-    """Tell whether nothing failed."""
+    """Return whether nothing failed."""
     return all(
         one.level is not FindingLevel.FAIL for section in sections for one in section.findings
     )

@@ -65,7 +65,7 @@ def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def usage(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell whether anything asks for ROS, and in which domain the robot would be."""
+    """Return whether anything asks for ROS, and in which domain the robot would be."""
     settings = _asked(context)
     if settings is None:
         why = "not in use: neither the robot file ([ros] enabled) nor the profile (ros) asks for it"
@@ -144,7 +144,7 @@ def _domain(settings: RosSettings) -> DoctorFinding:
 
 
 def _reach(settings: RosSettings) -> DoctorFinding:
-    """Tell who else can take part: DDS asks nobody for a password."""
+    """Report who else can take part: DDS asks nobody for a password."""
     name, peers = "ROS discovery", os.environ.get("ROS_STATIC_PEERS", "")
     can = {
         Accepts.ALL: "see the robot, and command it",

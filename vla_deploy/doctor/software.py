@@ -111,7 +111,7 @@ def open_gl(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def service(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Tell how the systemd unit is, if it is installed."""
+    """Return how the systemd unit is, if it is installed."""
     if not any(context.tree.exists(f"{folder}/{UNIT}") for folder in UNIT_FOLDERS):
         yield missing("service", f"{UNIT} is not installed", "sudo vla-deploy install")
         return

@@ -100,7 +100,7 @@ def _shape_text(
 
 
 def _same_shape(got: tuple[Dimension, ...], wanted: tuple[Dimension, ...]) -> bool:
-    """Tell whether shapes agree where both are numbers."""
+    """Return whether shapes agree where both are numbers."""
     return len(got) == len(wanted) and all(
         isinstance(one, str) or isinstance(other, str) or one == other
         for one, other in zip(got, wanted, strict=True)

@@ -34,7 +34,7 @@ _SHA256: Final = re.compile(r"[0-9a-f]{64}")
 
 
 def is_name(value: object) -> bool:
-    """Tell whether a value may name a model: it is a folder's name too."""
+    """Return whether a value may name a model: it is a folder's name too."""
     return isinstance(value, str) and _NAME.fullmatch(value) is not None
 
 
@@ -53,7 +53,7 @@ def _is_shape(value: object) -> bool:
 
 
 def _is_file_name(value: object) -> bool:
-    """Tell whether a value names a file below the model's folder."""
+    """Return whether a value names a file below the model's folder."""
     if not isinstance(value, str) or not value:
         return False
     path = PurePosixPath(value)

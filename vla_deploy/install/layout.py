@@ -34,7 +34,7 @@ class InstallLayout:
 
     @property
     def is_this_computer(self) -> bool:
-        """Tell whether this is the running system, not a folder that stands for one."""
+        """Return whether this is the running system, not a folder that stands for one."""
         return self.root == Path("/")
 
     @property
@@ -44,6 +44,6 @@ class InstallLayout:
 
     @property
     def is_installation(self) -> bool:
-        """Tell whether the prefix holds what `install` or a release has put there."""
+        """Return whether the prefix holds what `install` or a release has put there."""
         releases = self.on_disk(self.prefix / "releases")
         return self.on_disk(self.manifest).is_file() or any(releases.glob("*/bin/vla-deploy"))

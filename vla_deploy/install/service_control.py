@@ -36,7 +36,7 @@ class ServiceControl(Protocol):
         """
 
     def state(self) -> ServiceState:
-        """Tell its state.
+        """Return its state.
 
         Raises:
             CommandFailed: the service manager does not answer.
@@ -55,7 +55,7 @@ class SystemdService:
         run_command(["systemctl", "restart", self._unit])
 
     def state(self) -> ServiceState:
-        """Tell its state."""
+        """Return its state."""
         properties = "--property=ActiveState,MainPID,NRestarts,StatusText"
         text = run_command(["systemctl", "show", properties, self._unit])
         values = dict(line.split("=", 1) for line in text.splitlines() if "=" in line)

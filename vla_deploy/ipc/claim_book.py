@@ -17,7 +17,7 @@ _START_TIME_FIELD: Final = 19  # of /proc/<pid>/stat, counted behind the name
 
 
 class ClaimBook:
-    """Keep the claims in shared memory; whoever changes them excludes the others.
+    """Keep the claims in shared memory; one process at a time changes them.
 
     A claim belongs to the process that made it and ends with it, however it ends.
     """

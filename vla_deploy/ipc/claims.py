@@ -36,11 +36,11 @@ class Book:
         return sum(claim.wants.get(resource, 0) for claim in self.granted)
 
     def holds(self, holder: str) -> bool:
-        """Tell whether a holder was granted what it asked for."""
+        """Return whether a holder was granted what it asked for."""
         return any(claim.holder == holder for claim in self.granted)
 
     def waits(self, holder: str) -> bool:
-        """Tell whether a holder waits."""
+        """Return whether a holder waits."""
         return any(claim.holder == holder for claim in self.waiting)
 
 

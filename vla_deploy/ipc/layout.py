@@ -60,7 +60,7 @@ def payload_capacity(topic: Topic) -> int:
 
 
 def is_document(topic: Topic) -> bool:
-    """Tell whether a cell carries one bounded JSON text instead of packed fields."""
+    """Return whether a cell carries one bounded JSON text instead of packed fields."""
     return any(field.dtype == "json" for field in topic.fields)
 
 

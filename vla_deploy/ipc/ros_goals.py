@@ -53,7 +53,7 @@ class GoalState(StrEnum):
 
     @property
     def is_final(self) -> bool:
-        """Tell whether nothing more comes."""
+        """Return whether nothing more comes."""
         return self in _FINAL
 
 

@@ -112,7 +112,7 @@ def _open(path: Path) -> int:
 
 
 def _is_laid_out(fd: int, topic: Topic, layout: SlotLayout) -> bool:
-    """Tell whether the file is as expected: its header is written last, so nobody need be asked."""
+    """Return whether the file is as expected; its header is written last."""
     is_whole = os.fstat(fd).st_size == layout.file_bytes
     return is_whole and _header(fd) == _expected_header(topic, layout)
 

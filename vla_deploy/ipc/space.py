@@ -18,7 +18,7 @@ from vla_deploy.ipc.topics import TOPICS, Topic, TopicKind
 
 
 class SharedSpace:
-    """Give access to the shared memory of one run; files are made by whoever comes first.
+    """Give access to the shared memory of one run; the first process makes the files.
 
     Every method but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`; in
     a replay, which `is_replay` alone may write, every writer raises `ReplayOnly`.

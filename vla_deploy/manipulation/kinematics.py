@@ -41,7 +41,7 @@ class IkSolution:
 
     @property
     def is_exact(self) -> bool:
-        """Tell whether both errors are within tolerance."""
+        """Return whether both errors are within tolerance."""
         near = self.position_error_m <= POSITION_TOLERANCE_M
         return near and self.rotation_error_rad <= ROTATION_TOLERANCE_RAD
 

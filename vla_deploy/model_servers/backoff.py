@@ -25,7 +25,7 @@ class Backoff:
 
 
 def may_pass(error: ModelServerError) -> bool:
-    """Tell whether the same request may succeed a little later, and was not carried out."""
+    """Return whether the same request may succeed a little later, and was not carried out."""
     if isinstance(error, ServerUnreachable):
         return not error.was_sent
     return isinstance(error, ServerFailed)

@@ -37,7 +37,7 @@ class Chat:
 
     @property
     def has_images(self) -> bool:
-        """Tell whether any turn carries an image."""
+        """Return whether any turn carries an image."""
         return any(message.images for message in self.messages)
 
 

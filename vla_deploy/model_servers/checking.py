@@ -46,7 +46,7 @@ class ServerCheck:
 
     @property
     def is_ok(self) -> bool:
-        """Tell whether nothing that was tried failed."""
+        """Return whether nothing that was tried failed."""
         tried = (self.has_model, self.answers, self.sees)
         return self.is_reachable and all(one is not False for one in tried)
 

@@ -11,7 +11,7 @@ from vla_deploy.model_servers.errors import TimedOut
 class Deadline:
     """Hold when a call must have ended, and how long it was given.
 
-    It has ended at once when whoever set it sets `recall`: nobody waits for the answer any more.
+    It has ended at once when its owner sets `recall`: nobody waits for the answer any more.
     """
 
     clock: Clock
@@ -44,7 +44,7 @@ class Deadline:
 
     @property
     def is_recalled(self) -> bool:
-        """Tell whether nobody waits for the answer any more."""
+        """Return whether nobody waits for the answer any more."""
         return self.recall is not None and self.recall.is_set()
 
     @property

@@ -89,7 +89,7 @@ class ServerSettings(BaseModel):
 
     @property
     def is_local(self) -> bool:
-        """Tell whether the server is declared to run on this computer."""
+        """Return whether the server is declared to run on this computer."""
         return self.location is Location.LOCAL
 
     @property

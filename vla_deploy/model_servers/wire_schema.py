@@ -31,7 +31,7 @@ def wire_schema(schema: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_closed(schema: Mapping[str, Any]) -> bool:
-    """Tell whether every object of a reduced schema names its properties, as strict modes want."""
+    """Return whether every object of a reduced schema names its properties, for strict modes."""
     if schema.get("type") == "object" and "properties" not in schema:
         return False
     inner = [one for key in _NAMED for one in schema.get(key, {}).values()]

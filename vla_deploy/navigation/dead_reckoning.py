@@ -42,7 +42,7 @@ FROZEN_TURN_RAD = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryStep:
-    """Tell one dead-reckoned step in the base's frame, and its variances."""
+    """Hold one dead-reckoned step in the base's frame, and its variances."""
 
     motion: Pose2D
     duration_s: float
@@ -67,7 +67,7 @@ class DeadReckoning:
 
     @property
     def imu_is_frozen(self) -> bool:
-        """Tell whether the IMU kept to one yaw while the wheels turned the robot."""
+        """Return whether the IMU kept to one yaw while the wheels turned the robot."""
         return self._same_yaws >= FROZEN_SAMPLES and abs(self._turned_rad) > FROZEN_TURN_RAD
 
     def move(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> OdometryStep:
@@ -115,7 +115,7 @@ class DeadReckoning:
         )
 
     def speed(self) -> tuple[float, float]:
-        """Return how fast the base has moved (m/s) and turned (rad/s) of late, without signs."""
+        """Return how fast the base has just moved (m/s) and turned (rad/s), without signs."""
         if not self._history:
             return 0.0, 0.0
         now_ns = self._history[-1][0]

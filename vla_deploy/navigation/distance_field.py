@@ -14,7 +14,7 @@ _LONGEST_STRIDE_M = 1.0
 
 
 class DistanceField:
-    """Tell the signed distance to the nearest wall's surface (negative inside it) and its slope."""
+    """Hold the signed distance to the nearest wall's surface (negative inside it) and its slope."""
 
     def __init__(
         self, cells_m: NDArray[np.float32], resolution_m: float, origin_m: tuple[float, float]

@@ -104,7 +104,7 @@ class PathFollower:
         return math.copysign(max(rate, MIN_TURN_RATE_RAD_S), error_rad)
 
     def _at_end(self, position: NDArray[np.float64]) -> bool:
-        """Tell whether the end is reached, or was just passed."""
+        """Return whether the end is reached, or was just passed."""
         to_end = self._points[-1] - position
         distance_m = float(np.linalg.norm(to_end))
         if distance_m < POSITION_TOLERANCE_M:

@@ -79,7 +79,7 @@ class GlobalSearch:
 
     @property
     def finished(self) -> bool:
-        """Tell whether every heading has been tried, and every good place been fitted."""
+        """Return whether every heading has been tried, and every good place been fitted."""
         return self._unfitted == []
 
     @property

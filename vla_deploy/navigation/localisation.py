@@ -85,7 +85,7 @@ class Localiser:
 
     @property
     def is_anchored(self) -> bool:
-        """Tell whether scans have borne out a place since the start, or since it was lost."""
+        """Return whether scans have borne out a place since the start, or since it was lost."""
         return self._judge.is_anchored
 
     @property

@@ -238,7 +238,7 @@ def _read_by_opencv(path: Path, expected: str) -> Shades:
 
 
 def _has_transparent_cells(image: NDArray[Any] | None) -> bool:
-    """Tell whether some cell shows what is behind the image; cv2 gives four channels then."""
+    """Return whether some cell shows what is behind the image; cv2 gives four channels then."""
     if image is None or image.ndim < 3 or image.shape[2] < 4:
         return False
     opaque = np.iinfo(image.dtype).max

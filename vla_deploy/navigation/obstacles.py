@@ -21,7 +21,7 @@ def scan_points(ranges_m: NDArray[np.float64]) -> Points:
 def is_blocked(
     points: Points, mapped: NDArray[np.bool_], *, reach_m: float, radius_m: float
 ) -> bool:
-    """Tell whether a body of that radius meets a point within `reach_m` ahead.
+    """Return whether a body of that radius meets a point within `reach_m` ahead.
 
     `points` are (n, 2) with x along the motion; `mapped` marks those that the map shows too.
     """

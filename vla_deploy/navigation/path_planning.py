@@ -46,7 +46,7 @@ class PathPlanner:
         self._tolls: list[float] = tolls.ravel().tolist()
 
     def is_free(self, x_m: float, y_m: float) -> bool:
-        """Tell whether the body fits at a point of the map frame."""
+        """Return whether the body fits at a point of the map frame."""
         return self.room_m(x_m, y_m) >= self._radius_m
 
     def room_m(self, x_m: float, y_m: float) -> float:
@@ -55,7 +55,7 @@ class PathPlanner:
         return float(self._clearance_m[cell]) if self._inside(cell) else 0.0
 
     def is_mapped(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which of (n, 2) points of the map frame the map shows as blocked, or nearly."""
+        """Return which of (n, 2) points of the map frame the map shows as blocked, or nearly."""
         cells = np.floor((points - self._grid.origin_m) / self._grid.resolution_m).astype(np.intp)
         rows, columns = cells[:, 1], cells[:, 0]
         height, width = self._clearance_m.shape

@@ -59,7 +59,7 @@ DOUBT_TEXT: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScanVerdict:
-    """Tell what a scan says of the pose: the doubt that it casts, or none, and how well it fits."""
+    """Hold what a scan says of the pose: the doubt that it casts, or none, and how well it fits."""
 
     doubt: Doubt
     match_ratio: float
@@ -101,7 +101,7 @@ class PlaceJudge:
             self.doubt, self.is_anchored = Doubt.POOR_MATCH, True  # it fits no other place better
 
     def pass_time(self, now_ns: int, sigma_m: float, sigma_rad: float) -> None:
-        """Tell what is known when no scan says anything."""
+        """Return what is known when no scan says anything."""
         if self._good_ns is None:
             self._good_ns = now_ns
         if self.state is PlaceState.TRACKING and now_ns - self._good_ns > SILENT_NS:

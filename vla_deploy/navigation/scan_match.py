@@ -50,7 +50,7 @@ class ScanPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Match:
-    """Tell where a scan fits best.
+    """Hold where a scan fits best.
 
     `shift` (x, y, yaw) moves the pose, turning about itself; `covariance` (3, 3) is that of the
     moved pose. Ratios are shares of the scan's points: near a wall of the map, or beyond one.

@@ -46,7 +46,7 @@ class SurfaceField:
         self._average(points, distance_m)
 
     def is_known(self, points: Points) -> np.ndarray:
-        """Tell at which of (n, 2) points the field knows a surface near."""
+        """Return at which of (n, 2) points the field knows a surface near."""
         window = self._window
         if not window.shape[0]:
             return np.zeros(len(points), dtype=np.bool_)

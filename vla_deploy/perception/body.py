@@ -29,7 +29,7 @@ class _Balls:
 
 
 class BodyMask:
-    """Tell which pixels show the robot; shapes that carry the camera are left out."""
+    """Find which pixels show the robot; shapes that carry the camera are left out."""
 
     def __init__(self, robot: RobotDescription) -> None:
         path = str(robot.mjcf_path)

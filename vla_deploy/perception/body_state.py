@@ -31,7 +31,7 @@ class HandState:
 
 
 class BodyState:
-    """Tell how the body stood at a moment, from control's joint states."""
+    """Hold how the body stood at a moment, from control's joint states."""
 
     def __init__(self, robot: RobotDescription, model: RobotModel) -> None:
         """Read the body's shapes.

@@ -121,7 +121,7 @@ def upward_area(cloud: Cloud, stride: int = 1) -> Floats:
 
 
 def _on_one_surface(cloud: Cloud) -> Mask:
-    """Tell where the smoothing window crosses no edge in depth."""
+    """Return where the smoothing window crosses no edge in depth."""
     kernel = np.ones((SMOOTHING_PX + 2, SMOOTHING_PX + 2), dtype=np.uint8)
     depth = np.where(cloud.valid, cloud.depth_m, 0.0).astype(np.float32)
     nearest = cv2.erode(depth, kernel)

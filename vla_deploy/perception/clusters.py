@@ -51,14 +51,14 @@ class Cluster:
     occluded: bool
 
     def upper(self) -> Mask:
-        """Tell which points surely stand up; a low edge may show the support."""
+        """Return which points surely stand up; a low edge may show the support."""
         upper: Mask = self.heights > MIN_HEIGHT_M
         return upper if np.count_nonzero(upper) >= MIN_PIXELS else np.ones_like(upper)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Hidden:
-    """Tell how much of the outline, its top and its worse end borders on something nearer."""
+    """Hold how much of the outline, its top and its worse end borders on something nearer."""
 
     outline: float
     top: float
@@ -81,7 +81,7 @@ def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
 
 
 def _stands_up(heights: Floats, sigma_m: Floats, is_floor: bool) -> Mask:
-    """Tell which pixels are higher than their support, with the low edges of what is higher."""
+    """Return which pixels are higher than their support, with the low edges of what is higher."""
     lowest_m = MIN_HEIGHT_ON_FLOOR_M if is_floor else MIN_HEIGHT_M
     surely: Mask = heights > np.maximum(lowest_m, NOISE_SIGMAS * sigma_m)
     if is_floor:
@@ -95,7 +95,7 @@ def _stands_up(heights: Floats, sigma_m: Floats, is_floor: bool) -> Mask:
 
 
 def _belongs_to(higher: Support, lower: Support, points: Floats) -> Mask:
-    """Tell which points are part of, under, or on a higher surface."""
+    """Return which points are part of, under, or on a higher surface."""
     if np.allclose(higher.plane, lower.plane):
         return np.zeros(len(points), dtype=np.bool_)
     return inside(higher.outline, points, HIGHER_MARGIN_M)

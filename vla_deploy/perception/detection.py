@@ -83,14 +83,14 @@ def detect(
 
 
 def _is_floor_of(box: Detection, detection: Detection) -> bool:
-    """Tell whether this is the bottom of an open box, which shows between its walls."""
+    """Return whether this is the bottom of an open box, which shows between its walls."""
     inside = math.dist(box.position_m[:2], detection.position_m[:2]) < 0.5 * box.size_m[1]
     flat = detection.size_m[2] < BOX_FLOOR_M
     return detection is not box and inside and flat and detection.colour == box.colour
 
 
 def _is_bare_face(detection: Detection) -> bool:
-    """Tell whether this is one upright side of something larger, such as a sofa's arm."""
+    """Return whether this is one upright side of something larger, such as a sofa's arm."""
     _, width_m, height_m = detection.size_m
     return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
 

@@ -90,7 +90,7 @@ class Glance:
         )
 
     def shows_the_same(self, other: "Glance") -> bool:
-        """Tell whether two images show the same view of something that has contrast."""
+        """Return whether two images show the same view of something that has contrast."""
         plain = min(float(self.thumb.std()), float(other.thumb.std())) < PLAIN_LEVELS
         change = float(np.abs(self.thumb - other.thumb).mean())
         return not plain and change < SAME_LEVELS

@@ -45,7 +45,7 @@ class GeometryGrid:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether the grid is the image itself."""
+        """Return whether the grid is the image itself."""
         return self.camera == self.source
 
     def frame(self, frame: RgbdFrame) -> RgbdFrame:

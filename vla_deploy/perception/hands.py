@@ -26,7 +26,7 @@ class Hold:
 
     @property
     def is_lost(self) -> bool:
-        """Tell whether the hand lost what it was to hold, rather than putting it down."""
+        """Return whether the hand lost what it was to hold, rather than putting it down."""
         return not self.kind and self.touch.grip is Grip.LOST
 
     def document(self) -> dict[str, Any]:

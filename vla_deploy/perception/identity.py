@@ -23,7 +23,7 @@ ALIASES_KEPT = 3
 
 
 def may_be(elder: Track, newer: Track) -> bool:
-    """Tell whether `newer` may be the thing that was known as `elder`, brought elsewhere."""
+    """Return whether `newer` may be the thing that was known as `elder`, brought elsewhere."""
     if (elder.class_name, elder.colour) != (newer.class_name, newer.colour):
         return False
     sizes = [float(np.prod(np.maximum(one.size_m, 1e-3))) ** (1.0 / 3.0) for one in (elder, newer)]
@@ -40,7 +40,7 @@ def likeliest(elders: Iterable[Track], newer: Track) -> Track | None:
 
 
 def is_missing(track: Track) -> bool:
-    """Tell whether a known thing is not where it was, as far as a few looks can tell."""
+    """Return whether a known thing is not where it was, as far as a few looks can tell."""
     return bool(track.object_id) and track.misses >= MISSING_MISSES
 
 

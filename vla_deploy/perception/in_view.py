@@ -42,7 +42,7 @@ class Image:
 
 
 def view_of(place: Vector, size_m: Vector, image: Image, found: Sequence[Detection]) -> PlaceView:
-    """Tell whether the image shows a thing's place, in the base frame, with nothing in front of it.
+    """Return whether the image shows a thing's place (base frame) with nothing in front of it.
 
     What stands there and was found as nothing may well be the thing: that does not show its place
     without it.
@@ -69,7 +69,7 @@ def view_of(place: Vector, size_m: Vector, image: Image, found: Sequence[Detecti
 
 
 def _stands(beyond_m: float, place: Vector, size_m: Vector, found: Sequence[Detection]) -> bool:
-    """Tell whether something is where a thing was that no detection explains.
+    """Return whether something is where a thing was that no detection explains.
 
     A box around the place explains nothing: the thing may stand in it.
     """

@@ -70,7 +70,7 @@ def matrix_of(camera: Intrinsics) -> Array:
 
 
 def needs_flattening(camera: Intrinsics) -> bool:
-    """Tell whether the lens bends the image by more than a network can overlook."""
+    """Return whether the lens bends the image by more than a network can overlook."""
     return bool(camera.distortion) and _largest_shift_px(camera) > FLAT_ENOUGH_PX
 
 

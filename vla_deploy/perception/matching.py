@@ -56,7 +56,7 @@ def _still_costs(
 
 
 def _is_found(track: Track, sighting: Sighting) -> bool:
-    """Tell whether a sight shows a thing that was lost: it may be anywhere near, as much else is.
+    """Return whether a sight shows a thing that was lost: it may be anywhere near, as much else is.
 
     So nothing half seen, and nothing of another class or colour, is taken for it.
     """

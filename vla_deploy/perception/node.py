@@ -176,7 +176,7 @@ class PerceptionNode:
             self._publish_obstacles(1.0 / rate_hz)
 
     def _publish_obstacles(self, period_s: float) -> None:
-        """Tell what stands around the base; the stamp is that of the present pose."""
+        """Publish what stands around the base; the stamp is that of the present pose."""
         pose, now_ns = self._whereabouts.pose, self._clock.now_ns()
         points = self._looking.obstacles.around(pose, now_ns)
         padded = np.zeros((3, OBSTACLE_POINTS), dtype=np.float32)

@@ -121,7 +121,7 @@ def _across(xy: Floats, camera_position: Point) -> float:
 
 
 def inside_rectangle(xy: Floats, rectangle: Rectangle, margin_m: float) -> Mask:
-    """Tell which of (n, 2) points lie at least `margin_m` inside a rectangle."""
+    """Return which of (n, 2) points lie at least `margin_m` inside a rectangle."""
     c, s = math.cos(rectangle.yaw_rad), math.sin(rectangle.yaw_rad)
     half = 0.5 * np.array([rectangle.length_m, rectangle.width_m]) - margin_m
     local = np.abs((xy - rectangle.centre) @ np.array([[c, -s], [s, c]]))

@@ -45,7 +45,7 @@ class Support:
 
     @property
     def is_floor(self) -> bool:
-        """Tell whether this is the floor that the robot stands on."""
+        """Return whether this is the floor that the robot stands on."""
         middle = self.outline.mean(axis=0)
         return abs(self.height_m(float(middle[0]), float(middle[1]))) < FLOOR_M
 
@@ -80,7 +80,7 @@ def find_supports(cloud: Cloud, known: Sequence[KnownSurface] = ()) -> list[Supp
 
 
 def inside(outline: Floats, points: Floats, margin_m: float) -> Mask:
-    """Tell which of (n, 2 or 3) points lie within a convex outline widened by `margin_m`."""
+    """Return which of (n, 2 or 3) points lie within a convex outline widened by `margin_m`."""
     edges = np.roll(outline, -1, axis=0) - outline
     x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     within = np.ones(len(points), dtype=np.bool_)

@@ -39,7 +39,7 @@ class Sighting:
 
     @property
     def is_doubtful(self) -> bool:
-        """Tell whether a part of the thing is hidden, so that class and size are guesses."""
+        """Return whether a part of the thing is hidden, so that class and size are guesses."""
         return self.detection.truncated or self.detection.occluded
 
 

@@ -136,7 +136,7 @@ class Tracker:
         return min(near)[2] if near else None
 
     def _is_part(self, sighting: Sighting) -> bool:
-        """Tell whether this is a half-hidden part of a known thing, seen a second time."""
+        """Return whether this is a half-hidden part of a known thing, seen a second time."""
         seen = sighting.detection
         return seen.occluded and any(
             (track.class_name, track.colour) == (seen.class_name, seen.colour)
@@ -197,13 +197,13 @@ class Tracker:
 
 
 def _is_sure(sighting: Sighting) -> bool:
-    """Tell whether a sight is good enough to begin a track with."""
+    """Return whether a sight is good enough to begin a track with."""
     seen = sighting.detection
     return not (seen.truncated or (seen.occluded and seen.class_name == OTHER))
 
 
 def _is_believed(track: Track) -> bool:
-    """Tell whether enough looks agree on what a thing is."""
+    """Return whether enough looks agree on what a thing is."""
     return (
         track.seen_count >= CONFIRM_HITS and track.classes.share(track.class_name) > CONFIRM_SHARE
     )

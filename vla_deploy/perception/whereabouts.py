@@ -44,12 +44,12 @@ class Whereabouts:
 
     @property
     def is_lost(self) -> bool:
-        """Tell whether the pose says nothing about the map; it moves on with the wheels then."""
+        """Return whether the pose says nothing about the map; it moves on with the wheels then."""
         return self._localiser.state is PlaceState.LOST
 
     @property
     def is_borne_out(self) -> bool:
-        """Tell whether the lidar has agreed with the pose since the start, or since it was lost."""
+        """Return whether the lidar has agreed with the pose since the start, or since its loss."""
         return self._localiser.is_anchored
 
     def pose_at(self, stamp_ns: int) -> Pose2D:

@@ -71,7 +71,7 @@ class CannotBeDone(PlanningError):
 
 
 class NotAble(CannotBeDone):
-    """Say what the robot lacks for it, or that nothing such is there, whoever plans it."""
+    """Say what the robot lacks for it, or that nothing such is there, for any planner."""
 
 
 class Declined(PlanningError):

@@ -84,7 +84,7 @@ class World:
     is_free: IsFree | None = None
 
     def is_surface(self, name: str) -> bool:
-        """Tell whether one stands before furniture at a place itself, not elsewhere in the room."""
+        """Return whether one stands before furniture at a place, not elsewhere in the room."""
         site = self.sites.get(name)
         return site is not None and site.pose in site.viewpoints
 

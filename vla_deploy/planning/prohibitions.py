@@ -164,13 +164,13 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
 
 
 def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool:
-    """Tell whether a point of the map is at one of the places: no map says where rooms end."""
+    """Return whether a point of the map is at one of the places: no map says where rooms end."""
     poses = (site.pose for name, site in world.sites.items() if name in places)
     return any(math.dist(point, (one.x_m, one.y_m)) <= REACH_M for one in poses)
 
 
 def _may_be(text: str, words: str, scene: Snapshot | None) -> bool:
-    """Tell whether an action names a forbidden thing; one that is not seen may be, if it can."""
+    """Return whether an action names a forbidden thing; one that is not seen may be, if it can."""
     thing, asked, query = thing_of(text, scene), object_or_none(text), object_or_none(words)
     if asked is None or query is None:
         return False

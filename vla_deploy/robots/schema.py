@@ -31,7 +31,7 @@ class ValueCheck:
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Tell whether a value is a finite number; TOML's booleans are none."""
+    """Return whether a value is a finite number; TOML's booleans are none."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 

@@ -133,7 +133,7 @@ def _threads() -> list[int]:
 
 
 def _may_lock() -> bool:
-    """Tell whether all memory, also that of the future, may be locked: half a right would crash."""
+    """Return whether all memory, also future, may be locked: half a right would crash."""
     return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY or _may(
         _CAP_IPC_LOCK
     )

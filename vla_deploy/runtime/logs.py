@@ -188,7 +188,7 @@ def console_handler(stream: TextIO, process: str) -> logging.Handler:
 
 
 def journal_stream(environment: Mapping[str, str], fd: int) -> bool:
-    """Tell whether `fd` leads to the journal: systemd then names its device and inode."""
+    """Return whether `fd` leads to the journal: systemd then names its device and inode."""
     try:
         status = os.fstat(fd)
     except OSError:

@@ -16,5 +16,5 @@ def ask_power_off(run_dir: Path) -> None:
 
 
 def power_off_asked(run_dir: Path) -> bool:
-    """Tell whether a person switches the robot off."""
+    """Return whether a person switches the robot off."""
     return (run_dir / FILE_NAME).exists()

@@ -110,7 +110,7 @@ def _adapting(
 
 
 class _Announced:
-    """Say by a file that a node is started, for whoever waits for it."""
+    """Announce by a file that a node is started."""
 
     def __init__(self, name: str, node: Node, context: NodeContext) -> None:
         self._name = name

@@ -17,7 +17,7 @@ class RateMonitor:
 
     @property
     def ratio(self) -> float:
-        """Return the share of its steps that the node has made of late."""
+        """Return the share of its steps that the node makes, over about a hundred of them."""
         return min(1.0, 1.0 / self._periods_by_step)
 
     def note(self, now_ns: int, period_s: float) -> None:

@@ -9,7 +9,7 @@ from vla_deploy.safety.surroundings import Direction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """Tell one cause's numbers; NaN where no number applies.
+    """Hold one cause's numbers; NaN where no number applies.
 
     `speed_ratio` and `blocked` bound the base where the reaction leaves it moving.
     """

@@ -73,7 +73,7 @@ class SafetyState:
 
     @property
     def estop_latched(self) -> bool:
-        """Tell whether an emergency stop waits for its reset."""
+        """Return whether an emergency stop waits for its reset."""
         return any(verdict.cause is Cause.ESTOP for verdict in self.latched)
 
 

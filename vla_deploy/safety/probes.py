@@ -61,7 +61,7 @@ def encoder_jump(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 
 def jumped_joints(inputs: SafetyInputs, limits: SafetyLimits) -> Flags:
-    """Tell which powered joints `encoder_jump` finds: their setpoints are where no joint is."""
+    """Return which powered joints `encoder_jump` finds: their setpoints are where no joint is."""
     beyond: Flags = np.abs(inputs.position_step) > _possible_step(inputs, limits)
     return beyond & inputs.torque_enabled
 

@@ -27,7 +27,7 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZoneFinding:
-    """Tell of one zone that something is in.
+    """Describe one zone that something is in.
 
     `measured` is the distance of the nearest point and `limit` how far the zone reaches, both in m
     from the footprint; of an APPROACH zone the time until the base meets one, and the time that it
@@ -48,7 +48,7 @@ class ZoneFinding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeepOut:
-    """Tell how deep the base's footprint is within a keep-out area, and what leads deeper."""
+    """Hold how deep the base's footprint is within a keep-out area, and what leads deeper."""
 
     name: str
     depth_m: float
@@ -57,7 +57,7 @@ class KeepOut:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Excess:
-    """Tell which group is how far outside the workspace; the rate is positive on the way out."""
+    """Hold which group is how far outside the workspace; the rate is positive on the way out."""
 
     subject: str
     excess_m: float
@@ -66,7 +66,7 @@ class Excess:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clearance:
-    """Tell the smallest distance of a pair of bodies; a positive rate closes the gap.
+    """Hold the smallest distance of a pair of bodies; a positive rate closes the gap.
 
     `least_m` is how near this pair may come: less than all others' where it lay nearer when power
     came.

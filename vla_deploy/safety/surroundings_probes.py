@@ -125,7 +125,7 @@ def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 
 def _moves_by_itself(inputs: SafetyInputs) -> bool:
-    """Tell whether every joint has come under power: before that, limp arms may lie anywhere.
+    """Return whether every joint has come under power: before that, limp arms may lie anywhere.
 
     One that lets go later does not hide what the others do.
     """

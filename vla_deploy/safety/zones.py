@@ -62,7 +62,7 @@ class BaseMotion:
 
     @property
     def stands(self) -> bool:
-        """Tell whether the base is too slow for its motion to matter."""
+        """Return whether the base is too slow for its motion to matter."""
         return abs(self.v_m_s) < _STANDING_M_S and abs(self.w_rad_s) < _STANDING_RAD_S
 
 
@@ -80,7 +80,7 @@ IDLE = ZoneMemory()
 
 
 def inside(points: Points, polygon: Points) -> Mask:
-    """Tell which points lie inside a polygon, by counting the edges to their right."""
+    """Return which points lie inside a polygon, by counting the edges to their right."""
     x, y = points[:, 0, None], points[:, 1, None]
     here, there = polygon, np.roll(polygon, -1, axis=0)
     rise = there[:, 1] - here[:, 1]

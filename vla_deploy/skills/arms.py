@@ -36,7 +36,7 @@ class FingerTouch:
     effort_ratio: float
 
     def holds(self, effort_limit: float) -> bool:
-        """Tell whether something keeps the fingers apart under pressure."""
+        """Return whether something keeps the fingers apart under pressure."""
         pressing = self.effort_ratio > HELD_EFFORT_SHARE * effort_limit
         return self.short_of_goal_m > HELD_OPENING_M and pressing
 

@@ -38,7 +38,7 @@ ERRORS: Final[Mapping[GoalState, type[SkillFailed]]] = MappingProxyType(
 
 
 def server_drives(context: SkillContext) -> bool:
-    """Tell whether Nav2 drives the base to poses."""
+    """Return whether Nav2 drives the base to poses."""
     return context.ros is not None and context.robot.ros.is_driven_by_nav2
 
 

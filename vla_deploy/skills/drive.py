@@ -315,7 +315,7 @@ def _why_blind(context: SkillContext) -> str:
 
 
 def _leaves_free_floor(context: SkillContext, sign: float) -> bool:
-    """Tell whether a little further on the map leaves too little room, and less than here."""
+    """Return whether a little further on the map leaves too little room, and less than here."""
     pose = context.link.pose
     ahead, here = to_map(pose, sign * LOOK_AHEAD_M, 0.0), (pose.x_m, pose.y_m)
     planner = context.planner

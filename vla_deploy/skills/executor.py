@@ -114,12 +114,12 @@ class PlanExecution:
 
     @property
     def finished(self) -> bool:
-        """Tell whether every action has its final status."""
+        """Return whether every action has its final status."""
         return all(record.status in FINAL for record in self.records)
 
     @property
     def succeeded(self) -> bool:
-        """Tell whether every action succeeded."""
+        """Return whether every action succeeded."""
         return all(record.status is ActionStatus.SUCCEEDED for record in self.records)
 
     @property
@@ -268,7 +268,7 @@ class PlanExecution:
         return min(own_s, self._context.robot.planning.action_timeout_s)
 
     def _lacks_need(self, branch: _Branch, now_ns: int) -> bool:
-        """Tell whether to wait for what the world denies at first: one image may miss a thing.
+        """Return whether to wait for what the world denies at first: one image may miss a thing.
 
         Raises:
             PreconditionUnmet: the world still denies it.

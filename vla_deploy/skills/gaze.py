@@ -134,5 +134,5 @@ def watch_for(context: SkillContext, query: Query) -> Skill:
 
 
 def _looked(context: SkillContext, since_ns: int) -> bool:
-    """Tell whether perception has judged enough images taken after a moment to confirm things."""
+    """Return whether perception has judged enough images taken after a moment to confirm things."""
     return context.link.scene_stamp_ns > since_ns + round(CONFIRMED_S * NS_PER_S)

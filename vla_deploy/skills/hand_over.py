@@ -79,7 +79,7 @@ def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill
 
 
 def _is_pulled_on(context: SkillContext, hand: str, alone: Efforts) -> Generator[None, None, bool]:
-    """Tell, after a moment, whether the arm has felt a pull all the while that does not fade."""
+    """Return, after a moment, whether the arm has felt a pull all the while that does not fade."""
     until_ns = context.link.clock.now_ns() + round(PULLED_S * NS_PER_S)
     most = 0.0
     while context.link.clock.now_ns() < until_ns:

@@ -26,7 +26,7 @@ JOINT_AGE_S = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedMotion:
-    """Tell how a motion ended."""
+    """Hold how a motion ended."""
 
     status: str
     reason: str
@@ -150,7 +150,7 @@ class SkillLink:
 
     @property
     def is_blind(self) -> bool:
-        """Tell whether perception has just fallen silent: worth a wait before giving up."""
+        """Return whether perception has just fallen silent: worth a wait before giving up."""
         sample = self._pose.latest()
         return (
             sample is not None
@@ -212,7 +212,7 @@ class SkillLink:
 
     @property
     def is_paused(self) -> bool:
-        """Tell whether control has paused the robot by a protective stop, which ends by itself."""
+        """Return whether control has paused the robot by a protective stop, which ends itself."""
         status = self.control_status
         return status is not None and status["state"] == "protective_stop"
 

@@ -207,7 +207,7 @@ class ExecutorNode:
         )
 
     def _finish(self, why_no_other: str, success: bool = False) -> None:
-        """Tell how the command ended; of plans that failed, all that was done counts.
+        """Publish how the command ended; of plans that failed, all that was done counts.
 
         Where the world was against it, it is told what to do before, or instead.
         """

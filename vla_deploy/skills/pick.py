@@ -121,7 +121,7 @@ def _take(context: SkillContext, choice: GraspChoice, query: Query) -> Skill:
 
 
 def _already_held(context: SkillContext, query: Query) -> bool:
-    """Tell whether a hand holds what is meant: by the scene, or by kind where it cannot tell.
+    """Return whether a hand holds what is meant: by the scene, or by kind where it cannot tell.
 
     An id means one thing, and no other of its kind.
     """

@@ -16,7 +16,7 @@ class Recovery:
 
     @property
     def is_awaited(self) -> bool:
-        """Tell whether the executor waits for another plan."""
+        """Return whether the executor waits for another plan."""
         return self.until_ns > 0
 
     def may_go_on(self, further_plans: int) -> bool:
@@ -24,7 +24,7 @@ class Recovery:
         return self.plans <= further_plans
 
     def is_overdue(self, now_ns: int) -> bool:
-        """Tell whether it would come too late by now."""
+        """Return whether it would come too late by now."""
         return 0 < self.until_ns < now_ns
 
     def after(self, records: Sequence[ActionRecord]) -> "Recovery":

@@ -51,7 +51,7 @@ class SentGoal:
 
     @property
     def is_final(self) -> bool:
-        """Tell whether nothing more comes."""
+        """Return whether nothing more comes."""
         return self.state is not None and self.state.is_final
 
 
@@ -125,7 +125,7 @@ class RosGoals:
                 self.cancel(goal, reason)
 
     def is_ending(self, actor: str) -> bool:
-        """Tell whether a goal of an action is still being cancelled."""
+        """Return whether a goal of an action is still being cancelled."""
         return any(goal.actor == actor and not goal.is_final for goal in self._goals.values())
 
     def close(self) -> None:

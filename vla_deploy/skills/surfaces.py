@@ -76,7 +76,7 @@ def _around(
 
 
 def _fits(context: SkillContext, surface: Mapping[str, Any], x_m: float, y_m: float) -> bool:
-    """Tell whether a spot lies well within the seen surface and away from what stands on it."""
+    """Return whether a spot lies well within the seen surface and away from what stands on it."""
     spot = to_map(context.link.pose, x_m, y_m)
     outline = np.array(surface["polygon_m"], dtype=np.float32)
     if cv2.pointPolygonTest(outline, spot, measureDist=True) < EDGE_M:

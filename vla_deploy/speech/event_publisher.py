@@ -24,8 +24,8 @@ _LONGEST_OTHER: Final = 200
 class SpeechEvents:
     """Hold the ways out.
 
-    The robot asks again each time twice as seldom, until something is understood: whoever talks
-    near it, and not to it, is left alone.
+    The robot asks again each time twice as seldom, until something is understood: people who talk
+    near it, and not to it, are left alone.
     """
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:

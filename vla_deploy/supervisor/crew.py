@@ -91,7 +91,7 @@ class Crew:
         }
 
     def is_fresh(self, name: str) -> bool:
-        """Tell whether the running child's topic is young."""
+        """Return whether the running child's topic is young."""
         return self._readiness[name].is_fresh(self._children[name].pid)
 
     def examine(self, rate_ratios: Mapping[str, float]) -> dict[str, tuple[Vital, ...]]:

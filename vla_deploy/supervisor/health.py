@@ -88,7 +88,7 @@ class Health:
 
 
 def loop_troubles(gap_s: float, limits: HealthLimits) -> Iterator[str]:
-    """Tell whether the supervisor's own loop was held up."""
+    """Return whether the supervisor's own loop was held up."""
     if gap_s > limits.loop_age_s:
         yield f"supervisor: held up for {gap_s:.1f} s, limit {limits.loop_age_s:g} s"
 
@@ -96,7 +96,7 @@ def loop_troubles(gap_s: float, limits: HealthLimits) -> Iterator[str]:
 def tick_troubles(
     first: TickCount, last: TickCount, rate_hz: float, limits: HealthLimits
 ) -> Iterator[str]:
-    """Tell whether control ticks too seldom or too often late, once there is a whole window."""
+    """Return whether control ticks too seldom or too often late, once there is a whole window."""
     if last.now_ns - first.now_ns < WINDOW_NS:
         return
     ticks = last.tick - first.tick
@@ -110,14 +110,14 @@ def tick_troubles(
 
 
 def safety_troubles(status: Mapping[str, Any]) -> Iterator[str]:
-    """Tell whether ticks go by that safety has not judged."""
+    """Return whether ticks go by that safety has not judged."""
     unjudged = int(status["tick"]) - int(status["judged_tick"])
     if unjudged > _JUDGED_TICKS:
         yield f"safety: the last {unjudged} ticks were not judged, limit {_JUDGED_TICKS}"
 
 
 def bus_troubles(status: Mapping[str, Any]) -> Iterator[str]:
-    """Tell which buses have lost devices.
+    """Return which buses have lost devices.
 
     With the emergency stop latched nothing is told: a button may cut the power of the devices.
     """

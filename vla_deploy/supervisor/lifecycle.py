@@ -31,7 +31,7 @@ _SETTLED = (ProcessState.READY.value, ProcessState.OFF.value)
 
 
 def is_settled(table: Mapping[str, Any]) -> bool:
-    """Tell whether a published process table shows every process ready that should run."""
+    """Return whether a published process table shows every process ready that should run."""
     return bool(table["processes"]) and all(row["state"] in _SETTLED for row in table["processes"])
 
 
@@ -78,7 +78,7 @@ class ProcessSeen:
 
     @property
     def ended(self) -> bool:
-        """Tell whether nothing runs."""
+        """Return whether nothing runs."""
         return self.exit_code is not None or bool(self.refused)
 
 
@@ -163,7 +163,7 @@ def _end(
 
 
 def _lets_others_go(spec: ProcessSpec, record: ProcessRecord) -> bool:
-    """Tell whether those after it may start: not when it never worked at all, unless they can do
+    """Return whether those after it may start: not when it never worked at all, unless they can do
     without it."""
     dispensable = record.was_ready or spec.giving_up is GivingUp.CARRY_ON
     return record.state is ProcessState.READY or (

@@ -73,7 +73,7 @@ class NotifySocket:
 
 
 class Notifier:
-    """Tell systemd that the run is ready, in what state it is, and that it is in time.
+    """Notify systemd that the run is ready, in what state it is, and that it is in time.
 
     The watchdog is fed every second, at half its interval where that is shorter, and only while
     nothing is in trouble: so nearly the whole interval is left to a trouble that mends itself.
@@ -90,7 +90,7 @@ class Notifier:
         self._ready = False
 
     def step(self, *, ready: bool, stopping: bool, status: str, troubles: tuple[str, ...]) -> None:
-        """Tell what has changed; call it at every step."""
+        """Send what has changed; call it at every step."""
         now_ns = self._clock.now_ns()
         becomes_ready = ready and not stopping and not self._ready
         if becomes_ready:
@@ -103,11 +103,11 @@ class Notifier:
         self._feed(troubles, now_ns, stopping=stopping)
 
     def stopping(self) -> None:
-        """Tell that the run is coming to its end."""
+        """Send that the run is coming to its end."""
         self._socket.send(STOPPING="1")
 
     def reloading(self) -> None:
-        """Tell that a profile is being taken over; READY follows with the next step."""
+        """Send that a profile is being taken over; READY follows with the next step."""
         usec = self._clock.now_ns() // NS_PER_US
         self._socket.send(RELOADING="1", MONOTONIC_USEC=str(usec))
         self._ready = False

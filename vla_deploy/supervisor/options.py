@@ -51,7 +51,7 @@ class RunOptions:
 
     @property
     def takes_devices(self) -> bool:
-        """Tell whether device paths of the robot file are replaced."""
+        """Return whether device paths of the robot file are replaced."""
         return self.twin or self.devices_dir is not None
 
     def fill(self, command: tuple[str, ...], run_dir: Path) -> list[str]:

@@ -55,7 +55,7 @@ class ProfileChoice:
 
 
 def choice_of(runtime_base: Path | None) -> ProfileChoice:
-    """Return where the choice for the runs of a runtime directory is kept, whoever asks."""
+    """Return where the choice for the runs of a runtime directory is kept."""
     return ProfileChoice(library_dir_of(runtime_base or default_base()) / _NAME)
 
 

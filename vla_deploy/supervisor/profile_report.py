@@ -16,7 +16,7 @@ class ProfileReport:
     """Write the `profile_status` cell, and the log's line about each request."""
 
     def __init__(self, space: SharedSpace, clock: Clock, begun_with: str) -> None:
-        """Tell for the whole run which profile it has `begun_with`: the way back to an own file."""
+        """Report for the whole run which profile it has `begun_with`: the way back to a file."""
         self._begun_with = begun_with
         self._cell = space.cell_writer("profile_status")
         self._clock = clock

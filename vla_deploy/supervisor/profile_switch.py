@@ -286,7 +286,7 @@ class ProfileSwitch:
             self._on_change(profile)
 
     def _is_waiting(self, change: ProfileChange, restarting: tuple[str, ...] = ()) -> bool:
-        """Tell whether answers may still come; when it is too late for them, go back."""
+        """Return whether answers may still come; when it is too late for them, go back."""
         missing = (*change.silent, *restarting)
         if not missing:
             return False

@@ -23,11 +23,11 @@ class Readiness:
             path.unlink(missing_ok=True)
 
     def is_ready(self, pid: int) -> bool:
-        """Tell whether the instance `pid` has done all it promises."""
+        """Return whether the instance `pid` has done all it promises."""
         return all(path.exists() for path in self._files) and self.is_fresh(pid)
 
     def is_fresh(self, pid: int) -> bool:
-        """Tell whether its topic, if it has one, is young and written by `pid`."""
+        """Return whether its topic, if it has one, is young and written by `pid`."""
         if self._reader is None:
             return True
         sample = self._reader.latest()

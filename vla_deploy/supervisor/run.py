@@ -129,7 +129,7 @@ class Run:
             _log.warning("ended what a dead run had left: pids %s", self.runtime.orphans)
 
     def close(self) -> None:
-        """End whoever is left, keep the logs, remove the run, give the signals back."""
+        """End the children that are left, keep the logs, remove the run, restore the signals."""
         self.crew.kill_all()
         self.budgets.close()
         self.switch.close()
@@ -169,5 +169,5 @@ def _handle_stop_signals(on_stop_signal: Callable[[], None]) -> dict[signal.Sign
 
 
 def _is_ignored_hangup(number: int) -> bool:
-    """Tell whether whoever started this wants it to outlive the terminal, as nohup does."""
+    """Return whether this was started to outlive the terminal, as by nohup."""
     return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN

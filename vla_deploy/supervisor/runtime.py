@@ -38,7 +38,7 @@ class Owner:
     run_dir: str
 
     def is_alive(self) -> bool:
-        """Tell whether that very process still runs; one that nobody has reaped does not."""
+        """Return whether that very process still runs; one that nobody has reaped does not."""
         found = read_stat(self.pid)
         return found is not None and not found.ended and found.start_ticks == self.start_ticks
 
@@ -208,7 +208,7 @@ def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
 
 
 def _is_run(path: Path) -> bool:
-    """Tell a run from a folder of somebody who chose the wrong runtime directory."""
+    """Return whether a folder is a run's, and not of somebody who chose the wrong directory."""
     is_named_so = _RUN_ID.fullmatch(path.name) is not None
     return is_named_so and path.is_dir() and not path.is_symlink()
 

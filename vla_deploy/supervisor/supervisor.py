@@ -147,7 +147,7 @@ class Supervisor:
             _arm(self._run.space)
 
     def step(self) -> None:
-        """Look once, act once; whoever does not call `run_until_stopped` calls it every 50 ms."""
+        """Look once, act once; where `run_until_stopped` does not run, call it every 50 ms."""
         self._step(stopping=False)
 
     def run_until_stopped(self) -> None:

@@ -145,7 +145,7 @@ def _families(pids: Mapping[str, int]) -> dict[str, list[Instance]]:
 
 
 def _is_ours(pid: int, known: Mapping[int, ProcessStat]) -> bool:
-    """Tell whether a process is this one or descends from it: a pid may belong to another soon."""
+    """Return whether a process is this one or descends from it; a pid may be used again."""
     while pid in known:
         if pid == os.getpid():
             return True

@@ -88,7 +88,7 @@ class GraspAccess:
 
     @property
     def is_accessible(self) -> bool:
-        """Tell whether nothing is in the way."""
+        """Return whether nothing is in the way."""
         return not self.obstacles
 
     def document(self) -> dict[str, Any]:
@@ -203,7 +203,7 @@ def _discs(grasp: Grasp) -> Iterator[tuple[tuple[float, float], float, float]]:
 
 
 def _carries(thing: Thing, other: Thing) -> bool:
-    """Tell whether `other` is what a thing stands on, or stands on it: neither is beside it."""
+    """Return whether `other` is what a thing stands on, or stands on it: neither is beside it."""
     below = thing.rests is not None and (thing.rests.relation, thing.rests.of) == (
         ON, other.thing_id,
     )  # fmt: skip

@@ -13,7 +13,7 @@ ROUND_RATIO = 0.9
 
 
 def is_round(thing: Thing) -> bool:
-    """Tell whether a thing covers a circle rather than a rectangle."""
+    """Return whether a thing covers a circle rather than a rectangle."""
     length_m, width_m, _ = thing.size_m
     return thing.kind != "box" and min(length_m, width_m) >= ROUND_RATIO * max(length_m, width_m)
 

@@ -65,7 +65,7 @@ class Query:
     is_named: bool = field(default=False, compare=False)
 
     def fits(self, thing: Thing) -> bool:
-        """Tell whether a thing by itself is one of those meant, whatever is around it."""
+        """Return whether a thing by itself is one of those meant, whatever is around it."""
         if self.thing_id:
             return thing.is_called(self.thing_id)
         right_kind = self.kind in (ANY_CLASS, thing.kind)

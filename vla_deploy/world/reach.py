@@ -28,7 +28,7 @@ class Stand:
 
 
 def is_in_reach(point_m: Sequence[float]) -> bool:
-    """Tell whether the arms reach a point of the base frame from where the base stands."""
+    """Return whether the arms reach a point of the base frame from where the base stands."""
     x_m, y_m = point_m[0], point_m[1]
     return math.hypot(x_m, y_m) <= REACH_M[-1] and abs(y_m) <= MOST_ASIDE_M and x_m > LEAST_AHEAD_M
 

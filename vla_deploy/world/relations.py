@@ -48,14 +48,14 @@ Test = Callable[[Thing, Thing, Viewpoint | None], bool]
 
 
 def is_next_to(one: Thing, other: Thing, _: Viewpoint | None = None) -> bool:
-    """Tell whether two things stand side by side on one level, neither in nor on the other."""
+    """Return whether two things stand side by side on one level, neither in nor on the other."""
     if one.held_by or other.held_by or _carries(one, other) or _carries(other, one):
         return False
     return abs(one.bottom_m - other.bottom_m) < SAME_LEVEL_M and gap_m(one, other) < NEXT_TO_GAP_M
 
 
 def is_near(one: Thing, other: Thing, _: Viewpoint | None = None) -> bool:
-    """Tell whether two things are within half a metre, whatever they stand on."""
+    """Return whether two things are within half a metre, whatever they stand on."""
     return math.dist(one.position_m, other.position_m) < NEAR_M
 
 
@@ -121,7 +121,7 @@ def relations_of(snapshot: Snapshot, view: Viewpoint | None = None) -> Iterator[
 
 
 def is_under(thing: Thing, surface: Surface) -> bool:
-    """Tell whether a thing is below a surface, such as a ball under a table."""
+    """Return whether a thing is below a surface, such as a ball under a table."""
     below = surface.height_m - thing.top_m > UNDER_GAP_M
     return below and polygon_depth_m(thing.position_m, surface.polygon_m) > 0.0
 

@@ -57,7 +57,7 @@ class Thing:
         return self.position_m[:2]
 
     def is_called(self, name: str) -> bool:
-        """Tell whether a name is one of its ids."""
+        """Return whether a name is one of its ids."""
         return name == self.thing_id or name in self.aliases
 
     def __str__(self) -> str:
@@ -85,7 +85,7 @@ class Viewpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lost:
-    """Tell of a thing that is no longer where it was; its place is where it was last known."""
+    """Hold a thing that is no longer where it was; its place is where it was last known."""
 
     thing: Thing
     cause: str

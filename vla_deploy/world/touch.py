@@ -80,11 +80,11 @@ class Touch:
 
     @property
     def is_held(self) -> bool:
-        """Tell whether something is between the fingers."""
+        """Return whether something is between the fingers."""
         return self.grip in HELD
 
     def fits(self, size_m: tuple[float, float, float]) -> bool:
-        """Tell whether what is felt is as wide as one of a thing's sides across the floor."""
+        """Return whether what is felt is as wide as one of a thing's sides across the floor."""
         return min(abs(self.width_m - side_m) for side_m in size_m[:2]) <= FITS_M
 
 
@@ -167,7 +167,7 @@ def _since_s(then_ns: int, sample: FingerSample) -> float:
 
 
 def is_denied(hand: Mapping[str, object] | None, told: str | None) -> bool:
-    """Tell whether the fingers are sure not to hold what is told that they hold.
+    """Return whether the fingers are sure not to hold what is told that they hold.
 
     `hand` is as the scene tells it; a scene that does not know yet what is told denies nothing.
     """

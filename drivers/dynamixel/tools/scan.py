@@ -72,7 +72,7 @@ def scan_speed(
 
 
 def is_clash(link: BenchLink, servo_id: int) -> bool:
-    """Tell whether more than one servo answers to an id, by what two can never agree on.
+    """Return whether more than one servo answers to an id, by what two can never agree on.
 
     One clean answer is enough for a no, so that neither noise nor a late answer looks like a clash.
 

@@ -37,7 +37,7 @@ def at_rest() -> dict[str, float]:
 
 
 class EmptyFloor:
-    """Tell what perception tells, with nothing around at first, of the topics in `sees`."""
+    """Publish what perception tells, with nothing around at first, of the topics in `sees`."""
 
     period_s = 0.1
 

@@ -11,7 +11,7 @@ from vla_deploy.model_servers.settings import ServerSettings
 
 
 class SteppedClock:
-    """Tell the time that waits add up to; nobody really waits."""
+    """Count the time that waits add up to; nobody really waits."""
 
     def __init__(self) -> None:
         self.time_ns = NS_PER_S

@@ -48,7 +48,7 @@ def test_a_wrong_start_is_corrected_by_standing_still(flat: "TracedFlat", true: 
 
 
 def stays(localiser: Localiser, before: Pose2D) -> bool:
-    """Tell whether the pose is the same but for the IMU's drift, which is taken out all along."""
+    """Return whether the pose is the same but for the IMU's drift, which is taken out all along."""
     return localiser.pose.distance_m(before) < 1e-6 and localiser.pose.turn_rad(before) < 1e-3
 
 

@@ -157,7 +157,7 @@ class GraphLink:
         return named(self._others((one.node_name, one.node_namespace) for one in found))
 
     def caller(self, service: str) -> str:
-        """Return who has a client of a service beside us: whoever called it is among them."""
+        """Return who has a client of a service beside us: its caller is among them."""
         callers = []
         for name, namespace in self.node.get_node_names_and_namespaces():
             try:

@@ -122,7 +122,7 @@ def average_precision(scores: Iterable[float], hits: Iterable[bool], present: in
 
 
 def _hits(boxes: Boxes, truth: NDArray[np.float32]) -> list[bool]:
-    """Tell for each box, the surest first, whether it is the first on a thing."""
+    """Return for each box, the surest first, whether it is the first on a thing."""
     free = np.ones(len(truth), dtype=bool)
     hits = []
     for box in boxes.corners_px:

@@ -124,7 +124,7 @@ def _class_numbers(values: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def _is(dimension: Dimension, size: int) -> bool:
-    """Tell whether a dimension may have a size: one that is free may."""
+    """Return whether a dimension may have a size: one that is free may."""
     return isinstance(dimension, str) or dimension == size
 
 

@@ -126,7 +126,7 @@ class Steps:
 
 
 def is_seen(text: str, request: PlanRequest) -> bool:
-    """Tell whether something in the scene fits what shall be put."""
+    """Return whether something in the scene fits what shall be put."""
     context = CommandContext(request)
     try:
         read = context.read(text)

@@ -28,7 +28,7 @@ def plain_words(text: str) -> list[str]:
 
 
 def asks_about_speaker(words: Sequence[str]) -> bool:
-    """Tell whether words ask what their speaker may, shall or does: "can I stay up longer"."""
+    """Return whether words ask what their speaker may, shall or does: "can I stay up longer"."""
     return len(words) > 1 and words[0] in _ASKS and words[1] == "i"
 
 

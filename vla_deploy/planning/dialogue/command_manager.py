@@ -117,7 +117,7 @@ class CommandManager:
         return bool(self._active) or self._situation.is_executing
 
     def _forbids(self, command: UserCommand) -> bool:
-        """Tell whether a command forbids something for good, which is safe at once."""
+        """Return whether a command forbids something for good, which is safe at once."""
         if command.awaits_word:
             return False
         order = read_order(command.text, self._request(command).world, ())
@@ -418,7 +418,7 @@ class CommandManager:
 
 
 def _stands_still(done: PlannedCommand) -> bool:
-    """Tell whether what was planned begins with standing still, now."""
+    """Return whether what was planned begins with standing still, now."""
     plan = done.answer.plan
     return plan is not None and plan.actions[0].skill == "stop" and not done.awaits_word
 

@@ -85,7 +85,7 @@ class Situation:
 
     @property
     def is_executing(self) -> bool:
-        """Return whether the executor says that it carries out a plan, whoever gave it that."""
+        """Return whether the executor says that it carries out a plan, from any source."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
         return sample is not None and sample.document().get("state", "idle") != "idle"
 
@@ -153,7 +153,7 @@ class Situation:
 def recalled(
     store: MemoryStore | None, text: str | None
 ) -> tuple[tuple[str, ...], tuple[LastSeen, ...]]:
-    """Return what is remembered that fits a text, a sentence each, and where things were of late.
+    """Return what is remembered that fits a text, a sentence each, and where things were last.
 
     The newest comes first. A memory that cannot be read is done without.
     """

@@ -99,5 +99,5 @@ def _fitting(clause: str, request: PlanRequest) -> Step:
 
 
 def _is_known(name: str, request: PlanRequest) -> bool:
-    """Tell whether words name a place, or a thing, or are "there"."""
+    """Return whether words name a place, or a thing, or are "there"."""
     return name in _THERE or is_thing(name) or match_place(name, request.world.places) is not None

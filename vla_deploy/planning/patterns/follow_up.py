@@ -107,7 +107,7 @@ def corrected(
 
 
 def _tells_apart(words: str) -> bool:
-    """Tell whether words tell one thing from others without naming its kind."""
+    """Return whether words tell one thing from others without naming its kind."""
     if _OTHER.fullmatch(words):
         return True
     try:

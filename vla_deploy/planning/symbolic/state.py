@@ -55,7 +55,7 @@ class SymbolicState:
         return len(self.hands) - len(self.held)
 
     def holds(self, key: str) -> bool:
-        """Tell whether a hand holds that thing."""
+        """Return whether a hand holds that thing."""
         return any(one.key == key for one in self.held)
 
     def taking(self, held: HeldSymbol) -> "SymbolicState":

@@ -29,7 +29,7 @@ class MentionRole(StrEnum):
 
 
 class TurnOutcome(StrEnum):
-    """Tell how a turn ended, or that it has not."""
+    """Hold how a turn ended, or that it has not."""
 
     UNDER_WAY = "under way"
     SUCCEEDED = "succeeded"
@@ -115,7 +115,7 @@ class Question:
     limit_s: float = ANSWER_LIMIT_S
 
     def is_open(self, now_ns: int) -> bool:
-        """Tell whether an answer would still be taken."""
+        """Return whether an answer would still be taken."""
         return now_ns - self.asked_ns <= self.limit_s * NS_PER_S
 
 

@@ -64,7 +64,7 @@ class Expression:
 
     @property
     def is_compared(self) -> bool:
-        """Tell whether only the things around tell which one it is."""
+        """Return whether only the things around tell which one it is."""
         pointed = self.side or self.is_other or self.held_by
         return bool(pointed or self.is_superlative or self.besides)
 

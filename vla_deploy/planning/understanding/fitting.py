@@ -120,7 +120,7 @@ def fitting(read: Expression, use: ThingUse, context: CommandContext) -> list[Th
 
 
 def _suits(thing: Thing, use: ThingUse, query: Query, context: CommandContext) -> bool:
-    """Tell whether a thing can play its part: what is held is not taken, nor put upon."""
+    """Return whether a thing can play its part: what is held is not taken, nor put upon."""
     may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
     match use:
         case ThingUse.ONTO:

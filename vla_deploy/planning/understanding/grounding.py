@@ -224,7 +224,7 @@ class _Grounder:
             yield "hand_over", self._hand_of(self._held(thing)) or _arm(given)
 
     def _has_put(self, thing: Referent, destination: Parameters) -> bool:
-        """Tell whether the plan has put a thing there: "take it to the box, drop it in"."""
+        """Return whether the plan has put a thing there: "take it to the box, drop it in"."""
         rest = self._state.rests.get(self._key(thing))
         where = str(destination.get("destination", ""))
         subject = subject_or_none(where, self._request.scene)

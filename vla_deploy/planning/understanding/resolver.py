@@ -186,7 +186,7 @@ class Resolver:
         )
 
     def _can_be(self, one: Mention, use: ThingUse) -> bool:
-        """Tell whether what was mentioned can be meant: nothing is put upon itself."""
+        """Return whether what was mentioned can be meant: nothing is put upon itself."""
         if one.role is MentionRole.PLACE:
             return False
         if use is ThingUse.ONTO:
@@ -212,7 +212,7 @@ def _can_move(one: Mention, use: ThingUse) -> bool:
 
 
 def _needs_id(read: Expression) -> bool:
-    """Tell whether words alone would not find the same thing later, elsewhere."""
+    """Return whether words alone would not find the same thing later, elsewhere."""
     query = read.query
     pointed = read.is_compared or read.support or query.order or not query.is_named
     related = query.sizes or query.anchor is not None

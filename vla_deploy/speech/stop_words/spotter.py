@@ -20,7 +20,7 @@ ROLE: Final = "key_words"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spotted:
-    """Tell that a word was heard: `stamp_ns` is the end of the sound that settled it."""
+    """Hold that a word was heard: `stamp_ns` is the end of the sound that settled it."""
 
     word: str
     score: float

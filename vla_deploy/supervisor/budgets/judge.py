@@ -114,7 +114,7 @@ def _since(since_ns: int | None, holds: bool, now_ns: int) -> int | None:
 
 
 def lasts(since_ns: int | None, duration_s: float, now_ns: int) -> bool:
-    """Tell whether something has held for a while without a break."""
+    """Return whether something has held for a while without a break."""
     return since_ns is not None and now_ns - since_ns >= round(duration_s * NS_PER_S)
 
 

@@ -130,7 +130,7 @@ class BudgetKeeper:
         return Orders(suspended=self._suspended(), restart=restart)
 
     def _tell_board(self, snapshot: UsageSnapshot | None) -> None:
-        """Tell what was read last; old readings are told no more, so that they grow stale."""
+        """Publish what was read last; old readings are left out, so that they grow stale."""
         if snapshot is not None and not self._stale:
             self._board.put_document(board(snapshot.readings.values()))
 

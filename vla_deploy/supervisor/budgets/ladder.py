@@ -24,7 +24,7 @@ class Taken:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LadderMove:
-    """Tell that a step was taken or undone."""
+    """Hold that a step was taken or undone."""
 
     step: LadderStep
     taken: bool

@@ -23,11 +23,11 @@ class Line:
         return self.metric, self.process
 
     def is_beyond(self, value: float) -> bool:
-        """Tell whether a value breaks the limit."""
+        """Return whether a value breaks the limit."""
         return value < self.limit if self.at_least else value > self.limit
 
     def is_relieved(self, value: float, release_ratio: float) -> bool:
-        """Tell whether a value keeps so far from the limit that the excess is over."""
+        """Return whether a value keeps so far from the limit that the excess is over."""
         if self.at_least:
             return value >= self.limit / release_ratio
         return value <= self.limit * release_ratio

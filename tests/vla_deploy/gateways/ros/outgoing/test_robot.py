@@ -35,7 +35,7 @@ class Robot(ProcessStack):
         return self.begin("say", "--json", "--plan", str(plan))
 
     def is_driven(self) -> bool:
-        """Tell whether the wheels turn, but not how the arms move."""
+        """Return whether the wheels turn, but not how the arms move."""
         return max(map(abs, self.wheels_rad_s())) > MOVING_RAD_S
 
     def wheels_rad_s(self) -> list[float]:
@@ -44,7 +44,7 @@ class Robot(ProcessStack):
         return [joints[name]["velocity"] for name in ("left_wheel", "right_wheel")]
 
     def stands(self, timeout_s: float) -> bool:
-        """Tell whether the base comes to rest in time, of the twin's."""
+        """Return whether the base comes to rest in time, of the twin's."""
         return self.wait_until(
             lambda: max(map(abs, self.wheels_rad_s())) < STANDSTILL_RAD_S, timeout_s
         )
