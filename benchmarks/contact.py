@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from sim_twin.stack import LockstepStack
-from vla_deploy.control.contact_torque import ContactTorque
+from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.ipc import CellReader
 from vla_deploy.robots.model import RobotModel
 

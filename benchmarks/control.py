@@ -26,7 +26,7 @@ from benchmarks.spans import REST, Spans, Tally
 from benchmarks.stopwatch import answering
 from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepStack
-from vla_deploy.control import judging
+from vla_deploy.control.judging import safety_stage
 
 _COMMAND: Final = "pick up the red cup and put it in the box"
 _PARTS: Final[dict[str, tuple[str, ...]]] = {
@@ -98,7 +98,7 @@ def _instrument(spans: Spans, stack: LockstepStack) -> None:
         for path in paths:
             owner, _, name = path.rpartition(".")
             spans.wrap(part, attrgetter(owner)(control) if owner else control, name)
-    spans.wrap(_JUDGE, judging, "evaluate")
+    spans.wrap(_JUDGE, safety_stage, "evaluate")
     for owner, name in answering(stack.lockstep.twin):
         spans.wrap(_DEVICES, owner, name)
 

@@ -10,8 +10,8 @@ from drivers.imu.bno085_rvc import Bno085Rvc
 from drivers.lidar.ld19 import Ld19
 from platforms import load_profile
 from sim_twin.lockstep import Lockstep
-from vla_deploy.control.servos import ServoLine
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.output.servos import ServoLine
+from vla_deploy.control.output.wheels import Wheels
 
 PERIOD_S: Final = 0.004
 _SENSORS_EVERY: Final = 5

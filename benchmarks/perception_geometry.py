@@ -17,10 +17,10 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from training.detector.table_scenes import TableScene, Truth, draw_scenes
-from vla_deploy.perception.cloud import Cloud, make_cloud
-from vla_deploy.perception.detection import Detection, detect
-from vla_deploy.perception.geometry_grid import geometry_grid
-from vla_deploy.perception.supports import find_supports
+from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
+from vla_deploy.perception.geometry.geometry_grid import geometry_grid
+from vla_deploy.perception.geometry.supports import find_supports
+from vla_deploy.perception.images.detection import Detection, detect
 
 MATCH_M: Final = 0.08
 # Of a nearly square thing nobody can say which side is its length.

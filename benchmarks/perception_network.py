@@ -25,12 +25,12 @@ from training.detector.table_scenes import TableScene, draw_scenes
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.model_tools.detectors.benching import bench
-from vla_deploy.perception.classes import OTHER
-from vla_deploy.perception.detection import Detection, detect
 from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detector
-from vla_deploy.perception.geometry_grid import geometry_grid
-from vla_deploy.perception.network_view import NetworkView
-from vla_deploy.perception.supports import find_supports
+from vla_deploy.perception.geometry.geometry_grid import geometry_grid
+from vla_deploy.perception.geometry.supports import find_supports
+from vla_deploy.perception.images.detection import Detection, detect
+from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.naming.classes import OTHER
 from vla_deploy.runtime.state_dir import user_base
 
 FIRST_FRESH: Final = 20_000

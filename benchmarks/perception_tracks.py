@@ -21,11 +21,11 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
 from sim_twin.stack import LockstepStack
-from vla_deploy.perception.assignment import assign
-from vla_deploy.perception.detection import Detection
-from vla_deploy.perception.filtering import Estimate
-from vla_deploy.perception.track import Sighting
-from vla_deploy.perception.tracking import Tracker
+from vla_deploy.perception.images.detection import Detection
+from vla_deploy.perception.objects.assignment import assign
+from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.track import Sighting
+from vla_deploy.perception.objects.tracker import Tracker
 from vla_deploy.world import Snapshot, read_snapshot, relations_of
 
 JOB: Final = "pick up the red cup and put it in the box"

@@ -23,7 +23,7 @@ from sim_twin.probes import RangeProbe
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses
-from vla_deploy.control.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
 from vla_deploy.navigation.follower import AT_REST, DriveLimits, FollowerPhase, PathFollower, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.pose import Pose2D

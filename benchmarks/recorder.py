@@ -22,7 +22,7 @@ from benchmarks.command import parser, show
 from benchmarks.spans import REST, Spans
 from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepStack
-from vla_deploy.control.tick_recorder import TickRecorder
+from vla_deploy.control.judging.tick_recorder import TickRecorder
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.safety import SafetyInputs
 from vla_deploy.telemetry.folder import FlightFolder

@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.core import realtime
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from vla_deploy.supervisor.serial_workers import SerialWorkers
+from vla_deploy.supervisor.runs.serial_workers import SerialWorkers
 
 _BYTES: Final = bytes(64)
 _PERIOD_NS: Final = NS_PER_S // 250

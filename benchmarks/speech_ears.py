@@ -26,7 +26,7 @@ from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogni
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
 from vla_deploy.speech.sound import RATE_HZ, Sound, duration_ns
 from vla_deploy.speech.voice.tts import EspeakEngine
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 VOICES: Final = ("en-gb", "en-us", "en-gb-scotland", "en-gb-x-rp", "en-029")
 SENTENCES: Final = (

@@ -20,7 +20,7 @@ from benchmarks.live_robot import arm, live_robot
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
 from vla_deploy.cli.session import Session
-from vla_deploy.control.telemetry import TickClock
+from vla_deploy.control.reporting.telemetry import TickClock
 
 _PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
 _LOADS: Final = ("idle", "loaded")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from drivers.twin_page import TwinPace
 from sim_twin.campaigns import hog
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import TABLE, ProcessSpec
 

@@ -21,7 +21,7 @@ COMMANDS: Final = (
 """All are picking and placing, most of it where the robot stands; the box is some metres away.
 
 They ask for no answer: a thing that was seen from a wrong place may be remembered twice."""
-PUT_DOWN: Final = ("free your left hand", "free your right hand")
+PUT_DOWN: Final = tuple(f"put down the thing in your {hand} hand" for hand in ("left", "right"))
 """What a person says in turn to a robot that a kill has left with something in its hands.
 
 It may know no more than that there is something.

@@ -14,7 +14,7 @@ from sim_twin.campaigns.clock_shift import CannotShift, ClockShift
 from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.working_robot import WorkingRobot
 from vla_deploy.runtime.state_dir import state_dir_of
-from vla_deploy.supervisor.crash_reports import crash_folder
+from vla_deploy.supervisor.processes.crash_reports import crash_folder
 
 COOL_C: Final = 45.0
 _DISK: Final = "48m"

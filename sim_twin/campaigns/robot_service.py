@@ -14,8 +14,8 @@ from sim_twin.campaigns.strays import MARK, strays
 from sim_twin.service_runner import RunnerState, ServiceRunner
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
-from vla_deploy.supervisor.lifecycle import is_settled
-from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.processes.lifecycle import is_settled
+from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.service_times import RESTART_S, watchdog_s
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")

@@ -16,8 +16,8 @@ from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.referee import ask, told_hazards
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.lifecycle import is_settled
-from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.processes.lifecycle import is_settled
+from vla_deploy.supervisor.runs.runtime import running
 
 _START_S: Final = 120.0
 _END_S: Final = 40.0

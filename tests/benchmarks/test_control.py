@@ -1,10 +1,10 @@
 import json
 
 import pytest
+from vla_deploy.control.judging import safety_stage
 
 from benchmarks import control
 from benchmarks.control import main
-from vla_deploy.control import judging
 from vla_deploy.safety import evaluate
 
 STAGES = (
@@ -21,7 +21,7 @@ def test_the_report_shares_the_tick_out_to_its_parts(capsys: pytest.CaptureFixtu
     assert all(share > 0.0 for share in shares)
     assert report["total_ratio"] == pytest.approx(sum(shares))
     assert report["guarded_cost_ratio"] > 1.0
-    assert judging.evaluate is evaluate
+    assert safety_stage.evaluate is evaluate
 
 
 def test_the_report_tells_the_stages_of_each_kind_of_tick(

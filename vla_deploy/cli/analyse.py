@@ -17,7 +17,7 @@ from vla_deploy.cli.session import Session, attach
 from vla_deploy.dashboard.analysing import question_about
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 EXAMPLES: Final = """  vla-deploy analyse
   vla-deploy analyse --goal "pick up the red cup and put it in the box"

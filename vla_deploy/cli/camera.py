@@ -27,7 +27,7 @@ from vla_deploy.perception.camera_tools.board_pose import board_pose, depth_rati
 from vla_deploy.perception.camera_tools.hand_eye import HandEye, HeadView, fit_hand_eye
 from vla_deploy.perception.camera_tools.lens_fit import MODELS, LensFit, fit_lens
 from vla_deploy.perception.camera_tools.selecting import ViewSelection, select
-from vla_deploy.perception.rotation import angle_rad
+from vla_deploy.perception.geometry.rotation import angle_rad
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.camera_calibration import (
     LENS_FILE,

@@ -16,7 +16,7 @@ from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.model_tools.detectors.images import image_paths, read_image
 from vla_deploy.perception.camera_tools.board import CalibrationBoard, Image
-from vla_deploy.perception.history import JointHistory
+from vla_deploy.perception.objects.history import JointHistory
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import CameraDescription
 from vla_deploy.robots.model import full_positions

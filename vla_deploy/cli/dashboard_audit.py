@@ -14,7 +14,7 @@ from vla_deploy.cli.example import add_command
 from vla_deploy.dashboard.access.audit import AuditLog
 from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome
 from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 
 def register(acts: Any) -> None:

@@ -27,7 +27,7 @@ from vla_deploy.cli.run import add_robot_arguments, add_twin_arguments
 from vla_deploy.cli.session import Session
 from vla_deploy.client.action_words import action_words
 from vla_deploy.planning.knowledge import parse_object
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 
 COMMAND = "pick up the red cup and put it in the box"

@@ -17,8 +17,8 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.state_dir import models_dir_of
-from vla_deploy.supervisor.profile_choice import StartProfile, detect, start_profile
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.profiles.profile_choice import StartProfile, detect, start_profile
+from vla_deploy.supervisor.runs.runtime import default_base
 
 LIVE_ROOT = Path("/")
 FIRST_LOOK_S = 0.5  # what is counted needs two looks

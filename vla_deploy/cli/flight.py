@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import attach
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.flight import Flight, read_flight

@@ -25,8 +25,8 @@ from vla_deploy.speech.microphone import Microphone, linked
 from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing, sound_of
 from vla_deploy.speech.sound import Sound, count_of
-from vla_deploy.supervisor.profile_choice import start_profile
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.profiles.profile_choice import start_profile
+from vla_deploy.supervisor.runs.runtime import default_base
 
 _STEP_NS: Final = NS_PER_S // 50
 _AFTER_S: Final = 1.5

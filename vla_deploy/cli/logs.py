@@ -12,7 +12,7 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.runtime.state_dir import state_dir_of
-from vla_deploy.supervisor.log_files import (
+from vla_deploy.supervisor.runs.log_files import (
     LogLine,
     LogTail,
     as_line,
@@ -20,7 +20,7 @@ from vla_deploy.supervisor.log_files import (
     processes_in,
     read_log,
 )
-from vla_deploy.supervisor.runtime import default_base, old_logs, running
+from vla_deploy.supervisor.runs.runtime import default_base, old_logs, running
 
 EXAMPLES = """  vla-deploy logs                          all processes of the run, in order of time
   vla-deploy logs control --follow         one process, as it goes on

@@ -13,7 +13,7 @@ from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.memory import Episode, MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words, sentence_of
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "list": "  vla-deploy memory list\n",

@@ -31,8 +31,8 @@ from vla_deploy.model_tools.detectors.quantising import quantise
 from vla_deploy.model_tools.detectors.trial import empty_images
 from vla_deploy.model_tools.published import WHISPERS
 from vla_deploy.model_tools.verifying import ModelFinding, verify
-from vla_deploy.supervisor.profile_choice import start_profile
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.profiles.profile_choice import start_profile
+from vla_deploy.supervisor.runs.runtime import default_base
 
 _BENCH_IMAGES: Final = 32
 _BYTES_PER_MB: Final = 2**20

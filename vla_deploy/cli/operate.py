@@ -13,7 +13,7 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.client.acts import REACHED, Status, why_not
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.supervisor.runtime import default_base, running
+from vla_deploy.supervisor.runs.runtime import default_base, running
 
 WAIT_S = 5.0
 

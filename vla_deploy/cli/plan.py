@@ -23,7 +23,7 @@ from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 from vla_deploy.world import Snapshot, read_snapshot
 from vla_deploy.world.report import read_report
 

@@ -18,9 +18,9 @@ from vla_deploy.cli.session import Session, attach
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
 from vla_deploy.install.service_profile import slice_too_small
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profile_change import ChangeOutcome, ChangePhase
-from vla_deploy.supervisor.profile_choice import choice_of, detect, start_profile
-from vla_deploy.supervisor.runtime import default_base, running
+from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome, ChangePhase
+from vla_deploy.supervisor.profiles.profile_choice import choice_of, detect, start_profile
+from vla_deploy.supervisor.runs.runtime import default_base, running
 
 TIMEOUT_NS = 90 * NS_PER_S
 _BASE = "base"

@@ -14,7 +14,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun

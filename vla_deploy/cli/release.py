@@ -22,7 +22,7 @@ from vla_deploy.install.release_build import ReleaseSource, add_release, version
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import SystemdService
 from vla_deploy.install.switch import End, Switch, SwitchPlan, SwitchReport, recover
-from vla_deploy.supervisor.profile_choice import start_profile
+from vla_deploy.supervisor.profiles.profile_choice import start_profile
 
 EXAMPLES = """  vla-deploy release list
   sudo vla-deploy release add vla_deploy-0.2.0-py3-none-any.whl --wheelhouse wheels

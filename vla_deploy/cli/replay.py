@@ -14,8 +14,8 @@ from vla_deploy.cli.recorded_file import find_recorded
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE
 from vla_deploy.runtime.node import run_node
-from vla_deploy.supervisor.process import ChildProcess
-from vla_deploy.supervisor.runtime import Runtime, default_base
+from vla_deploy.supervisor.processes.process import ChildProcess
+from vla_deploy.supervisor.runs.runtime import Runtime, default_base
 from vla_deploy.telemetry.replay.node import ReplayNode
 from vla_deploy.telemetry.replay.source import Source
 

@@ -14,7 +14,7 @@ from vla_deploy.cli.recorded_file import find_recorded
 from vla_deploy.cli.session import attach
 from vla_deploy.cli.watched_run import watched_run
 from vla_deploy.runtime.node import run_node
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 from vla_deploy.telemetry.recording.request import RecordingWish, checked
 from vla_deploy.telemetry.recording.selection import Selection

@@ -15,8 +15,8 @@ from vla_deploy.cli.run_parameters import with_parameters
 from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.runtime.logs import journal_stream
 from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
-from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.profile_choice import start_profile
+from vla_deploy.supervisor.profiles.profile_choice import start_profile
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready

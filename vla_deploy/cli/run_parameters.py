@@ -32,8 +32,8 @@ from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOT_FILE, robot_file
 from vla_deploy.robots.overrides import OVERRIDES_FILE, read_overrides
 from vla_deploy.runtime.state_dir import config_dir_of
-from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.runtime import default_base, free_base
+from vla_deploy.supervisor.runs.options import RunOptions
+from vla_deploy.supervisor.runs.runtime import default_base, free_base
 
 DERIVED_DIR: Final = "with_parameters"
 _HEADER: Final = "# Derived from the parameters in {file}; the next start writes it anew.\n"

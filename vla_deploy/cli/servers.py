@@ -13,7 +13,7 @@ from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import CredentialMissing
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.model_servers.shelf import ServerShelf
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 EXAMPLES = """  vla-deploy servers list
   vla-deploy servers check                 reachable, how fast, has it the model, does it see

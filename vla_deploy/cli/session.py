@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import RingReader
-from vla_deploy.supervisor.runtime import default_base, running
+from vla_deploy.supervisor.runs.runtime import default_base, running
 
 POLL_NS = NS_PER_S // 50
 

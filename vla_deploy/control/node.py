@@ -7,28 +7,28 @@ from drivers.clock import NS_PER_S
 from drivers.errors import DriverError
 from drivers.opener import DeviceOpener
 from platforms import Profile
-from vla_deploy.control.arming import Arming
-from vla_deploy.control.axes import Flags, any_of
-from vla_deploy.control.base_output import BaseOutput
-from vla_deploy.control.dispatch import Dispatcher, axis_limits
-from vla_deploy.control.estop_button import EstopButton
-from vla_deploy.control.joint_output import JointOutput
-from vla_deploy.control.judging import Judging
-from vla_deploy.control.lowering import LOWERING_S
-from vla_deploy.control.modes import AT_REST_MODES, Modes
-from vla_deploy.control.motions import MotionSet
-from vla_deploy.control.operator_desk import OperatorAct, OperatorDesk
-from vla_deploy.control.payload import Payload
-from vla_deploy.control.resetting import Resetting
-from vla_deploy.control.rest import Standstill
-from vla_deploy.control.retuning import Tuning, retuned, tuning_of
-from vla_deploy.control.servos import ServoLine
-from vla_deploy.control.state_machine import Mode
-from vla_deploy.control.status import Status
-from vla_deploy.control.stopping import Stopping
-from vla_deploy.control.switching_off import SwitchingOff
-from vla_deploy.control.telemetry import Telemetry, TickClock
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.judging.estop_button import EstopButton
+from vla_deploy.control.judging.safety_stage import Judging
+from vla_deploy.control.modes.controlled_descent import LOWERING_S
+from vla_deploy.control.modes.modes import AT_REST_MODES, Modes
+from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorDesk
+from vla_deploy.control.modes.resetting import Resetting
+from vla_deploy.control.modes.retuning import Tuning, retuned, tuning_of
+from vla_deploy.control.modes.standstill import Standstill
+from vla_deploy.control.modes.state_machine import Mode
+from vla_deploy.control.modes.stopping import Stopping
+from vla_deploy.control.modes.switching_off import SwitchingOff
+from vla_deploy.control.motion.axes import Flags, any_of
+from vla_deploy.control.motion.dispatch import Dispatcher, axis_limits
+from vla_deploy.control.motion.motions import MotionSet
+from vla_deploy.control.output.arming import Arming
+from vla_deploy.control.output.base_output import BaseOutput
+from vla_deploy.control.output.joint_output import JointOutput
+from vla_deploy.control.output.payload import Payload
+from vla_deploy.control.output.servos import ServoLine
+from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.control.reporting.status import Status
+from vla_deploy.control.reporting.telemetry import Telemetry, TickClock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NodeContext

@@ -11,7 +11,7 @@ from vla_deploy.dashboard.tls import server_context
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, ok, warn
 from vla_deploy.runtime.state_dir import config_dir_of
-from vla_deploy.supervisor.runtime import default_base, running
+from vla_deploy.supervisor.runs.runtime import default_base, running
 
 _NAME: Final = "dashboard"
 _LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})

@@ -11,7 +11,7 @@ from vla_deploy.runtime.one_line import one_line
 from vla_deploy.runtime.state_dir import engines_dir_of
 from vla_deploy.speech.stop_words.listener import OFF
 from vla_deploy.speech.stop_words.spotter import open_spotter
-from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.runs.runtime import default_base
 
 NAME: Final = "spoken stop"
 

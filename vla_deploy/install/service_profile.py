@@ -6,7 +6,7 @@ from typing import Final
 
 from platforms import Profile
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
-from vla_deploy.supervisor.profile_choice import (
+from vla_deploy.supervisor.profiles.profile_choice import (
     ProfileChoice,
     StartProfile,
     choice_of,

@@ -12,9 +12,9 @@ from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.mapping import Mapper
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
-from vla_deploy.perception.body_state import BodyState
-from vla_deploy.perception.geometry_grid import geometry_grid
-from vla_deploy.perception.lens import ray_table
+from vla_deploy.perception.geometry.geometry_grid import geometry_grid
+from vla_deploy.perception.geometry.lens import ray_table
+from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
 

@@ -13,9 +13,9 @@ from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.perception.body_state import BodyState
-from vla_deploy.perception.eyes import Eyes, Network, open_network
-from vla_deploy.perception.looking import Looking
+from vla_deploy.perception.images.detector_worker import Eyes, Network, open_network
+from vla_deploy.perception.images.image_pipeline import Looking
+from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.perception.sensors import Sensors
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription

@@ -7,10 +7,10 @@ from typing import Any
 from drivers.clock import Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.budgets.sampler import UsageSnapshot
-from vla_deploy.supervisor.crew import Crew
-from vla_deploy.supervisor.lifecycle import ProcessRecord
-from vla_deploy.supervisor.liveness import Vital
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.processes.lifecycle import ProcessRecord
+from vla_deploy.supervisor.processes.liveness import Vital
+from vla_deploy.supervisor.processes.process_manager import Crew
+from vla_deploy.supervisor.runs.options import RunOptions
 
 _SUPERVISOR = "supervisor"
 _UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None, "cpu_s": None}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.supervisor.lifecycle import ABORT_GRACE_NS, delay_s, give_up_s
+from vla_deploy.supervisor.processes.lifecycle import ABORT_GRACE_NS, delay_s, give_up_s
 from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
 
 RESTART_S: Final = 2

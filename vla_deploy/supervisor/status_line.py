@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
 
 DEGRADED = "degraded"
 LATE = "not in time"

@@ -13,7 +13,6 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.runtime.power_off import ask_power_off
-from vla_deploy.supervisor.consequences import Consequences
 from vla_deploy.supervisor.errors import (
     DeviceAbsent,
     ProcessGivenUp,
@@ -21,8 +20,10 @@ from vla_deploy.supervisor.errors import (
     StartFailed,
     SupervisorError,
 )
-from vla_deploy.supervisor.last_words import complaint, last_words
-from vla_deploy.supervisor.lifecycle import (
+from vla_deploy.supervisor.notify import NotifyTarget, own_target
+from vla_deploy.supervisor.processes.failure_policy import Consequences
+from vla_deploy.supervisor.processes.last_words import complaint, last_words
+from vla_deploy.supervisor.processes.lifecycle import (
     Action,
     ProcessRecord,
     ProcessState,
@@ -30,12 +31,11 @@ from vla_deploy.supervisor.lifecycle import (
     reconcile,
     wind_down,
 )
-from vla_deploy.supervisor.liveness import Vital
-from vla_deploy.supervisor.notify import NotifyTarget, own_target
-from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.predicates import RunContext
-from vla_deploy.supervisor.profile_change import Member
-from vla_deploy.supervisor.run import Run
+from vla_deploy.supervisor.processes.liveness import Vital
+from vla_deploy.supervisor.processes.predicates import RunContext
+from vla_deploy.supervisor.profiles.profile_change import Member
+from vla_deploy.supervisor.runs.options import RunOptions
+from vla_deploy.supervisor.runs.run import Run
 from vla_deploy.supervisor.status_line import status_line
 from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
 

@@ -7,7 +7,7 @@ with the previous one start together, and stop together.
 from dataclasses import dataclass
 from enum import Enum
 
-from vla_deploy.supervisor.predicates import (
+from vla_deploy.supervisor.processes.predicates import (
     Predicate,
     all_of,
     always,

@@ -5,13 +5,18 @@ from collections import Counter
 import pytest
 
 from sim_twin.campaigns.kill_rules import (
+    COMMANDS,
     GRAVEST,
+    PUT_DOWN,
     RULES,
     SIGNALS,
     WITH_A_FULL_HAND,
     KillMoment,
     injections,
 )
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.patterns.backend import plan_command
+from vla_deploy.robots import load_robot
 
 
 def test_every_process_gets_every_signal() -> None:
@@ -49,3 +54,12 @@ def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
     assert pairs >= set(GRAVEST)
     assert carrying == set(WITH_A_FULL_HAND)
     assert max(one.after_s for one in drawn) <= 3.0
+
+
+@pytest.mark.parametrize(
+    ("text", "skill", "held"),
+    [(text, "pick_up", None) for text in COMMANDS] + [(text, "place", "object") for text in PUT_DOWN],
+)
+def test_what_the_robot_is_told_is_understood_by_patterns_alone(text, skill, held):
+    world = world_of(load_robot("butler"), {"left": held, "right": held})
+    assert skill in [action.skill for action in plan_command(text, world).actions]

@@ -10,7 +10,7 @@ from platforms import load_profile
 from sim_twin.can import MemoryBus
 from sim_twin.clock import SimClock
 from sim_twin.twin import Twin
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import load_robot
 
 TICK_NS = 4_000_000

@@ -23,7 +23,7 @@ from sim_twin.can import (
 )
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.power_stage import MotorSpec
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription, load_robot
 
 TICK_NS = 4_000_000

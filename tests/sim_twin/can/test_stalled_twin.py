@@ -17,7 +17,7 @@ from sim_twin.can import WheelDrive
 from sim_twin.engine import STEP_NS
 from sim_twin.priority import Priority
 from sim_twin.process import TwinOptions, TwinProcess
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import load_robot
 
 TICK_NS = 4_000_000

@@ -16,7 +16,7 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.cli.camera_images import from_robot
 from vla_deploy.cli.main import main
 from vla_deploy.perception.camera_tools.board import CalibrationBoard
-from vla_deploy.perception.lens import rays_of
+from vla_deploy.perception.geometry.lens import rays_of
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.robots.model import RobotModel, full_positions

@@ -12,7 +12,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.main import main
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.runtime import own_start_ticks
+from vla_deploy.supervisor.runs.runtime import own_start_ticks
 
 
 class Twin:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.supervisor.runtime import own_start_ticks
+from vla_deploy.supervisor.runs.runtime import own_start_ticks
 
 
 def line(process: str, stamp_ns: int, level: str = "INFO", **more: object) -> str:

@@ -9,7 +9,7 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.main import main
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profile_choice import (
+from vla_deploy.supervisor.profiles.profile_choice import (
     ProfileChoice,
     StartProfile,
     choice_of,

@@ -20,8 +20,8 @@ from vla_deploy.gateways.ros.parameters import (
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.supervisor.errors import AlreadyRunning
-from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.runtime import Runtime
+from vla_deploy.supervisor.runs.options import RunOptions
+from vla_deploy.supervisor.runs.runtime import Runtime
 
 KEY = "key-of-nobody"
 SERVERS = """

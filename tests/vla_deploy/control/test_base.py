@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.control.base_motion import BaseLimits, BaseRamp
-from vla_deploy.control.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.motion.base_motion import BaseLimits, BaseRamp
+from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
 
 DRIVE = DifferentialDrive(wheel_radius_m=0.1, track_m=0.4)
 LIMITS = BaseLimits(

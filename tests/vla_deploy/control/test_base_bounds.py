@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.control.base_motion import BaseLimits, permitted
+from vla_deploy.control.motion.base_motion import BaseLimits, permitted
 from vla_deploy.safety import Direction
 
 LIMITS = BaseLimits(

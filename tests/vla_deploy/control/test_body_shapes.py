@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vla_deploy.control.body_shapes import FLOOR, BodyShapes
+from vla_deploy.control.judging.body_shapes import FLOOR, BodyShapes
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import full_positions
 from vla_deploy.robots.protection import ClearanceLimits

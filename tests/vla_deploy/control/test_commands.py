@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.control.commands import (
+from vla_deploy.control.motion.commands import (
     Cancel,
     CommandRefused,
     JointGoal,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vla_deploy.control.contact_torque import FILTER_S, ContactTorque
+from vla_deploy.control.judging.contact_torque import FILTER_S, ContactTorque
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel, full_positions
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.dynamixel import BusState
-from vla_deploy.control.joint_steps import JointSteps
+from vla_deploy.control.output.joint_steps import JointSteps
 
 
 def told(stamp_ns: int, positions: list[float], valid: list[bool]) -> BusState:

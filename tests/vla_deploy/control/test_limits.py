@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.control.limits import SetpointGate
+from vla_deploy.control.output.limits import SetpointGate
 
 LOWER, UPPER, VELOCITY = np.array([-1.0, 0.0]), np.array([1.0, 0.04]), np.array([2.0, 0.08])
 PERIOD_S = 0.004

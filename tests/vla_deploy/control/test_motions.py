@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vla_deploy.control.axes import Axes, AxisLimits
-from vla_deploy.control.motions import Ending, MotionResult, MotionSet
-from vla_deploy.control.profile_motion import plan_motion
+from vla_deploy.control.motion.axes import Axes, AxisLimits
+from vla_deploy.control.motion.motions import Ending, MotionResult, MotionSet
+from vla_deploy.control.motion.profile_motion import plan_motion
 
 PERIOD_S = 0.004
 LIMITS = AxisLimits(velocity=np.full(3, 2.0), acceleration=np.full(3, 8.0), jerk=np.full(3, 80.0))

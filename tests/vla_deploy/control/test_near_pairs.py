@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from vla_deploy.control.body_shapes import BodyShapes
+from vla_deploy.control.judging.body_shapes import BodyShapes
 from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")

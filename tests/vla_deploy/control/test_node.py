@@ -11,8 +11,8 @@ import pytest
 from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
 from platforms import load_profile
-from vla_deploy.control.payload import PRESS_M
-from vla_deploy.control.servos import ServoLine
+from vla_deploy.control.output.payload import PRESS_M
+from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.description import StopCategory
 from vla_deploy.runtime.power_off import ask_power_off

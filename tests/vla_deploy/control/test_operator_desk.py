@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.operator_desk import (
+from vla_deploy.control.modes.operator_acts import (
     LATCHED_BEFORE,
     LOST,
     MOST_WAITING,

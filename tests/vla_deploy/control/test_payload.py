@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.payload import PRESS_M, PRESSING_RATIO, SHORT_OF_GOAL_M, Payload
+from vla_deploy.control.output.payload import PRESS_M, PRESSING_RATIO, SHORT_OF_GOAL_M, Payload
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 

@@ -8,8 +8,8 @@ import ruckig
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.control.axes import AxesState, AxisLimits, Floats
-from vla_deploy.control.profile_motion import MotionProfile, plan_motion, plan_stop
+from vla_deploy.control.motion.axes import AxesState, AxisLimits, Floats
+from vla_deploy.control.motion.profile_motion import MotionProfile, plan_motion, plan_stop
 
 LIMITS = AxisLimits(
     velocity=np.array([2.0, 1.0]), acceleration=np.array([8.0, 3.0]), jerk=np.array([60.0, 40.0])

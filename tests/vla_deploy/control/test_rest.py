@@ -5,8 +5,8 @@ from typing import Any as Rig  # the class in conftest.py, which no test can imp
 
 import pytest
 
-from vla_deploy.control.rest import TURN_ON_NS, Standstill
-from vla_deploy.control.wheels import Wheels
+from vla_deploy.control.modes.standstill import TURN_ON_NS, Standstill
+from vla_deploy.control.output.wheels import Wheels
 
 
 def test_rest_is_reached_at_once_where_the_wheels_stand() -> None:

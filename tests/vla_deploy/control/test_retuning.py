@@ -3,8 +3,8 @@ from dataclasses import replace
 import pytest
 
 from platforms import ProfileError, load_profile
-from vla_deploy.control.retuning import retuned, tuning_of
-from vla_deploy.control.telemetry import TickClock
+from vla_deploy.control.modes.retuning import retuned, tuning_of
+from vla_deploy.control.reporting.telemetry import TickClock
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.node import NeedsRestart
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from drivers.opener import PathOpener
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.control.estop_button import EstopButton
+from vla_deploy.control.judging.estop_button import EstopButton
 from vla_deploy.robots import load_robot
 
 

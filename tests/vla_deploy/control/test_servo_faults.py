@@ -8,7 +8,7 @@ from drivers.dynamixel.fault_policy import DEFAULT_RULES, FaultAction, FaultRule
 from sim_twin.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
-from vla_deploy.control.servo_faults import RULES, ServoFaults
+from vla_deploy.control.output.servo_faults import RULES, ServoFaults
 
 
 class Servos:

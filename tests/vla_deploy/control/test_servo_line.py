@@ -13,7 +13,7 @@ from platforms import load_profile
 from sim_twin.pty_line import PtyLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
-from vla_deploy.control.servos import ServoLine
+from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.robots import load_robot
 
 pytestmark = pytest.mark.stack

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.lockstep import Lockstep
 from sim_twin.servos import WireTiming
-from vla_deploy.control.servos import REOPEN_NS, ServoLine
+from vla_deploy.control.output.servos import REOPEN_NS, ServoLine
 from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
+from vla_deploy.control.modes.state_machine import Mode, ModeInputs, next_mode, status_name
 from vla_deploy.safety import Reaction
 
 CALM: dict[str, Any] = {

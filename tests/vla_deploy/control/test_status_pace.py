@@ -1,4 +1,4 @@
-from vla_deploy.control.status_pace import LEAST_GAP_TICKS, StatusPace
+from vla_deploy.control.reporting.status_pace import LEAST_GAP_TICKS, StatusPace
 
 EVERY = 12
 

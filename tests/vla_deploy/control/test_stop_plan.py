@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vla_deploy.control.gravity import GravityOffset, stiffness
-from vla_deploy.control.stop_plan import StopPlan
+from vla_deploy.control.modes.stop_plan import StopPlan
+from vla_deploy.control.output.gravity import GravityOffset, stiffness
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import StopCategory
 from vla_deploy.robots.model import RobotModel

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.control.setpoint_rates import SetpointRates
-from vla_deploy.control.surroundings import SurroundingsWatch
+from vla_deploy.control.judging.surroundings import SurroundingsWatch
+from vla_deploy.control.motion.setpoint_rates import SetpointRates
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.model import full_positions
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.status_document import verdict_document
-from vla_deploy.control.thresholds import safety_limits
-from vla_deploy.control.watch import BudgetWatch
+from vla_deploy.control.judging.input_collector import BudgetWatch
+from vla_deploy.control.judging.thresholds import safety_limits
+from vla_deploy.control.reporting.status_document import verdict_document
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.protection import NOTHING_DECLARED

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.control.telemetry import TickClock
+from vla_deploy.control.reporting.telemetry import TickClock
 
 PERIOD_S = 0.004
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.control.touch_guard import TouchGuard
+from vla_deploy.control.motion.touch_guard import TouchGuard
 
 BLOCKING_NM = 50.0
 JOINT = "left_shoulder_pitch"

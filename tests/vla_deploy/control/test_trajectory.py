@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.control.axes import AxesState, AxisLimits
-from vla_deploy.control.trajectory import Trajectory, TrajectoryRefused, plan_trajectory
+from vla_deploy.control.motion.axes import AxesState, AxisLimits
+from vla_deploy.control.motion.trajectory import Trajectory, TrajectoryRefused, plan_trajectory
 
 JOINTS = ("shoulder", "elbow")
 LIMITS = AxisLimits(velocity=np.full(2, 2.0), acceleration=np.full(2, 8.0), jerk=np.full(2, 80.0))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.control.wheel_tracking import WINDOW_NS, WheelTracking
+from vla_deploy.control.output.wheel_tracking import WINDOW_NS, WheelTracking
 
 TICK_NS = 4_000_000
 

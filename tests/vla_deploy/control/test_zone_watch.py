@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.control.zone_watch import reach_m, reaches_m
+from vla_deploy.control.judging.zone_watch import reach_m, reaches_m
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.protection import Zone, ZoneKind, ZoneSource
 from vla_deploy.safety.zones import IDLE, BaseMotion, Footprint, Points, judge_zone, moved

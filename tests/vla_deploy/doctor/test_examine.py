@@ -28,7 +28,7 @@ from vla_deploy.doctor.context import ask_command
 from vla_deploy.doctor.software import EGL_SCRIPT
 from vla_deploy.doctor.table import Check
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.profile_choice import choice_of
+from vla_deploy.supervisor.profiles.profile_choice import choice_of
 
 TREES = sorted(path.stem for path in (Path(__file__).parents[2] / "platforms/trees").glob("*"))
 GARBAGE = (b"", b"\xff\xfe\x00", b"-1\n", b"nan", b"9" * 5000, b"a b c\n\n:\n")

@@ -29,7 +29,7 @@ from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry_grid import GeometryGrid, geometry_grid
+from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel

@@ -1,6 +1,6 @@
 import pytest
 
-from vla_deploy.perception.belief import MOST_EVIDENCE, Belief
+from vla_deploy.perception.naming.class_fusion import MOST_EVIDENCE, Belief
 
 
 def of(*names: str, **weights: float) -> Belief:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vla_deploy.perception.colour import NAMES, colour_names, dominant_colour
+from vla_deploy.perception.naming.colour import NAMES, colour_names, dominant_colour
 
 PURE = {
     "red": (200, 15, 15),

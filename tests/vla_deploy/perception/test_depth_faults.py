@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.cloud import aim_sigma_rad, make_cloud
-from vla_deploy.perception.detection import Detection, detect
-from vla_deploy.perception.history import JointHistory
-from vla_deploy.perception.supports import find_supports
+from vla_deploy.perception.geometry.cloud import aim_sigma_rad, make_cloud
+from vla_deploy.perception.geometry.supports import find_supports
+from vla_deploy.perception.images.detection import Detection, detect
+from vla_deploy.perception.objects.history import JointHistory
 
 if TYPE_CHECKING:
     from conftest import StillFlat

@@ -17,7 +17,12 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
-from vla_deploy.perception.eyes import FAILURES_TO_DISMISS, DetectorAnswer, Eyes, open_network
+from vla_deploy.perception.images.detector_worker import (
+    FAILURES_TO_DISMISS,
+    DetectorAnswer,
+    Eyes,
+    open_network,
+)
 
 
 class HeldBack(Executor):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vla_deploy.perception.filtering import (
+from vla_deploy.perception.objects.filtering import (
     MOST_SIGMA_M,
     Estimate,
     carried,

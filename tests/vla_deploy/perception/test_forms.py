@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.perception.clusters import Cluster
-from vla_deploy.perception.forms import fit_lying, fit_upright
-from vla_deploy.perception.supports import Support
+from vla_deploy.perception.geometry.clusters import Cluster
+from vla_deploy.perception.geometry.forms import fit_lying, fit_upright
+from vla_deploy.perception.geometry.supports import Support
 
 CAMERA = np.array([0.0, 0.0, 1.2])
 TABLE_M = 0.5

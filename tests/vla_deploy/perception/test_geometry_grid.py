@@ -5,11 +5,11 @@ import pytest
 
 from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.cloud import make_cloud
 from vla_deploy.perception.detectors.boxes import Boxes
-from vla_deploy.perception.geometry_grid import GRID_PIXELS, geometry_grid
-from vla_deploy.perception.lens import ray_table
-from vla_deploy.perception.network_view import NetworkView
+from vla_deploy.perception.geometry.cloud import make_cloud
+from vla_deploy.perception.geometry.geometry_grid import GRID_PIXELS, geometry_grid
+from vla_deploy.perception.geometry.lens import ray_table
+from vla_deploy.perception.images.network_view import NetworkView
 
 BARREL = (-0.3, 0.1, 0.0, 0.0, 0.0)
 SIZES = [(321, 240), (512, 384), (640, 480), (848, 480), (1280, 720), (1920, 1200)]

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.body import BodyMask
-from vla_deploy.perception.cloud import Cloud, make_cloud
-from vla_deploy.perception.detection import Detection, Vector, detect
-from vla_deploy.perception.in_view import Image, PlaceView, view_of
-from vla_deploy.perception.supports import KnownSurface, counter_clockwise, find_supports
+from vla_deploy.perception.geometry.body import BodyMask
+from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
+from vla_deploy.perception.geometry.supports import KnownSurface, counter_clockwise, find_supports
+from vla_deploy.perception.images.detection import Detection, Vector, detect
+from vla_deploy.perception.objects.in_view import Image, PlaceView, view_of
 
 if TYPE_CHECKING:
     from conftest import StillFlat

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.body import BodyMask
-from vla_deploy.perception.cloud import make_cloud
-from vla_deploy.perception.lens import (
+from vla_deploy.perception.geometry.body import BodyMask
+from vla_deploy.perception.geometry.cloud import make_cloud
+from vla_deploy.perception.geometry.lens import (
     bent_boxes,
     flattened,
     matrix_of,

@@ -16,7 +16,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.map_file import LOW_SHADE, read_map_file
 from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.perception.lens import ray_table
+from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.map_recorder import MapRecorder
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import LensCalibration

@@ -2,8 +2,15 @@
 
 import pytest
 
-from vla_deploy.perception.classes import BYSTANDERS, OTHER, Form
-from vla_deploy.perception.naming import ClassVote, Name, NameSource, by_both, by_form, chance_of
+from vla_deploy.perception.naming.classes import BYSTANDERS, OTHER, Form
+from vla_deploy.perception.naming.object_name import (
+    ClassVote,
+    Name,
+    NameSource,
+    by_both,
+    by_form,
+    chance_of,
+)
 
 POOR, GOOD = 0.55, 0.95
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vla_deploy.perception.detectors.boxes import Boxes
-from vla_deploy.perception.naming import ClassVote
-from vla_deploy.perception.network_view import NetworkView
-from vla_deploy.perception.voices import Voice
+from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.naming.class_weighting import Voice
+from vla_deploy.perception.naming.object_name import ClassVote
 
 UNMEASURED = (Voice(class_name="cup"), Voice(class_name="ball"))
 MEASURED = tuple(

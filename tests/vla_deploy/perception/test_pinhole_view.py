@@ -8,9 +8,9 @@ import pytest
 from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.detectors.boxes import Boxes
-from vla_deploy.perception.network_view import NetworkView
-from vla_deploy.perception.pinhole_view import as_pinhole, in_image
-from vla_deploy.perception.voices import Voice
+from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.images.pinhole_view import as_pinhole, in_image
+from vla_deploy.perception.naming.class_weighting import Voice
 
 CAMERA = Intrinsics(
     width=320, height=240, fx=216.5, fy=216.5, cx=159.5, cy=119.5, distortion=(-0.3, 0.1, 0, 0, 0)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.perception.filtering import Estimate
-from vla_deploy.perception.hands import Hold
-from vla_deploy.perception.scene import Scene
-from vla_deploy.perception.track import Track
-from vla_deploy.perception.tracking import MAX_OBJECTS, VANISHED_KEPT
+from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.hands import Hold
+from vla_deploy.perception.objects.scene import Scene
+from vla_deploy.perception.objects.track import Track
+from vla_deploy.perception.objects.tracker import MAX_OBJECTS, VANISHED_KEPT
 from vla_deploy.world.thing import Rest
 from vla_deploy.world.touch import Grip, Touch
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.cloud import Cloud, make_cloud
-from vla_deploy.perception.supports import KnownSurface, Support, find_supports
+from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
+from vla_deploy.perception.geometry.supports import KnownSurface, Support, find_supports
 
 FOCAL_PX = 500.0
 ABOVE_M = 1.0

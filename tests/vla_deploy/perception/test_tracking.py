@@ -3,12 +3,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.perception.detection import Detection
-from vla_deploy.perception.filtering import Estimate
-from vla_deploy.perception.in_view import PlaceView
-from vla_deploy.perception.noise import covariance_of
-from vla_deploy.perception.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
-from vla_deploy.perception.tracking import Tracker
+from vla_deploy.perception.geometry.noise import covariance_of
+from vla_deploy.perception.images.detection import Detection
+from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.in_view import PlaceView
+from vla_deploy.perception.objects.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
+from vla_deploy.perception.objects.tracker import Tracker
 
 CLEAR, HIDDEN = PlaceView.CLEAR, PlaceView.HIDDEN
 

@@ -12,10 +12,16 @@ from vla_deploy.inference.manifest import (
     Measured,
     TensorLayout,
 )
-from vla_deploy.perception.class_names import OTHER_WORDS, known_as
-from vla_deploy.perception.classes import FURNITURE, OTHER, POSSIBLE, Form
-from vla_deploy.perception.naming import ClassVote, NameSource, by_both, by_form, chance_of
-from vla_deploy.perception.voices import Voice, voices_of
+from vla_deploy.perception.naming.class_names import OTHER_WORDS, known_as
+from vla_deploy.perception.naming.class_weighting import Voice, voices_of
+from vla_deploy.perception.naming.classes import FURNITURE, OTHER, POSSIBLE, Form
+from vla_deploy.perception.naming.object_name import (
+    ClassVote,
+    NameSource,
+    by_both,
+    by_form,
+    chance_of,
+)
 
 IMAGE = ImageInput(
     width_px=640,

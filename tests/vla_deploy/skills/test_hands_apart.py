@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.control.axes import AxesState
-from vla_deploy.control.body_shapes import BodyShapes
-from vla_deploy.control.dispatch import axis_limits
-from vla_deploy.control.profile_motion import plan_motion
+from vla_deploy.control.judging.body_shapes import BodyShapes
+from vla_deploy.control.motion.axes import AxesState
+from vla_deploy.control.motion.dispatch import axis_limits
+from vla_deploy.control.motion.profile_motion import plan_motion
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics

@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from vla_deploy.supervisor.notify import NotifyTarget
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import ProcessSpec, RestartPolicy
 

@@ -5,10 +5,10 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.crash_reports import CrashReports, signal_name, traceback_of
-from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
-from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.state_folder import BoundedFolder
+from vla_deploy.supervisor.processes.crash_reports import CrashReports, signal_name, traceback_of
+from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.runs.options import RunOptions
+from vla_deploy.supervisor.runs.state_folder import BoundedFolder
 
 STARTED = {"planner": (42, 1 * NS_PER_S)}
 

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
-from vla_deploy.supervisor.lifecycle import (
+from vla_deploy.supervisor.processes.lifecycle import (
     ABORT_GRACE_NS,
     ProcessAct,
     ProcessRecord,
@@ -15,7 +15,7 @@ from vla_deploy.supervisor.lifecycle import (
     reconcile,
     wind_down,
 )
-from vla_deploy.supervisor.predicates import twin_only
+from vla_deploy.supervisor.processes.predicates import twin_only
 from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RestartPolicy
 
 S = 1_000_000_000

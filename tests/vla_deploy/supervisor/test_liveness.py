@@ -6,7 +6,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.liveness import WINDOW_S, Liveness
+from vla_deploy.supervisor.processes.liveness import WINDOW_S, Liveness
 from vla_deploy.supervisor.table import TABLE, ProcessSpec, Watched
 
 PID = os.getpid()

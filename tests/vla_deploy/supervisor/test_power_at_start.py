@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from platforms.power_switch import PowerSwitch
-from vla_deploy.supervisor.power_at_start import set_at_start
+from vla_deploy.supervisor.profiles.power_at_start import set_at_start
 
 SECTION = "< POWER_MODEL ID={} NAME={} >\nTPC_POWER_GATING TPC_PG_MASK {}\n"
 

@@ -4,7 +4,7 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.predicates import (
+from vla_deploy.supervisor.processes.predicates import (
     RunContext,
     all_of,
     always,

@@ -4,7 +4,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.readiness import Readiness
+from vla_deploy.supervisor.processes.readiness import Readiness
 from vla_deploy.supervisor.table import ProcessSpec
 
 DEADLINE_S = 0.1  # what topics.py declares for base_state

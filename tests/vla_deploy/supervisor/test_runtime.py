@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
-from vla_deploy.supervisor.runtime import (
+from vla_deploy.supervisor.runs.runtime import (
     Owner,
     Runtime,
     default_base,
@@ -110,7 +110,8 @@ def test_runs_and_shared_memory_of_dead_supervisors_are_swept(tmp_path, shared):
 
 def test_the_shared_memory_of_a_living_supervisor_elsewhere_is_left_alone(tmp_path, shared):
     script = (
-        "import sys; from pathlib import Path; from vla_deploy.supervisor.runtime import Runtime;"
+        "import sys; from pathlib import Path;"
+        "from vla_deploy.supervisor.runs.runtime import Runtime;"
         "runtime = Runtime(Path(sys.argv[1]), Path(sys.argv[2]));"
         "print(runtime.ipc_dir, flush=True); sys.stdin.read()"
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.supervisor.serial_workers import PRIORITY, SerialWorkers
+from vla_deploy.supervisor.runs.serial_workers import PRIORITY, SerialWorkers
 
 needs_real_time = pytest.mark.skipif(
     os.geteuid() != 0, reason="needs the right to real-time scheduling"

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.supervisor.health import HealthLimits
-from vla_deploy.supervisor.lifecycle import give_up_s
 from vla_deploy.supervisor.notify import FEED_EVERY_NS
+from vla_deploy.supervisor.processes.lifecycle import give_up_s
 from vla_deploy.supervisor.service_times import (
     RESTART_S,
     START_BURST,

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from platforms import load_profile
-from vla_deploy.supervisor.start_settings import nice_of, thread_limits
+from vla_deploy.supervisor.runs.start_settings import nice_of, thread_limits
 
 
 def test_a_process_that_no_profile_speaks_of_is_as_others_are():

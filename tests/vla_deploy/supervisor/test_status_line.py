@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.supervisor.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
 from vla_deploy.supervisor.status_line import status_line, trouble_in, with_late
 
 READY = ProcessRecord(state=ProcessState.READY)

@@ -15,8 +15,8 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.supervisor.errors import ProcessGivenUp
 from vla_deploy.supervisor.notify import NotifyTarget
-from vla_deploy.supervisor.predicates import twin_only
-from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.processes.predicates import twin_only
+from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import GivingUp, Watched
 
@@ -270,7 +270,7 @@ def test_children_know_nothing_of_systemd(stage, monkeypatch, step_until):
 HELD = """
 import sys
 from pathlib import Path
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import ProcessSpec
 child, events, base, last = sys.argv[1:]

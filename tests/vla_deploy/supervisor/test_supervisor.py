@@ -10,7 +10,7 @@ import pytest
 
 from platforms import ProfileError
 from vla_deploy.supervisor.errors import AlreadyRunning, DeviceAbsent, StartCrashed, StartFailed
-from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
 
 pytestmark = pytest.mark.stack
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.stack
 RUN_FOREVER = """
 import sys
 from pathlib import Path
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import ProcessSpec
 child, events, base = sys.argv[1:]

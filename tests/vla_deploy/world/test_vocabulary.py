@@ -1,6 +1,6 @@
 from vla_deploy.manipulation.grasps import GRASP_RULES
-from vla_deploy.perception.classes import RULES
-from vla_deploy.perception.colour import NAMES
+from vla_deploy.perception.naming.classes import RULES
+from vla_deploy.perception.naming.colour import NAMES
 from vla_deploy.world.vocabulary import COLOURS, CONTAINERS, OBJECT_CLASSES, SYNONYMS
 
 

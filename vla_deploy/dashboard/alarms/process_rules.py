@@ -6,7 +6,7 @@ from typing import Final
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Document, Told
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.supervisor.lifecycle import ProcessState
+from vla_deploy.supervisor.processes.lifecycle import ProcessState
 from vla_deploy.supervisor.table import TABLE, GivingUp
 
 GIVEN_UP: Final[Mapping[GivingUp, Severity]] = {

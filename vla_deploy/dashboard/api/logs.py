@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from vla_deploy.dashboard.access import Role, require
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.runtime.logs import LOGS_DIR
-from vla_deploy.supervisor.log_files import newest_lines, processes_in
+from vla_deploy.supervisor.runs.log_files import newest_lines, processes_in
 
 router = APIRouter(tags=["logs"], dependencies=[Depends(require(Role.VIEWER))])
 

@@ -12,7 +12,7 @@ from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
 from vla_deploy.dashboard.access import Role, note, require
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.supervisor.profile_choice import detect
+from vla_deploy.supervisor.profiles.profile_choice import detect
 
 router = APIRouter(prefix="/profile", tags=["profile"])
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Frame, SharedSpace
-from vla_deploy.perception.lens import project
+from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematic_tree import KinematicTree
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages
-from vla_deploy.perception.lens import matrix_of, project
+from vla_deploy.perception.geometry.lens import matrix_of, project
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,7 +16,7 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.board_pose import board_pose, placed, rms
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
-from vla_deploy.perception.lens import project
+from vla_deploy.perception.geometry.lens import project
 
 MIN_VIEWS: Final = 6
 # Turns about one axis alone leave the place along it open.

@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 from drivers.clock import NS_PER_S, Clock
 from platforms.probes import Reading
-from vla_deploy.supervisor.usage import Usage, UsageMeter
+from vla_deploy.supervisor.processes.usage import Usage, UsageMeter
 
 SAMPLE_PERIOD_S: Final = 0.5
 KEPT_SNAPSHOTS: Final = 64

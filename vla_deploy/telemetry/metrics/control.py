@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.control.state_machine import CONTROL_STATES
+from vla_deploy.control.modes.state_machine import CONTROL_STATES
 from vla_deploy.safety import Cause, Reaction
 from vla_deploy.telemetry.metrics.kinds import Kind, Metric
 from vla_deploy.telemetry.metrics.paths import Among, Each, Joints, keys, same

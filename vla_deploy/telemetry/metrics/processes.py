@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.supervisor.lifecycle import ProcessState
+from vla_deploy.supervisor.processes.lifecycle import ProcessState
 from vla_deploy.telemetry.metrics.kinds import Kind, Metric
 from vla_deploy.telemetry.metrics.paths import Each, Named, Path, Rows, keys, same
 from vla_deploy.telemetry.metrics.takes import column, count_of, is_empty, share_of_limit

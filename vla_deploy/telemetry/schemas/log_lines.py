@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from vla_deploy.supervisor.log_files import LogTail, processes_in
+from vla_deploy.supervisor.runs.log_files import LogTail, processes_in
 from vla_deploy.telemetry.schemas.geometry import time_json
 
 _LEVELS: Final[Mapping[str, int]] = {

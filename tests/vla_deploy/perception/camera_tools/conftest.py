@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import CalibrationBoard
-from vla_deploy.perception.lens import rays_of
+from vla_deploy.perception.geometry.lens import rays_of
 
 Array = NDArray[np.float64]
 BOARD = CalibrationBoard()

@@ -13,7 +13,7 @@ from vla_deploy.perception.camera_tools.board import BoardView, CalibrationBoard
 from vla_deploy.perception.camera_tools.board_pose import board_pose, depth_ratio
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.hand_eye import HeadView, fit_hand_eye
-from vla_deploy.perception.lens import project
+from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel, full_positions
 

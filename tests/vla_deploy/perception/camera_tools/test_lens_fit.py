@@ -12,7 +12,7 @@ from vla_deploy.perception.camera_tools.board import BoardView, CalibrationBoard
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.lens_fit import fit_lens
 from vla_deploy.perception.camera_tools.selecting import ViewSelection, select
-from vla_deploy.perception.lens import project, rays_of
+from vla_deploy.perception.geometry.lens import project, rays_of
 
 if TYPE_CHECKING:
     from conftest import BoardCamera

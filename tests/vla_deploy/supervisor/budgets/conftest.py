@@ -12,7 +12,7 @@ from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, UsageSnapshot
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
-from vla_deploy.supervisor.usage import Usage
+from vla_deploy.supervisor.processes.usage import Usage
 
 
 class StepClock:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import ProcessSpec
 

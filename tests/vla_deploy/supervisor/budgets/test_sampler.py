@@ -7,9 +7,9 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from platforms.probes import Reading
-from vla_deploy.supervisor import proc_files
 from vla_deploy.supervisor.budgets import BackgroundSampler
-from vla_deploy.supervisor.proc_files import read_all_stats
+from vla_deploy.supervisor.processes import proc_files
+from vla_deploy.supervisor.processes.proc_files import read_all_stats
 
 HEAT = Reading(name="temperature_c", value=50.0, unit="degC", reason="")
 

@@ -18,9 +18,9 @@ from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NeedsRestart, Node
 from vla_deploy.runtime.reconfigurable_node import ReconfigurableNode
 from vla_deploy.skills.node import ExecutorNode
-from vla_deploy.supervisor.profile_change import Member
-from vla_deploy.supervisor.profile_choice import ProfileChoice
-from vla_deploy.supervisor.profile_switch import ProfileSwitch
+from vla_deploy.supervisor.profiles.profile_change import Member
+from vla_deploy.supervisor.profiles.profile_choice import ProfileChoice
+from vla_deploy.supervisor.profiles.profile_switch import ProfileSwitch
 
 
 class StepClock:

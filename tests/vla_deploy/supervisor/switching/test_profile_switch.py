@@ -5,7 +5,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.runtime.node import NeedsRestart
-from vla_deploy.supervisor.profile_change import Member
+from vla_deploy.supervisor.profiles.profile_change import Member
 
 NAMES = ("control", "perception", "planner", "executor")
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.control.axes import Floats
+from vla_deploy.control.motion.axes import Floats
 
 SLOWEST_S = 0.008
 

@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel.counters import BusCounters
 from drivers.latency import LatencyHistogram
 from platforms.probes import Reading
-from vla_deploy.control.tick_periods import TickPeriods
+from vla_deploy.control.reporting.tick_periods import TickPeriods
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.budgets.documents import board
 from vla_deploy.telemetry.metrics import READ_TOPICS, Look, Looker, Readings, read

@@ -1,0 +1,112 @@
+"""Derive the limits of the safety rules from robot file, servo datasheets and topics."""
+
+import numpy as np
+
+from drivers.dynamixel.models import MODELS
+from vla_deploy.control.motion.axes import Floats
+from vla_deploy.ipc import BY_NAME
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.protection import ZoneSource
+from vla_deploy.safety import SafetyLimits
+
+_RANGE_MARGIN = 0.02
+_OUTWARD_SHARE = 0.05
+_OVERSPEED = 2.0
+# Servos that answer late and early tell several cycles' way at once.
+_POSITION_JUMP_RAD = 0.08
+_FOLLOWING_ERROR_RAD = 0.4
+_WHEEL_ERROR_OF_TOP = 0.05
+_WHEEL_ERROR_OF_COMMAND = 0.5
+# A servo shuts down by itself at its own limits: we stop before it lets go.
+_TEMPERATURE_MARGIN_C = 5.0
+_VOLTAGE_MARGIN_V = 0.3
+_VOLTAGE_UNIT_V = 0.1
+_EFFORT_RATIO = 0.9
+_STANDSTILL_SHARE = 0.1
+_STANDSTILL_WHEEL_M_S = 0.01
+# Slower than this it does not approach: it is the play of what is measured.
+_APPROACH_M_S = 0.01
+# Perception tells scan, pose and attitude from the same steps: one held up holds up all of them.
+POSE_AGE_S = IMU_AGE_S = BY_NAME["scan"].deadline_s
+
+
+def safety_limits(robot: RobotDescription) -> SafetyLimits:
+    """Return the thresholds of the safety rules for a robot.
+
+    A gripper has no following error: closed on an object it is blocked by intent. A wheel may be
+    off by a twentieth of its top speed, at which the base creeps, and by half of what it is told:
+    it lags while it speeds up, and strains on a carpet's edge. One that stands or runs away is
+    beyond that. A sense that nothing in the robot file is judged by may be silent.
+    """
+    margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
+    lowest_v = _registers(robot, "min_voltage_limit") * _VOLTAGE_UNIT_V
+    highest_v = _registers(robot, "max_voltage_limit") * _VOLTAGE_UNIT_V
+    tip_over = robot.protection.tip_over
+    return SafetyLimits(
+        joint_names=robot.joint_names,
+        position_lower=robot.position_min - margin,
+        position_upper=robot.position_max + margin,
+        outward_velocity=_OUTWARD_SHARE * robot.velocity_max,
+        velocity=_OVERSPEED * robot.velocity_max,
+        position_jump=np.array(
+            [_POSITION_JUMP_RAD * servo.travel_per_rad for servo in robot.servo_bus.servos]
+        ),
+        following_error=_following_error(robot),
+        wheel_error_rad_s=_WHEEL_ERROR_OF_TOP
+        * robot.base.max_speed_m_s
+        / robot.base.wheel_radius_m,
+        wheel_error_ratio=_WHEEL_ERROR_OF_COMMAND,
+        servo_age_s=BY_NAME["joint_state"].deadline_s,
+        base_command_age_s=BY_NAME["base_command"].deadline_s,
+        supervisor_age_s=BY_NAME["process_table"].deadline_s,
+        effort_ratio=np.full(len(robot.joint_names), _EFFORT_RATIO),
+        temperature_c=_registers(robot, "temperature_limit") - _TEMPERATURE_MARGIN_C,
+        voltage_min_v=lowest_v + _VOLTAGE_MARGIN_V,
+        voltage_max_v=highest_v - _VOLTAGE_MARGIN_V,
+        standstill_velocity=_STANDSTILL_SHARE * robot.velocity_max,
+        standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / robot.base.wheel_radius_m,
+        scan_required=True,
+        scan_age_s=BY_NAME["scan"].deadline_s,
+        depth_age_s=BY_NAME["near_obstacles"].deadline_s if _looks_by_depth(robot) else np.inf,
+        pose_age_s=POSE_AGE_S if robot.home.zones else np.inf,
+        imu_age_s=IMU_AGE_S if tip_over else np.inf,
+        keep_out_depth_m=0.0,
+        workspace_excess_m=0.0,
+        self_clearance_m=robot.protection.clearance.self_m,
+        environment_clearance_m=robot.protection.clearance.floor_m,
+        approach_m_s=_APPROACH_M_S,
+        tip_margin_ratio=tip_over.min_ratio if tip_over else 0.0,
+        external_torque_nm=contact_torque(robot),
+    )
+
+
+def _looks_by_depth(robot: RobotDescription) -> bool:
+    return any(ZoneSource.DEPTH in zone.sources for zone in robot.protection.zones)
+
+
+def _registers(robot: RobotDescription, name: str) -> Floats:
+    """Return the factory value of one register of every servo, in the register's unit."""
+    return np.array([_factory_value(servo.model, name) for servo in robot.servo_bus.servos])
+
+
+def _following_error(robot: RobotDescription) -> Floats:
+    grippers = robot.gripper_joints
+    return np.array(
+        [
+            np.inf if servo.joint in grippers else _FOLLOWING_ERROR_RAD * servo.travel_per_rad
+            for servo in robot.servo_bus.servos
+        ]
+    )
+
+
+def contact_torque(robot: RobotDescription) -> Floats:
+    """Return each joint's contact limit; a joint for which none is declared is not judged."""
+    contact = robot.protection.contact
+    declared = {} if contact is None else contact.torque_nm
+    return np.array([declared.get(name, np.inf) for name in robot.joint_names])
+
+
+def _factory_value(model: str, name: str) -> float:
+    value = MODELS[model].registers[name].initial
+    assert value is not None
+    return float(value)

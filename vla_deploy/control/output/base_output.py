@@ -1,0 +1,36 @@
+"""Move the base: on a ramp to the wheel drives, on the only way there is."""
+
+from vla_deploy.control.motion.base_motion import BaseLimits, BaseRamp, base_limits, permitted
+from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.robots import RobotDescription
+from vla_deploy.safety import Reaction, Verdict
+
+
+class BaseOutput:
+    """Hold the base's ramp, and command the wheels by it."""
+
+    def __init__(self, robot: RobotDescription, wheels: Wheels) -> None:
+        self._limits: BaseLimits = base_limits(robot)
+        self._wheels = wheels
+        self.ramp = BaseRamp(self._limits)
+
+    def follow(self, wanted: tuple[float, float], verdict: Verdict, period_s: float) -> None:
+        """Move towards what a verdict leaves of a wanted velocity; brake where it demands that."""
+        if verdict.reaction is Reaction.BASE_RAMP:
+            self.brake(period_s)
+            return
+        v_m_s, w_rad_s = permitted(wanted, self._limits, verdict.speed_ratio, verdict.blocked)
+        if self._wheels.enabled:
+            self.ramp.advance(v_m_s, w_rad_s, period_s)
+        self._command()
+
+    def brake(self, period_s: float) -> None:
+        """Move towards rest."""
+        if self._wheels.enabled:
+            self.ramp.brake(period_s)
+        self._command()
+
+    def _command(self) -> None:
+        if not self._wheels.enabled:
+            self.ramp.halt()
+        self._wheels.cycle(self.ramp.v_m_s, self.ramp.w_rad_s)

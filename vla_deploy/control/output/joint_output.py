@@ -1,0 +1,102 @@
+"""Move the joints: from the motions through the gate to the servos, on the only way there is."""
+
+from typing import Final
+
+import numpy as np
+
+from vla_deploy.control.judging.thresholds import contact_torque
+from vla_deploy.control.motion.axes import Flags, Floats, any_of
+from vla_deploy.control.motion.motions import MotionResult, MotionSet
+from vla_deploy.control.output.gravity import GravityOffset, full_duty_error
+from vla_deploy.control.output.limits import SetpointGate
+from vla_deploy.control.output.payload import Payload
+from vla_deploy.control.output.servos import ServoLine
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel
+
+# Of the torque that counts as contact: what a stopped joint may go on pressing with.
+EASED_RATIO: Final = 0.5
+# Of the joint's top speed: slower than what counts as motion while the robot has to stand.
+EASING_RATIO: Final = 0.05
+UNWINDING_RATIO: Final = 0.3
+
+
+class JointOutput:
+    """Hold the motions of all joints, and send what the gate lets through."""
+
+    def __init__(
+        self, robot: RobotDescription, motions: MotionSet, servos: ServoLine, payload: Payload
+    ) -> None:
+        self.motions = motions
+        self._servos = servos
+        self._payload = payload
+        self._gate = SetpointGate(robot.position_min, robot.position_max, robot.velocity_max)
+        self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
+        self._eased_nm = EASED_RATIO * contact_torque(robot)
+        self._easing_rad_s = EASING_RATIO * robot.velocity_max
+        self._unwinding_rad_s = UNWINDING_RATIO * robot.velocity_max
+        self._arms = [
+            np.array([robot.joint_index[name] for name in robot.group(hand.arm).joints])
+            for hand in robot.hands.values()
+        ]
+        self._full_error = full_duty_error(robot)
+
+    @property
+    def sent(self) -> Floats:
+        """Return the setpoints that were sent last, without what carries the weight."""
+        return self._gate.sent
+
+    @property
+    def weight_offset(self) -> Floats:
+        """Return how far above its setpoint each goal is, so that the motor carries the weight."""
+        return self._gravity.at(self.sent)
+
+    def move(self, period_s: float) -> list[MotionResult]:
+        """Advance the setpoints, bound them, add what gravity asks for, and send them."""
+        state = self._servos.state
+        loose = ~state.torque_on | (state.watchdog < 0)
+        if any_of(loose):
+            self.place(loose)
+        ended = self.motions.advance(period_s)
+        sent = self._gate.limit(self.motions.state.position, period_s)
+        if any_of(state.torque_on):
+            self._servos.write(sent + self._gravity.at(sent))
+        return ended
+
+    def place(self, joints: Flags) -> None:
+        """Let setpoints of joints that take no goals follow them, so that arming is bumpless.
+
+        A hand whose servo still presses on what it holds goes on pressing.
+        """
+        state = self._servos.state
+        begin = state.position_rad
+        if any_of(joints & state.torque_on):
+            pressed = self._payload.pressed(begin, state.effort_ratio)
+            begin = np.where(state.torque_on, pressed, begin)
+        self.motions.place(begin, joints)
+        self._gate.place(begin, joints)
+
+    def ease_off(self, external_torque_nm: Floats, period_s: float) -> None:
+        """Take back, slowly, setpoints by which joints at rest press hard on what they have met.
+
+        A setpoint goes no further than to where its joint is, and only while the torque that is
+        felt agrees that it presses that way; what carries the arm's own weight is added later.
+        An arm with a limp joint stays where it is: what falls or hangs there feels like a contact.
+        """
+        error = self.sent - self._servos.state.position_rad
+        presses = (np.abs(external_torque_nm) > self._eased_nm) & (error * external_torque_nm < 0.0)
+        for arm in self._arms:
+            presses[arm] &= self._servos.state.torque_on[arm].all()
+        if any_of(presses):
+            # Further ahead than the motor can follow it presses no less: that part goes quickly.
+            winds = np.abs(error + self.weight_offset) > self._full_error
+            step = np.where(winds, self._unwinding_rad_s, self._easing_rad_s) * period_s
+            self.lead(self.sent - np.minimum(np.maximum(error, -step), step), presses)
+
+    def place_all(self) -> None:
+        """Let every setpoint begin where its joint is."""
+        self.place(np.ones(len(self.sent), dtype=np.bool_))
+
+    def lead(self, setpoint: Floats, joints: Flags) -> None:
+        """Choose the next setpoints of these joints, without a motion; the gate bounds them."""
+        self.motions.place(setpoint, joints)

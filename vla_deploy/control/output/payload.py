@@ -1,0 +1,57 @@
+"""Tell which hands hold something: told by the executor, or felt by the gripper itself."""
+
+from typing import Final
+
+import numpy as np
+
+from vla_deploy.control.motion.axes import Flags, Floats
+from vla_deploy.ipc import CellReader
+from vla_deploy.robots import RobotDescription
+
+# An empty gripper closes to where it was sent; fingers on an object stop short of it, pressing.
+SHORT_OF_GOAL_M: Final = 0.001
+PRESSING_RATIO: Final = 0.05
+PRESS_M: Final = 0.004
+"""How far behind a thing's surface a hand that holds it is sent; its Goal PWM bounds the force."""
+
+
+class Payload:
+    """Look at the hands when a stop has to know; a held thing outlives the executor."""
+
+    def __init__(self, robot: RobotDescription, executor_status: CellReader) -> None:
+        self._grippers = {
+            name: [robot.joint_index[joint] for joint in robot.group(hand.gripper).joints]
+            for name, hand in robot.hands.items()
+        }
+        self._low = robot.position_min
+        self._status = executor_status
+
+    def holding(
+        self, position: Floats, setpoint: Floats, effort_ratio: Floats, torque_on: Flags
+    ) -> frozenset[str]:
+        """Return the hands that hold something, in doubt too many of them."""
+        short = position - setpoint > SHORT_OF_GOAL_M
+        pressing = short & (abs(effort_ratio) > PRESSING_RATIO) & torque_on
+        felt = {name for name, joints in self._grippers.items() if pressing[joints].any()}
+        return frozenset(felt | self._told())
+
+    def pressed(self, position: Floats, effort_ratio: Floats) -> Floats:
+        """Return where setpoints may begin anew: at the joints, but fingers that hold something
+        are sent further, for a hand that is sent to where it is presses no more.
+
+        A robot that has just been started is told nothing: there the closing motor itself tells.
+        """
+        begin, told = position.copy(), self._told()
+        for name, joints in self._grippers.items():
+            if name in told or (effort_ratio[joints] < -PRESSING_RATIO).any():
+                begin[joints] = np.maximum(position[joints] - PRESS_M, self._low[joints])
+        return begin
+
+    def close(self) -> None:
+        """Unmap the topic."""
+        self._status.close()
+
+    def _told(self) -> set[str]:
+        sample = self._status.latest()
+        holding = {} if sample is None else sample.document().get("holding", {})
+        return {name for name in self._grippers if holding.get(name)}

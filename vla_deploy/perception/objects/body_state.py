@@ -1,0 +1,97 @@
+"""Follow the robot's own body: its joints over time, its camera's pose, and what its hands hold."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.protocol import Intrinsics
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import CellReader, SharedSpace
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.geometry.body import BodyMask
+from vla_deploy.perception.objects.hands import Hands, Hold
+from vla_deploy.perception.objects.history import JointHistory
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel
+
+Array = NDArray[np.float64]
+Point = tuple[float, float, float]
+STALE_JOINTS_NS = NS_PER_S // 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandState:
+    """Hold what a hand holds, and where its grip is in the base frame."""
+
+    name: str
+    hold: Hold
+    grip: Point
+
+
+class BodyState:
+    """Hold how the body stood at a moment, from control's joint states."""
+
+    def __init__(self, robot: RobotDescription, model: RobotModel) -> None:
+        """Read the body's shapes.
+
+        Raises:
+            RobotFileError: the MJCF does not fit the robot file.
+        """
+        self._robot = robot
+        self._model = model
+        self._mask = BodyMask(robot)
+        self._joints = JointHistory()
+        self._hands = Hands(robot)
+
+    def start(self, space: SharedSpace) -> None:
+        """Open the topics."""
+        self._joint_state: CellReader = space.cell_reader("joint_state")
+        self._executor_status: CellReader = space.cell_reader("executor_status")
+
+    def read(self) -> None:
+        """Take the newest joint state."""
+        sample = self._joint_state.latest()
+        if sample is not None:
+            count = len(self._robot.joint_names)
+            positions = np.array(sample.data["position"][:count], dtype=np.float64)
+            self._joints.add(sample.stamp_ns, positions)
+            self._hands.feel(sample)
+
+    def at(self, stamp_ns: int) -> Array | None:
+        """Return the joints' positions at a moment; None where nothing near it is known."""
+        return self._joints.at(stamp_ns, STALE_JOINTS_NS)
+
+    def camera_pose(self, positions: Array) -> Array:
+        """Return the camera's optical frame in the base frame, 4 x 4."""
+        pose: Array = self._model.camera_pose(positions)
+        return pose
+
+    def mask(self, positions: Array, camera: Intrinsics) -> NDArray[np.bool_]:
+        """Return an image that is true where the robot itself is seen."""
+        return self._mask.mask(positions, camera)
+
+    def hands(self, positions: Array, now_ns: int) -> list[HandState]:
+        """Return the hands with what they hold, by the executor's word and by touch."""
+        sample = self._executor_status.latest()
+        told = {} if sample is None else sample.document().get("holding", {})
+        holds = self._hands.judge(told, now_ns)
+        return [
+            HandState(name=name, hold=holds[name], grip=self._grip(hand.grip_site, positions))
+            for name, hand in self._robot.hands.items()
+        ]
+
+    def view_rotation(self, stamp_ns: int, base: Pose2D) -> Array:
+        """Return how the camera was turned in the frame of `base`, 3 x 3; upright where unknown."""
+        positions = self.at(stamp_ns)
+        if positions is None:
+            return np.eye(3)
+        c, s = math.cos(base.yaw_rad), math.sin(base.yaw_rad)
+        frame_from_base = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rotation: Array = frame_from_base @ self._model.camera_pose(positions)[:3, :3]
+        return rotation
+
+    def _grip(self, site: str, positions: Array) -> Point:
+        x, y, z = (float(value) for value in self._model.site_pose(site, positions)[:3, 3])
+        return (x, y, z)

@@ -1,0 +1,89 @@
+"""Know what the hands hold: the executor tells, the fingers confirm or deny."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import Sample
+from vla_deploy.perception.naming.classes import OTHER
+from vla_deploy.robots import RobotDescription
+from vla_deploy.world.touch import FingerSample, Grip, Touch, feel
+
+# Fingers that told nothing for longer are not felt.
+STALE_NS = NS_PER_S // 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """Say what a hand holds: `kind` is a class, "" for nothing; `cause` why it holds no longer."""
+
+    kind: str
+    told: str
+    touch: Touch
+    is_confirmed: bool
+    cause: str = ""
+
+    @property
+    def is_lost(self) -> bool:
+        """Return whether the hand lost what it was to hold, rather than putting it down."""
+        return not self.kind and self.touch.grip is Grip.LOST
+
+    def document(self) -> dict[str, Any]:
+        """Return it as the scene topic tells it."""
+        return {
+            "class": self.kind or None,
+            "told": self.told or None,
+            "felt": self.touch.grip.value,
+            "confirmed": self.is_confirmed,
+            "width_m": round(self.touch.width_m, 4) if self.touch.is_held else None,
+            "drift_m": round(self.touch.drift_m, 4),
+            "effort_ratio": round(self.touch.closing_ratio, 3),
+            "cause": self.cause,
+        }
+
+
+class Hands:
+    """Feel every hand's fingers in what control tells of the joints."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        index = robot.joint_index
+        self._grippers = {
+            name: (index[hand.gripper], hand.opening_ratio) for name, hand in robot.hands.items()
+        }
+        self._touches = {name: Touch() for name in robot.hands}
+        self._stamp_ns = 0
+
+    def feel(self, sample: Sample) -> None:
+        """Take in one sample of `joint_state`; one that was taken in already changes nothing."""
+        if sample.stamp_ns <= self._stamp_ns:
+            return
+        self._stamp_ns, data = sample.stamp_ns, sample.data
+        for name, (joint, ratio) in self._grippers.items():
+            fingers = FingerSample(
+                stamp_ns=sample.stamp_ns,
+                opening_m=ratio * float(data["position"][joint]),
+                goal_m=ratio * float(data["setpoint"][joint]),
+                speed_m_s=ratio * float(data["velocity"][joint]),
+                closing_ratio=-float(data["effort_ratio"][joint]),
+                is_powered=bool(data["torque_enabled"][joint]),
+            )
+            self._touches[name] = feel(self._touches[name], fingers)
+
+    def judge(self, told: Mapping[str, Any], now_ns: int) -> dict[str, Hold]:
+        """Return what each hand holds; `told` is what the executor says, by hand."""
+        is_felt = now_ns - self._stamp_ns <= STALE_NS
+        return {
+            name: _hold(str(told.get(name) or ""), touch if is_felt else Touch())
+            for name, touch in self._touches.items()
+        }
+
+
+def _hold(told: str, touch: Touch) -> Hold:
+    """Join word and touch: what is told and not felt is not held, what is only felt is unknown."""
+    if touch.is_held:
+        return Hold(kind=told or OTHER, told=told, touch=touch, is_confirmed=True)
+    if touch.grip in (Grip.UNKNOWN, Grip.CLOSING):
+        return Hold(kind=told, told=told, touch=touch, is_confirmed=False, cause=touch.cause)
+    cause = touch.cause or ("nothing is felt between the fingers" if told else "")
+    return Hold(kind="", told=told, touch=touch, is_confirmed=True, cause=cause)

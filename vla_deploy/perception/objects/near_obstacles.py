@@ -1,0 +1,151 @@
+"""Remember what the depth camera saw standing up from the floor around the base.
+
+The camera looks over what is close, and sees a cup on the floor only from a metre away. So what
+it saw is kept where it was, in cells of the map frame, until it is seen to be gone or too old.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.protocol import Intrinsics
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc.topics import OBSTACLE_POINTS
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.geometry.lens import project, ray_table
+
+Array = NDArray[np.float64]
+Cell = tuple[int, int]
+
+STRIDE_PX = 3
+# Lower things are taken for the floor: depth noise, a carpet, the slant of a wheel on its edge.
+LOWEST_M = 0.05
+HIGHEST_M = 1.3
+CELL_M = 0.04
+MIN_PIXELS = 2
+SEEN_WITHIN_M = 2.5
+KEPT_WITHIN_M = 1.5
+KEPT_NS = 8 * NS_PER_S
+# A cup hides the table close behind it; what is in view is seen anew wherever it stays.
+GONE_M = 0.04
+MIN_DEPTH_M = 0.2
+# A thing in a hand reaches this far from the grip.
+HELD_M = 0.22
+# What was kept this near to a full hand is what it has taken; further off it may be the table.
+TAKEN_M = 0.1
+
+
+class NearObstacles:
+    """Hold the cells that stand up from the floor, each with its newest point."""
+
+    def __init__(self) -> None:
+        self._cells: dict[Cell, tuple[float, float, float, int]] = {}
+
+    def look(
+        self,
+        depth_m: NDArray[np.float32],
+        camera: Intrinsics,
+        base_from_camera: Array,
+        body: NDArray[np.bool_],
+        pose: Pose2D,
+        grips: Sequence[Array],
+        stamp_ns: int,
+    ) -> None:
+        """Take in an image; `body` marks the robot itself, `grips` are points of full hands."""
+        self._forget_what_is_gone(depth_m, camera, base_from_camera, body, pose)
+        self._forget_what_is_taken(grips, pose)
+        points = _standing(depth_m, camera, base_from_camera, body)
+        for grip in grips:
+            points = points[np.linalg.norm(points - grip, axis=1) > HELD_M]
+        turned = _to_map(points, pose)
+        keys = np.floor(turned[:, :2] / CELL_M).astype(np.int64)
+        _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
+        for index in first[counts >= MIN_PIXELS]:
+            x_m, y_m, z_m = turned[index].tolist()
+            column, row = keys[index].tolist()
+            self._cells[column, row] = (x_m, y_m, z_m, stamp_ns)
+
+    def around(self, pose: Pose2D, now_ns: int) -> Array:
+        """Return what stands near the base, (n, 3) in the base frame, the nearest first."""
+        self._cells = {
+            cell: kept for cell, kept in self._cells.items() if now_ns - kept[3] <= KEPT_NS
+        }
+        points = _to_base(self._points(), pose)
+        distance = np.linalg.norm(points[:, :2], axis=1)
+        order = np.argsort(distance, kind="stable")[:OBSTACLE_POINTS]
+        near: Array = points[order[distance[order] <= KEPT_WITHIN_M]]
+        return near
+
+    def _points(self) -> Array:
+        kept = [cell[:3] for cell in self._cells.values()]
+        return np.array(kept, dtype=np.float64).reshape(-1, 3)
+
+    def _forget_what_is_gone(
+        self,
+        depth_m: NDArray[np.float32],
+        camera: Intrinsics,
+        base_from_camera: Array,
+        body: NDArray[np.bool_],
+        pose: Pose2D,
+    ) -> None:
+        """Drop cells through which the camera looks at something further away."""
+        if not self._cells:
+            return
+        points = _to_base(self._points(), pose) - base_from_camera[:3, 3]
+        local = points @ base_from_camera[:3, :3]
+        ahead = local[:, 2].copy()
+        local[:, 2] = np.maximum(ahead, MIN_DEPTH_M)
+        column, row = np.rint(project(camera, local)).astype(np.int64).T
+        seen = (ahead > MIN_DEPTH_M) & (column >= 0) & (column < camera.width)
+        seen &= (row >= 0) & (row < camera.height)
+        at = (row[seen], column[seen])
+        gone = np.zeros(len(points), dtype=np.bool_)
+        gone[seen] = (depth_m[at] > ahead[seen] + GONE_M) & ~body[at]
+        self._forget(gone)
+
+    def _forget_what_is_taken(self, grips: Sequence[Array], pose: Pose2D) -> None:
+        """Drop cells where a full hand is: it carries away what stood there."""
+        for grip in grips:
+            points = _to_base(self._points(), pose)
+            self._forget(np.linalg.norm(points - grip, axis=1) < TAKEN_M)
+
+    def _forget(self, gone: NDArray[np.bool_]) -> None:
+        self._cells = {
+            cell: kept
+            for (cell, kept), is_gone in zip(self._cells.items(), gone, strict=True)
+            if not is_gone
+        }
+
+
+def _standing(
+    depth_m: NDArray[np.float32],
+    camera: Intrinsics,
+    base_from_camera: Array,
+    body: NDArray[np.bool_],
+) -> Array:
+    """Return the points between floor and robot's height, of some of the pixels."""
+    some = (slice(None, None, STRIDE_PX), slice(None, None, STRIDE_PX))
+    depth = depth_m[some].astype(np.float64)
+    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < SEEN_WITHIN_M) & ~body[some])
+    z = depth[rows, columns]
+    x, y = ray_table(camera)[some][rows, columns].T * z
+    rotation, origin = base_from_camera[:3, :3], base_from_camera[:3, 3]
+    points: Array = np.column_stack((x, y, z)) @ rotation.T + origin
+    return points[(points[:, 2] > LOWEST_M) & (points[:, 2] < HIGHEST_M)]
+
+
+def _rotation(yaw_rad: float) -> Array:
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _to_map(points: Array, pose: Pose2D) -> Array:
+    turned: Array = points @ _rotation(pose.yaw_rad).T + (pose.x_m, pose.y_m, 0.0)
+    return turned
+
+
+def _to_base(points: Array, pose: Pose2D) -> Array:
+    turned: Array = (points - (pose.x_m, pose.y_m, 0.0)) @ _rotation(pose.yaw_rad)
+    return turned

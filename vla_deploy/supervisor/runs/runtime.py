@@ -1,0 +1,240 @@
+"""Own the directory of one run: its lock, its shared memory, and what dead runs left behind."""
+
+import fcntl
+import json
+import logging
+import os
+import re
+import shutil
+import stat
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from vla_deploy.runtime.state_dir import state_dir_of, user_base
+from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
+from vla_deploy.supervisor.processes.proc_files import read_stat
+from vla_deploy.supervisor.runs.orphans import end_orphans
+from vla_deploy.supervisor.runs.state_folder import BoundedFolder
+
+SHARED_MEMORY = Path("/dev/shm")
+KEEP_LOGS_OF_RUNS = 20
+_OWNER_FILE = "owner.json"
+_RUN_ID: Final = re.compile(r"\d{8}-\d{6}-\d+")
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Owner:
+    """Identify the supervisor of a run; the start time tells it from a later process of its pid.
+
+    That is counted since the computer's start: no jump of the wall clock makes it another.
+    """
+
+    pid: int
+    start_ticks: int
+    run_id: str
+    run_dir: str
+
+    def is_alive(self) -> bool:
+        """Return whether that very process still runs; one that nobody has reaped does not."""
+        found = read_stat(self.pid)
+        return found is not None and not found.ended and found.start_ticks == self.start_ticks
+
+
+def default_base() -> Path:
+    """Return where runs live unless told otherwise."""
+    if os.getuid() == 0:
+        return Path("/run/vla-deploy")
+    return user_base()
+
+
+def running(base: Path) -> Owner | None:
+    """Return the supervisor that now holds `base`, or None.
+
+    Raises:
+        RuntimeUnavailable: `base` belongs to someone else.
+    """
+    owner = _read_owner(base / "lock")
+    return owner if owner is not None and owner.is_alive() else None
+
+
+def free_base(base: Path) -> None:
+    """Make the runtime directory where it is missing, for what a run is derived from.
+
+    Raises:
+        AlreadyRunning: a supervisor holds it.
+        RuntimeUnavailable: it cannot be made or belongs to someone else.
+    """
+    _make_private(base)
+    owner = running(base)
+    if owner is not None:
+        raise _already_running(base, owner)
+
+
+class Runtime:
+    """Hold `<base>/<run_id>/` for one run, remove it at the end.
+
+    Raises:
+        AlreadyRunning: another supervisor holds `base`.
+        RuntimeUnavailable: `base` cannot be made or belongs to someone else.
+    """
+
+    def __init__(self, base: Path, shared_memory: Path = SHARED_MEMORY) -> None:
+        self._base = base
+        self._shared_memory = shared_memory
+        _make_private(base)
+        self._lock_fd = _lock(base)
+        self.state_dir = state_dir_of(base)
+        self._old_logs = old_logs(self.state_dir)
+        self.orphans = _sweep_runs(base, self._old_logs)
+        _sweep_shared_memory(shared_memory)
+        self.run_id = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
+        self.run_dir = base / self.run_id
+        self._owner = Owner(
+            pid=os.getpid(),
+            start_ticks=own_start_ticks(),
+            run_id=self.run_id,
+            run_dir=str(self.run_dir),
+        )
+        self.run_dir.mkdir(mode=0o700)
+        self.ipc_dir = self._make_ipc_dir()
+        _write_owner(base / "lock", self._owner)
+        _point_to(base / "current", self.run_id)
+
+    def close(self) -> None:
+        """Keep the logs, remove everything else of this run and let the next supervisor in."""
+        _keep_logs(self.run_dir, self._old_logs)
+        (self._base / "current").unlink(missing_ok=True)
+        shutil.rmtree(self.ipc_dir, ignore_errors=True)
+        shutil.rmtree(self.run_dir, ignore_errors=True)
+        os.ftruncate(self._lock_fd, 0)
+        os.close(self._lock_fd)
+
+    def _make_ipc_dir(self) -> Path:
+        link = self.run_dir / "ipc"
+        if not self._shared_memory.is_dir():
+            link.mkdir(mode=0o700)
+            return link
+        directory = self._shared_memory / f"{_prefix()}{self.run_id}"
+        unfinished = directory.with_name(f".{directory.name}")
+        unfinished.mkdir(mode=0o700)
+        _write_owner(unfinished / _OWNER_FILE, self._owner)
+        unfinished.rename(directory)  # a sweeper never sees it without its owner
+        link.symlink_to(directory)
+        return directory
+
+
+def own_start_ticks() -> int:
+    """Return when this process was started, in clock ticks since boot."""
+    found = read_stat(os.getpid())
+    assert found is not None, "this process runs"
+    return found.start_ticks
+
+
+def _prefix() -> str:
+    return f"vla-deploy-{os.getuid()}-"
+
+
+def _make_private(base: Path) -> None:
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = base.stat()
+    except OSError as error:
+        raise _unavailable(base, error) from error
+    if found.st_uid != os.getuid():
+        raise RuntimeUnavailable(
+            f"runtime directory {base}: belongs to user {found.st_uid}, expected {os.getuid()}; "
+            "choose another with --runtime-base"
+        )
+    if found.st_mode & stat.S_IWOTH:
+        raise RuntimeUnavailable(
+            f"runtime directory {base}: everybody may write to it, expected its owner only: "
+            f"`chmod o-w {base}`, or choose another with --runtime-base"
+        )
+
+
+def _unavailable(base: Path, error: OSError) -> RuntimeUnavailable:
+    return RuntimeUnavailable(
+        f"runtime directory {base}: {error.strerror}; choose another with --runtime-base"
+    )
+
+
+def _lock(base: Path) -> int:
+    path = base / "lock"
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise _unavailable(base, error) from error
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(fd)
+        raise _already_running(base, _read_owner(path)) from None
+    return fd
+
+
+def _already_running(base: Path, owner: Owner | None) -> AlreadyRunning:
+    who = f"pid {owner.pid}, run {owner.run_id}" if owner else "it is just starting or stopping"
+    return AlreadyRunning(
+        f"a supervisor already runs in {base} ({who}); end it with `vla-deploy shutdown`, "
+        "or choose another directory with --runtime-base"
+    )
+
+
+def old_logs(state_dir: Path) -> BoundedFolder:
+    """Return the folder with the logs of runs that have ended."""
+    return BoundedFolder(state_dir / "runs", KEEP_LOGS_OF_RUNS)
+
+
+def _keep_logs(run_dir: Path, folder: BoundedFolder) -> None:
+    logs = run_dir / "logs"
+    if not logs.is_dir():
+        return
+    try:
+        shutil.move(logs, folder.claim(run_dir.name))
+    except OSError as error:
+        _log.warning("the logs of run %s are lost: %s", run_dir.name, error)
+
+
+def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
+    stale = [path for path in base.iterdir() if _is_run(path)]
+    orphans = end_orphans({path.name for path in stale}) if stale else []
+    for path in stale:
+        _keep_logs(path, logs)
+        shutil.rmtree(path, ignore_errors=True)
+    return orphans
+
+
+def _is_run(path: Path) -> bool:
+    """Return whether a folder is a run's, and not of somebody who chose the wrong directory."""
+    is_named_so = _RUN_ID.fullmatch(path.name) is not None
+    return is_named_so and path.is_dir() and not path.is_symlink()
+
+
+def _sweep_shared_memory(shared_memory: Path) -> None:
+    for directory in shared_memory.glob(f"{_prefix()}*"):
+        owner = _read_owner(directory / _OWNER_FILE)
+        if owner is None or not owner.is_alive():
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+def _read_owner(path: Path) -> Owner | None:
+    try:
+        return Owner(**json.loads(path.read_text()))
+    except (FileNotFoundError, NotADirectoryError, json.JSONDecodeError, TypeError):
+        return None
+    except PermissionError as error:
+        raise _unavailable(path.parent, error) from error
+
+
+def _write_owner(path: Path, owner: Owner) -> None:
+    path.write_text(json.dumps(asdict(owner)))
+
+
+def _point_to(link: Path, target: str) -> None:
+    fresh = link.with_name(f".{link.name}-{os.getpid()}")
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(target)
+    fresh.replace(link)
