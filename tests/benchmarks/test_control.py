@@ -1,10 +1,10 @@
 import json
 
 import pytest
-from vla_deploy.control.judging import safety_stage
 
 from benchmarks import control
 from benchmarks.control import main
+from vla_deploy.control.judging import safety_stage
 from vla_deploy.safety import evaluate
 
 STAGES = (

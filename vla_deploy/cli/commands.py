@@ -45,6 +45,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "shutdown": Command(
         "operate", "end the run in order, as Ctrl-C does; power goes off, so support the arms"
     ),
+    "joint": Command("joint", "show where the joints are, and move one of them"),
     "profile": Command("profile", "choose how the stack uses this computer"),
     "robot": Command("robot", "write the robot's description as URDF, for ROS"),
     "servo": Command("servo", "find, look at, set up and calibrate servos"),

@@ -6,7 +6,7 @@ from typing import Final
 
 from drivers.clock import Clock
 
-SENDERS: Final = ("executor", "ros")
+SENDERS: Final = ("executor", "ros", "cli")
 _US_NS: Final = 1000
 
 

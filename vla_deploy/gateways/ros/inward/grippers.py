@@ -12,9 +12,8 @@ from control_msgs.action import GripperCommand, ParallelGripperCommand
 from sensor_msgs.msg import JointState
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.motions import Claimed, JointView, Motions
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.claiming import Claimed
-from vla_deploy.gateways.ros.inward.motions import JointView, Motions
 from vla_deploy.gateways.ros.inward.pursuing import (
     ActionDesk,
     Begin,

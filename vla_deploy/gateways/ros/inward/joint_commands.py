@@ -10,9 +10,8 @@ from typing import Final
 from sensor_msgs.msg import JointState
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.motions import Claimed, Motions
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.claiming import Claimed
-from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.refusals import Refusals
 from vla_deploy.gateways.ros.part import Due, Gateway
 

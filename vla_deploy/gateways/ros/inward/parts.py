@@ -7,12 +7,12 @@ from control_msgs.action import FollowJointTrajectory
 from nav2_msgs.action import NavigateToPose
 from vla_deploy_msgs.action import ExecutePlan
 
+from vla_deploy.client.motions import Claimed, Motions
 from vla_deploy.gateways.ros.inward.acts import Acts
-from vla_deploy.gateways.ros.inward.claiming import Borrowed, Claimed, PartsHold
+from vla_deploy.gateways.ros.inward.claiming import Borrowed, PartsHold
 from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
 from vla_deploy.gateways.ros.inward.grippers import gripper_desks
 from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
-from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
 from vla_deploy.gateways.ros.inward.orders import CommandOrders
 from vla_deploy.gateways.ros.inward.plans import PlanServer
@@ -40,7 +40,8 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
     """
     accept, settings = gateway.settings.accept, gateway.settings
     graph, link = gateway.graph, gateway.link
-    motions = Motions(link, gateway.robot.joint_index)
+    motions = Motions(link, gateway.robot.joint_index, "ros")
+    motions.end_those_of_one_before()
     orders = CommandOrders(link)
     acts = {Accepts.STOP: (ESTOP,), Accepts.ALL: ALL_ACTS}.get(accept)
     parts: list[GatewayPart] = [] if acts is None else [Acts(gateway, acts)]

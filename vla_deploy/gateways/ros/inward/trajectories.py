@@ -8,9 +8,9 @@ from control_msgs.action import FollowJointTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.motions import Ended, JointView, Motions
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.claiming import PartsHold
-from vla_deploy.gateways.ros.inward.motions import Ended, JointView, Motions
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.inward.trajectory_goal import (
     GoalRefused,

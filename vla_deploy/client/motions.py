@@ -1,5 +1,6 @@
-"""Send motions to control as the executor does, and learn how each ended."""
+"""Send motions to control as the executor does, and learn how each ended; hold their parts."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -8,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import ClaimBook
+from vla_deploy.ipc.errors import ClaimRefused
 from vla_deploy.ipc.motion_ids import motion_ids, sender_of
 
-SENDER: Final = "ros"
 Floats = NDArray[np.float64]
-_JOINT_AGE_S = 0.25
+_JOINT_AGE_S: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,17 +36,38 @@ class JointView:
     effort_ratio: Floats
 
 
-class Motions:
-    """Hold the gateway's end of the topics of motions."""
+def joint_view(
+    link: RobotLink, joint_index: Mapping[str, int], joints: Sequence[str]
+) -> JointView | None:
+    """Return how some joints are, or None where control is silent."""
+    sample = link.fresh("joint_state", _JOINT_AGE_S)
+    if sample is None:
+        return None
+    chosen = [joint_index[joint] for joint in joints]
 
-    def __init__(self, link: RobotLink, joint_index: Mapping[str, int]) -> None:
+    def of(field: str) -> Floats:
+        return np.asarray(sample.data[field], dtype=np.float64)[chosen]
+
+    return JointView(
+        stamp_ns=sample.stamp_ns,
+        position=of("position"),
+        velocity=of("velocity"),
+        setpoint=of("setpoint"),
+        effort_ratio=of("effort_ratio"),
+    )
+
+
+class Motions:
+    """Hold one sender's end of the topics of motions."""
+
+    def __init__(self, link: RobotLink, joint_index: Mapping[str, int], sender: str) -> None:
         self._link = link
         self._index = joint_index
-        self._ids = motion_ids(link.clock, SENDER)
+        self._sender = sender
+        self._ids = motion_ids(link.clock, sender)
         self._results = link.events("motion_result")
         self._ended: dict[int, Ended] = {}
         self._active: set[int] = set()
-        self._end_those_of_one_before()
 
     def step(self) -> None:
         """Take in what has ended."""
@@ -71,13 +94,18 @@ class Motions:
             }
         )
 
-    def go(self, targets: Mapping[str, float], effort_ratio: Mapping[str, float]) -> int:
+    def go(
+        self,
+        targets: Mapping[str, float],
+        effort_ratio: Mapping[str, float],
+        speed_ratio: float = 1.0,
+    ) -> int:
         """Ask control to bring joints to targets, and return the motion's id."""
         return self._send(
             {
                 "kind": "goal",
                 "targets": dict(targets),
-                "speed_ratio": 1.0,
+                "speed_ratio": speed_ratio,
                 "effort_ratio": dict(effort_ratio),
             }
         )
@@ -97,22 +125,7 @@ class Motions:
 
     def look(self, joints: Sequence[str]) -> JointView | None:
         """Return how some joints are, or None where control is silent."""
-        sample = self._link.fresh("joint_state", _JOINT_AGE_S)
-        if sample is None:
-            return None
-        chosen = [self._index[joint] for joint in joints]
-        data = sample.data
-
-        def of(field: str) -> Floats:
-            return np.asarray(data[field], dtype=np.float64)[chosen]
-
-        return JointView(
-            stamp_ns=sample.stamp_ns,
-            position=of("position"),
-            velocity=of("velocity"),
-            setpoint=of("setpoint"),
-            effort_ratio=of("effort_ratio"),
-        )
+        return joint_view(self._link, self._index, joints)
 
     def close(self) -> None:
         """End every motion that was begun here."""
@@ -120,11 +133,11 @@ class Motions:
             self.cancel(motion_id)
         self._results.close()
 
-    def _end_those_of_one_before(self) -> None:
-        """End motions whose gateway was killed: nobody watches their tolerances any more."""
+    def end_those_of_one_before(self) -> None:
+        """End motions whose sender was killed: nobody watches over them any more."""
         status = self._link.document("control_status", _JOINT_AGE_S)
         for motion_id in (status or {}).get("active_motions", ()):
-            if sender_of(motion_id) == SENDER:
+            if sender_of(motion_id) == self._sender:
                 self.cancel(motion_id)
 
     def _send(self, command: dict[str, Any]) -> int:
@@ -132,3 +145,39 @@ class Motions:
         self._link.publish("motion_command", command | {"motion_id": motion_id})
         self._active.add(motion_id)
         return motion_id
+
+
+class Claimed:
+    """Ask for some of the robot's parts, all or none; waiting for them is not offered."""
+
+    def __init__(self, link: RobotLink, holder: str, parts: Sequence[str]) -> None:
+        self.is_held = False
+        self._book = ClaimBook(link.space, link.clock)
+        self._holder = holder
+        self._wants = dict.fromkeys(parts, 1)
+
+    def why_not_taken(self) -> str:
+        """Take them, or return who has them; holding them already is fine."""
+        if self.is_held:
+            return ""
+        try:
+            self.is_held = self._book.ask(self._holder, self._wants)
+        except ClaimRefused as error:
+            return str(error)
+        if self.is_held:
+            return ""
+        self._book.release(self._holder)
+        return self._book.obstacles(self._wants) or "another command was faster"
+
+    def why_over(self) -> str:
+        """Return "": what is held is held until it is released."""
+        return ""
+
+    def most_m_s(self) -> float:
+        """Return infinity: the limits are control's."""
+        return math.inf
+
+    def release(self) -> None:
+        """Give them back."""
+        self._book.release(self._holder)
+        self.is_held = False
