@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from sim_twin.stack import LockstepStack
+from sim_twin.harness.stack import LockstepStack
 from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.ipc import CellReader
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 JOBS: Final = (
     "pick up the red cup and put it in the box",

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from drivers.imu.bno085_rvc import Bno085Rvc
 from drivers.lidar.ld19 import Ld19
 from platforms import load_profile
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.control.output.wheels import Wheels
 

@@ -26,9 +26,9 @@ from benchmarks.live_robot import arm, await_change, live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.campaigns.phases import Phase, PhaseStage
-from sim_twin.stack import LockstepControl
-from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
+from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
+from sim_twin.harness.stack import LockstepControl
+from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton

@@ -7,10 +7,10 @@ import numpy as np
 
 from benchmarks.pushed_robot import PushedReading, PushedRobot
 from vla_deploy.navigation.follower import Twist
-from vla_deploy.navigation.grid_map import GridMap
-from vla_deploy.navigation.localisation import Localiser
+from vla_deploy.navigation.localising.localisation import Localiser
+from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.navigation.pose import Pose2D
 
 CLEARANCE_M: Final = 0.27

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from training.detector.table_scenes import TableScene, Truth, draw_scenes
+from training.detector.scenes.table_scenes import TableScene, Truth, draw_scenes
 from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
 from vla_deploy.perception.geometry.supports import find_supports

@@ -16,12 +16,12 @@ from benchmarks.command import parser, show
 from benchmarks.perception_geometry import MATCH_M, cloud_of
 from drivers.clock import MonotonicClock
 from platforms import load_profile
-from sim_twin.renderer import open_gl_context
+from sim_twin.pictures.renderer import open_gl_context
 from training.detector.average_precision import Rows
 from training.detector.dataset import IMAGES_PER_SHARD, Shard, draw_shard
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import RECALLS, judge_file
-from training.detector.table_scenes import TableScene, draw_scenes
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
+from training.detector.scenes.table_scenes import TableScene, draw_scenes
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.model_tools.detectors.benching import bench

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
-from sim_twin.stack import LockstepStack
+from sim_twin.harness.stack import LockstepStack
 from vla_deploy.perception.images.detection import Detection
 from vla_deploy.perception.objects.assignment import assign
 from vla_deploy.perception.objects.filtering import Estimate

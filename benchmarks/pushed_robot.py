@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from drivers.imu.bno085_rvc import Bno085Rvc
 from drivers.lidar.base import Scan
 from drivers.lidar.ld19 import Ld19
-from sim_twin.compose import ROBOT_ROOT
-from sim_twin.lines import MemoryLine
-from sim_twin.load import load_model
-from sim_twin.probes import RangeProbe
+from sim_twin.physics.compose import ROBOT_ROOT
+from sim_twin.physics.load import load_model
+from sim_twin.physics.probes import RangeProbe
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses

@@ -24,7 +24,7 @@ from benchmarks.core import REALTIME_PRIORITY, realtime
 from benchmarks.live_robot import arm, live_stack
 from benchmarks.percentiles import percentile
 from platforms import load_profile
-from sim_twin.process_stack import ProcessStack
+from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.robots import load_robot

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
+from sim_twin.harness.stack import LockstepControl
 from sim_twin.sound.streams import streamed_microphone
 from sim_twin.sound.talker import Talker
-from sim_twin.stack import LockstepControl
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import build_stop_words
 from vla_deploy.speech.voice.tts import EspeakEngine

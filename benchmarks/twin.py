@@ -29,10 +29,10 @@ from benchmarks.command import parser, show
 from benchmarks.device_traffic import DeviceTraffic
 from benchmarks.stopwatch import Stopwatch
 from platforms import load_profile
-from sim_twin.compose import STEP_S
-from sim_twin.engine import Engine
-from sim_twin.load import load_engine
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
+from sim_twin.physics.compose import STEP_S
+from sim_twin.physics.engine import Engine
+from sim_twin.physics.load import load_engine
 from sim_twin.twin import Twin
 from vla_deploy.control.node import ControlNode
 from vla_deploy.robots import RobotDescription, load_robot

@@ -14,26 +14,26 @@ from drivers.clock import Clock
 from drivers.twin_clock import TwinClock
 from drivers.twin_page import PAGE_FILE, TwinPace
 from sim_twin.can import CanHub
-from sim_twin.drawing import start_camera, start_viewer
-from sim_twin.engine import STEP_NS
 from sim_twin.errors import RefereeRefusal, TwinError
 from sim_twin.faults.camera_relay import faults_in_force
 from sim_twin.faults.desk import FaultDesk
 from sim_twin.faults.plug import Carrier
-from sim_twin.governor import Governor
-from sim_twin.json_line_server import JsonLineServer
-from sim_twin.mirror import MirrorState
-from sim_twin.mirror_link import MirrorLink
-from sim_twin.pacer import Pacer, RealTimeFactor
+from sim_twin.physics.engine import STEP_NS
+from sim_twin.pictures.drawing import start_camera, start_viewer
+from sim_twin.pictures.mirror import MirrorState
+from sim_twin.pictures.mirror_link import MirrorLink
+from sim_twin.ports.json_line_server import JsonLineServer
+from sim_twin.ports.pty_line import PtyLine
+from sim_twin.ports.stream_line import StreamLine
 from sim_twin.priority import Priority, claim_priority
-from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.servos import WireTiming
 from sim_twin.sound.desk import SoundDesk
-from sim_twin.stream_line import StreamLine
+from sim_twin.timing.governor import Governor
+from sim_twin.timing.pacer import Pacer, RealTimeFactor
+from sim_twin.timing.wall_time import WallTime
 from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
-from sim_twin.wall_time import WallTime
 from sim_twin.wire_digest import WireDigest
 from vla_deploy.robots import RobotDescription, load_robot
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from sim_twin.contracts.hardware import Hardware
     from sim_twin.faults import FaultInjector
     from sim_twin.faults.remote import RemoteFaults
-    from sim_twin.lockstep import Lockstep
-    from sim_twin.process_stack import ProcessStack
-    from sim_twin.stack import LockstepStack
+    from sim_twin.harness.lockstep import Lockstep
+    from sim_twin.harness.process_stack import ProcessStack
+    from sim_twin.harness.stack import LockstepStack
 
 MARKERS = (
     "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with; "
@@ -98,7 +98,9 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 @pytest.fixture
 def make_lockstep(tmp_path: Path) -> Iterator[Callable[..., Lockstep]]:
     """Build robots in lock-step with the arguments of `Lockstep`; all are closed at the end."""
-    from sim_twin.lockstep import Lockstep  # MuJoCo loads only where a test asks for a robot
+    from sim_twin.harness.lockstep import (
+        Lockstep,  # MuJoCo loads only where a test asks for a robot
+    )
 
     built: list[Lockstep] = []
 
@@ -122,7 +124,7 @@ def lockstep(make_lockstep: Callable[..., Lockstep]) -> Lockstep:
 @pytest.fixture
 def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepStack]:
     """Give the whole robot in lock-step, armed."""
-    from sim_twin.stack import LockstepStack
+    from sim_twin.harness.stack import LockstepStack
 
     run_dir = tmp_path / "twin"
     run_dir.mkdir()
@@ -137,7 +139,7 @@ def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepSta
 @pytest.fixture
 def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     """Give the real processes on the twin's time, armed."""
-    from sim_twin.process_stack import ProcessStack
+    from sim_twin.harness.process_stack import ProcessStack
 
     chosen = _chosen(request)
     chosen.pop("speech", None)  # the processes always have it

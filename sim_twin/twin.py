@@ -12,15 +12,15 @@ from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import Supply
-from sim_twin.hazards import HazardWatch
-from sim_twin.head_camera import HeadCamera, camera_line
-from sim_twin.load import load_engine
+from sim_twin.physics.hazards import HazardWatch
+from sim_twin.physics.load import load_engine
+from sim_twin.pictures.head_camera import HeadCamera, camera_line
+from sim_twin.ports.streams import StreamedDevice, streamed_devices
 from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.servos import Coupling, EmulatedServoSpec, ServoBank, WireTiming
-from sim_twin.streams import StreamedDevice, streamed_devices
 from vla_deploy.robots import RobotDescription
 
 S = TypeVar("S", bound=StreamedDevice)

@@ -7,10 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import fault_matrix, kills, load, pressure, soak, switches
+from sim_twin.campaigns import load, soak
+from sim_twin.campaigns.faulting import fault_matrix
+from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
+from sim_twin.campaigns.pressing import pressure
 from sim_twin.campaigns.report import CampaignReport, make_room
 from sim_twin.campaigns.selection import NothingChosen
+from sim_twin.campaigns.switching import switches
 from vla_deploy.cli.example import OneLineParser
 from vla_deploy.cli.validate import duration_h, whole_number
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivers.twin_page import TwinPace
-from sim_twin.campaigns import hog
+from sim_twin.campaigns.pressing import hog
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 from vla_deploy.supervisor.table import TABLE, ProcessSpec

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.campaigns.strays import MARK, strays
-from sim_twin.service_runner import RunnerState, ServiceRunner
+from sim_twin.harness.service_runner import RunnerState, ServiceRunner
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.processes.lifecycle import is_settled

@@ -1,12 +1,12 @@
 """Emulate a CAN bus, and wheel drives on it: CiA 402 over CANopen, and ODrive axes."""
 
-from sim_twin.can.drive import WheelDrive
+from sim_twin.can.bus.hub import CanHub
+from sim_twin.can.bus.memory_bus import MemoryBus
+from sim_twin.can.bus.wire import CanNode, CanWire
+from sim_twin.can.cia402.drive import WheelDrive
 from sim_twin.can.drives import DRIVES, robot_drives
 from sim_twin.can.emulated_drive import EmulatedDrive, MotorMounting
-from sim_twin.can.hub import CanHub
-from sim_twin.can.memory_bus import MemoryBus
-from sim_twin.can.odrive import ODriveAxis
-from sim_twin.can.wire import CanNode, CanWire
+from sim_twin.can.odrive.axis import ODriveAxis
 
 __all__ = [
     "DRIVES",

@@ -15,11 +15,11 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from drivers.errors import DeviceBusy
+from sim_twin.can.bus.hub import CanHub
+from sim_twin.can.bus.wire import DEFAULT_BITRATE, CanWire
 from sim_twin.can.drives import DRIVES
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import STEP_NS, FreeWheel
-from sim_twin.can.hub import CanHub
-from sim_twin.can.wire import DEFAULT_BITRATE, CanWire
 
 _NODE_IDS: Final = {"cia402": (1, 126), "odrive": (0, 62)}
 

@@ -5,9 +5,9 @@ from typing import Final
 
 from drivers.canopen import EDS_PATH
 from drivers.odrive import EMULATED_ENDPOINTS
-from sim_twin.can.drive import WheelDrive
+from sim_twin.can.cia402.drive import WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive, MotorMounting
-from sim_twin.can.odrive import ODriveAxis
+from sim_twin.can.odrive.axis import ODriveAxis
 from vla_deploy.robots.description import CanBus, Drive
 
 DRIVES: Final[Mapping[str, Callable[..., EmulatedDrive]]] = {

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 from drivers.clock import NS_PER_S
+from sim_twin.can.bus.wire import CanWire
 from sim_twin.can.emulated_drive import EmulatedDrive
-from sim_twin.can.wire import CanWire
 
 STEP_NS: Final = 2_000_000
 

@@ -19,9 +19,9 @@ from sim_twin.contracts.scripted import ManualClock
 from sim_twin.device import WireDevice
 from sim_twin.faults.line_tamper import LineTamper, Tampering
 from sim_twin.faults.plug import Plug
-from sim_twin.lines import MemoryLine
-from sim_twin.pty_line import PtyLine
-from sim_twin.stream_line import StreamLine
+from sim_twin.ports.lines import MemoryLine
+from sim_twin.ports.pty_line import PtyLine
+from sim_twin.ports.stream_line import StreamLine
 
 STEP_NS: Final = 2_000_000
 

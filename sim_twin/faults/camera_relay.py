@@ -8,7 +8,7 @@ from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.vocabulary import Component
-from sim_twin.head_camera import HeadCamera
+from sim_twin.pictures.head_camera import HeadCamera
 from vla_deploy.robots import RobotDescription
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from sim_twin.faults.scenario import NO_CAUSE
-from sim_twin.stack import LockstepControl
-from sim_twin.truth import STANDSTILL_RAD_S
+from sim_twin.harness.stack import LockstepControl
+from sim_twin.physics.truth import STANDSTILL_RAD_S
 from vla_deploy.ipc import BY_NAME
 
 SENSOR_CELLS: Final = ("scan", "imu", "pose")

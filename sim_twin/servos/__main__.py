@@ -15,8 +15,8 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.dynamixel.codec import MAX_SERVO_ID
 from drivers.dynamixel.control_table import BAUD_RATES, MODELS
 from sim_twin.priority import claim_priority
+from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.server import FreeServos, make_specs, serve
-from sim_twin.servos.timing import WireTiming
 
 _EXAMPLE = (
     "example: python -m sim_twin.servos --link /tmp/servos --baud 1000000 --return-delay-us 0"

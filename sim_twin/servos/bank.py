@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from typing import Final
 
-from sim_twin.servos.coupling import Coupling
-from sim_twin.servos.firmware import Firmware
-from sim_twin.servos.instructions import InstructionParser
-from sim_twin.servos.profile import Floats
-from sim_twin.servos.protocol import BusProtocol
+from sim_twin.servos.firmware.coupling import Coupling
+from sim_twin.servos.firmware.firmware import Firmware
+from sim_twin.servos.firmware.profile import Floats
+from sim_twin.servos.protocol.instructions import InstructionParser
+from sim_twin.servos.protocol.protocol import BusProtocol
+from sim_twin.servos.protocol.timing import ReplyQueue, WireTiming
+from sim_twin.servos.protocol.wire_faults import ReplySpoiler
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
-from sim_twin.servos.timing import ReplyQueue, WireTiming
-from sim_twin.servos.wire_faults import ReplySpoiler
 
 _PACKET_GAP_NS: Final = 1_500_000
 """A pause within an instruction packet after which a servo looks for a new header."""

@@ -14,11 +14,11 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel.control_table import MODELS
-from sim_twin.pty_line import PtyLine
+from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
-from sim_twin.servos.rotor import FreeRotors
+from sim_twin.servos.firmware.rotor import FreeRotors
+from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
-from sim_twin.servos.timing import WireTiming
 
 STEP_S: Final = 0.002
 _STEP_NS: Final = round(STEP_S * NS_PER_S)

@@ -46,8 +46,8 @@ class FirmwareOptions:
     """Choose what the manual leaves open, and the constants of the protection.
 
     A servo counts as overloaded when its effort stays above `overload_ratio` of stall for
-    `overload_time_s`. What heats and cools it: `sim_twin/servos/thermal.py`. `supply_ohm` is the
-    resistance of supply, cables and connectors together (chosen, not measured).
+    `overload_time_s`. What heats and cools it: `sim_twin/servos/firmware/thermal.py`. `supply_ohm`
+    is the resistance of supply, cables and connectors together (chosen, not measured).
 
     When the Bus Watchdog trips, the manual says only that the servo stops. By default its path
     stops where it is: it holds the setpoint it had. With `trip_holds_present` it takes its

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.faults.line_tamper import LineTamper
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.ipc import Announced, Announcer, SharedSpace

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from benchmarks.estop import main, standstill_s
-from sim_twin.campaigns.phases import Phase
+from sim_twin.campaigns.faulting.phases import Phase
 
 
 def test_a_resting_robot_stands_at_once_and_a_driving_one_soon() -> None:

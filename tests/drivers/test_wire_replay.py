@@ -10,7 +10,7 @@ from drivers.errors import LinkLost
 from drivers.wire_recorder import RecordingTransport, WireRecorder
 from drivers.wire_recording import RecordKind, WireRecord, read_recording
 from drivers.wire_replay import ReplayDiverged, WireReplay
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim_twin.campaigns import kills
-from sim_twin.campaigns.kill_rules import Injection, injections
+from sim_twin.campaigns.killing import kills
+from sim_twin.campaigns.killing.rules import Injection, injections
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.harness.stack import LockstepStack
 from sim_twin.sound.talker import Talker
-from sim_twin.stack import LockstepStack
 from vla_deploy import speech
 from vla_deploy.speech.voice.tts import EspeakEngine
 

@@ -3,9 +3,9 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from sim_twin.compose import compose
-from sim_twin.engine import Engine
-from sim_twin.shafts import Shaft
+from sim_twin.physics.compose import compose
+from sim_twin.physics.engine import Engine
+from sim_twin.physics.shafts import Shaft
 
 ROBOT = """
 <mujoco model="cart">

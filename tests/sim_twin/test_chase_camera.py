@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from sim_twin.chase_camera import ELEVATIONS_DEG, ChaseCamera
-from sim_twin.engine import Engine
+from sim_twin.physics.engine import Engine
+from sim_twin.pictures.chase_camera import ELEVATIONS_DEG, ChaseCamera
 
 LOWEST_DEG = -ELEVATIONS_DEG[0]
 

@@ -1,4 +1,4 @@
-from sim_twin.clock import SimClock
+from sim_twin.timing.clock import SimClock
 
 
 class CountingSimulation:

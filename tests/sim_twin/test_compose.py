@@ -4,8 +4,8 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from sim_twin.compose import ROBOT_COLLISION_GROUP, ROBOT_LOOKS_GROUP, compose
 from sim_twin.errors import TwinModelMismatch
+from sim_twin.physics.compose import ROBOT_COLLISION_GROUP, ROBOT_LOOKS_GROUP, compose
 
 
 def test_the_composed_model_has_what_grasps_need(room: mujoco.MjModel) -> None:

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_twin.engine import START_NS, STEP_NS, Engine
 from sim_twin.errors import TwinModelMismatch
-from sim_twin.shafts import Shaft
+from sim_twin.physics.engine import START_NS, STEP_NS, Engine
+from sim_twin.physics.shafts import Shaft
 
 
 def angles(engine: Engine) -> NDArray[np.float64]:

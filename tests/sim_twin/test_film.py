@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from sim_twin.engine import Engine
 from sim_twin.errors import FilmFault, RefereeRefusal
-from sim_twin.film import HEIGHT, WIDTH, Film, contact_sheet
-from sim_twin.film_desk import FilmDesk
+from sim_twin.physics.engine import Engine
+from sim_twin.pictures.film import HEIGHT, WIDTH, Film, contact_sheet
+from sim_twin.pictures.film_desk import FilmDesk
 
 OWN = "head_camera"
 

@@ -20,8 +20,8 @@ import pytest
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.twin_clock import TwinClock
 from drivers.twin_page import TIME_SOCKET, Op, TimeRole, pack
-from sim_twin.governor import Governor
-from sim_twin.pacer import Pacer
+from sim_twin.timing.governor import Governor
+from sim_twin.timing.pacer import Pacer
 from vla_deploy.runtime.executors import TwinWorker, worker_thread
 
 MS = 1_000_000

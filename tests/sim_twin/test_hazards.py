@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.hazards import MOST_TILT_RAD, HazardWatch
-from sim_twin.stack import LockstepControl
+from sim_twin.harness.stack import LockstepControl
+from sim_twin.physics.hazards import MOST_TILT_RAD, HazardWatch
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
 

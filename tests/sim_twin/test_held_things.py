@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_twin.held_things import HeldThings
+from sim_twin.physics.held_things import HeldThings
 
 TURN_RAD_S = 1.2
 WORLD = """

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from sim_twin.errors import RefereeRefusal
-from sim_twin.json_line_server import JsonLineServer
+from sim_twin.ports.json_line_server import JsonLineServer
 
 
 def echo(request: Mapping[str, Any]) -> dict[str, Any]:

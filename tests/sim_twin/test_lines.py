@@ -2,7 +2,7 @@ import pytest
 
 from drivers.base import ByteTransport
 from drivers.errors import LinkLost
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 
 LATER_NS = 10**12
 

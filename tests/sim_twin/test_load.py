@@ -1,8 +1,8 @@
 import pytest
 
-from sim_twin.engine import Engine
 from sim_twin.errors import TwinModelMismatch
-from sim_twin.load import load_engine
+from sim_twin.physics.engine import Engine
+from sim_twin.physics.load import load_engine
 from vla_deploy.robots import load_robot
 
 DEEP_M = -0.002

@@ -10,7 +10,7 @@ from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.dynamixel.control_table import MODELS
 from drivers.errors import DeviceMissing
-from sim_twin.lockstep import Lockstep, MemoryOpener
+from sim_twin.harness.lockstep import Lockstep, MemoryOpener
 from sim_twin.servos import WireTiming
 
 HEAD_PAN_ID = 21

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim_twin.mirror import MirrorState, mirror_pair, newest_state, send_state
+from sim_twin.pictures.mirror import MirrorState, mirror_pair, newest_state, send_state
 
 
 def state(now_ns: int) -> MirrorState:

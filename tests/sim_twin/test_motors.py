@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from sim_twin.engine import Engine
-from sim_twin.load import load_engine
+from sim_twin.physics.engine import Engine
+from sim_twin.physics.load import load_engine
 from vla_deploy.robots import RobotDescription, load_robot
 
 REVERSALS = 4

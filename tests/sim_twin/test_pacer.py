@@ -1,7 +1,7 @@
 import pytest
 
 from sim_twin.contracts.scripted import ManualClock
-from sim_twin.pacer import Pacer, RealTimeFactor
+from sim_twin.timing.pacer import Pacer, RealTimeFactor
 
 MS = 1_000_000
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_twin.engine import Engine
-from sim_twin.load import load_engine
+from sim_twin.physics.engine import Engine
+from sim_twin.physics.load import load_engine
 from vla_deploy.robots import load_robot
 
 EVERY_BEAM = range(360)

@@ -9,7 +9,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from drivers.errors import LinkLost
 from drivers.serial_port import SerialPort
-from sim_twin.pty_line import PtyLine
+from sim_twin.ports.pty_line import PtyLine
 
 EVERY_BYTE = bytes(range(256))
 

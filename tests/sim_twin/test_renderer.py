@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim_twin.engine import Engine
 from sim_twin.errors import TwinModelMismatch
-from sim_twin.renderer import Renderer, fixed_camera
+from sim_twin.physics.engine import Engine
+from sim_twin.pictures.renderer import Renderer, fixed_camera
 
 WITHOUT_EGL = """
 import ctypes, sys
@@ -17,7 +17,7 @@ def missing(*arguments, **options):
     raise ImportError("Unable to load EGL library")
 loader.loadLibrary = missing
 from sim_twin.errors import OpenGLMissing
-from sim_twin.renderer import open_gl_context
+from sim_twin.pictures.renderer import open_gl_context
 try:
     open_gl_context(64, 48)
 except OpenGLMissing as error:

@@ -1,7 +1,7 @@
 import pytest
 
-from sim_twin.clock import SimClock
-from sim_twin.schedule import Schedule
+from sim_twin.harness.schedule import Schedule
+from sim_twin.timing.clock import SimClock
 
 MS = 1_000_000
 

@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.service_runner import RunnerState, ServiceRules, ServiceRunner
+from sim_twin.harness.service_runner import RunnerState, ServiceRules, ServiceRunner
 
 # A service whose words are those of the product's own notifier.
 SERVICE = """

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sim_twin.stillness import FINE_STEP_S, PRIORITY, StillnessWatch
+from sim_twin.harness.stillness import FINE_STEP_S, PRIORITY, StillnessWatch
 
 STALL_S = 0.06
 ABOVE = f"""

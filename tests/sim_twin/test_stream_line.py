@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.stream_line import StreamLine
+from sim_twin.ports.stream_line import StreamLine
 
 
 class Loudspeaker:

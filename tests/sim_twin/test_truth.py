@@ -1,7 +1,7 @@
 import pytest
 
-from sim_twin.engine import Engine
 from sim_twin.errors import RefereeRefusal
+from sim_twin.physics.engine import Engine
 
 
 def settle(engine: Engine) -> None:

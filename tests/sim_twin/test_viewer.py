@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim_twin.drawing import DISPLAY_VARIABLES, start_viewer
 from sim_twin.errors import DrawingFailed
-from sim_twin.mirror import MirrorState, mirror_pair, send_state
-from sim_twin.viewer_process import show
+from sim_twin.pictures.drawing import DISPLAY_VARIABLES, start_viewer
+from sim_twin.pictures.mirror import MirrorState, mirror_pair, send_state
+from sim_twin.pictures.viewer_process import show
 
 Mirror = tuple[socket.socket, socket.socket]
 

@@ -71,7 +71,7 @@ def test_benchmarks_ask_the_referee_for_the_truth() -> None:
     [
         "import mujoco",
         "from mujoco import viewer",
-        "from sim_twin.truth import Referee",
+        "from sim_twin.physics.truth import Referee",
         "import_module('mujoco')",
         "height = engine.data.xpos[3]",
         "data = MjData(model)",

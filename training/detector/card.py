@@ -8,10 +8,10 @@ from typing import Any
 from training.detector.average_precision import SURE_SCORE, WEAK_SCORE
 from training.detector.classes import CLASSES
 from training.detector.dataset import FLAT_SHARE, IMAGES_PER_SHARD
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import RECALLS, SAME_CLASS_IOU
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
 from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, NEAR_LONG_PX, SMALL_LEAST
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.settings import DetectorSettings
 from training.detector.targets import STRIDE_PX
 from vla_deploy.inference.file_check import sha256_of

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_twin.renderer import open_gl_context
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX, StageDrawing
-from training.detector.dress import dress
-from training.detector.flat_stage import build_flat
+from sim_twin.pictures.renderer import open_gl_context
 from training.detector.labels import Label, label
-from training.detector.layout import arrange
-from training.detector.parts import Random
-from training.detector.pose import pose_robot
-from training.detector.scene_model import SceneStage, build_studio
-from training.detector.spoil import spoil
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX, StageDrawing
+from training.detector.scenes.dress import dress
+from training.detector.scenes.flat_stage import build_flat
+from training.detector.scenes.layout import arrange
+from training.detector.scenes.parts import Random
+from training.detector.scenes.pose import pose_robot
+from training.detector.scenes.scene_model import SceneStage, build_studio
+from training.detector.scenes.spoil import spoil
 
 SPLITS = {"train": 1, "heldout": 2, "flat": 3}
 """Training; judging on unseen scenes, lights and textures; judging in the flat as it is."""

@@ -8,10 +8,10 @@ import torch
 
 from training.detector.classes import CLASSES
 from training.detector.dataset import load
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import as_input
 from training.detector.files import FILES
 from training.detector.network import CentreNet
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.settings import DetectorSettings
 from training.detector.training import WEIGHTS
 from vla_deploy.inference.manifest import Variant

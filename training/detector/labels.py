@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES, CLUTTER, LARGE
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
-from training.detector.layout import ImageContents
-from training.detector.scene_model import SceneStage
-from training.detector.silhouettes import extent
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
+from training.detector.scenes.layout import ImageContents
+from training.detector.scenes.scene_model import SceneStage
+from training.detector.scenes.silhouettes import extent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from training.planner.chatter import read_chatter
+from training.planner.sentences.chatter import read_chatter
 from training.planner.settings import SIZES, PlannerSettings
 
 _EXAMPLE: Final = (

@@ -5,11 +5,11 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
-from training.planner.clause import load_groups
 from training.planner.evaluation import MOST_TOKENS
 from training.planner.files import CARD, GRAPH, MEAN_OF, METRICS, NAME, PARTS
+from training.planner.sentences.clause import load_groups
+from training.planner.sentences.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from training.planner.settings import PlannerSettings
-from training.planner.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Certainty, Language, LanguageUse, Manifest, ModelFile
 from vla_deploy.inference.manifest_file import write_manifest

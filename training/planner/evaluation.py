@@ -13,8 +13,8 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from training.planner.certainty_fit import Judged, fit
-from training.planner.composing import Composer, Example
 from training.planner.files import METRICS
+from training.planner.sentences.composing import Composer, Example
 from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.inference.manifest import Certainty, Language, LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE

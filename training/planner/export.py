@@ -11,10 +11,10 @@ import onnx
 import torch
 from numpy.typing import NDArray
 
-from training.planner.composing import Composer
 from training.planner.files import CONFIG, GRAPH, KNOWN_WORDS, TOKENIZER, TOKENIZER_CONFIG
 from training.planner.graph import Sizes, decoder_graph, genai_config
 from training.planner.network import PlanDecoder
+from training.planner.sentences.composing import Composer
 from training.planner.settings import NetworkShape
 from training.planner.tokens import ANSWER, COMMAND, END, PAD, load_tokenizer
 from training.planner.training import STATE, WEIGHTS

@@ -14,7 +14,7 @@ from tokenizers.pre_tokenizers import ByteLevel, Split
 from tokenizers.pre_tokenizers import Sequence as InTurn
 from tokenizers.trainers import BpeTrainer
 
-from training.planner.composing import Composer
+from training.planner.sentences.composing import Composer
 from vla_deploy.planning.command_parser.grammar import STEPS, field_names
 
 VOCABULARY: Final = 2048

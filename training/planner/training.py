@@ -15,9 +15,9 @@ from tokenizers import Tokenizer
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.planner.composing import Composer, Example
 from training.planner.files import TOKENIZER
 from training.planner.network import PlanDecoder
+from training.planner.sentences.composing import Composer, Example
 from training.planner.settings import PlannerSettings
 from training.planner.tokens import END, PAD, load_tokenizer, prompt_of, train_tokenizer
 

@@ -64,7 +64,7 @@ def main() -> None:
 
 # What a step needs beyond numpy is imported by that step alone.
 def _data(job: Job) -> None:
-    from training.speech.data import generate
+    from training.speech.clips.data import generate
 
     generate(job.out / "clips", job.size.shards, job.size.seed, job.size.clips_per_shard)
 

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from training.speech.framing import IGNORED, draw_hop, framed, in_groups, padded
+from training.speech.clips.framing import IGNORED, draw_hop, framed, in_groups, padded
+from training.speech.clips.spoiling import Spoiler
 from training.speech.network import LARGEST_FRAMES, MELS
-from training.speech.spoiling import Spoiler
 from training.speech.tokens import Coder
 from training.voices.clip import RATE_HZ, Wave
 from training.voices.clip_store import StoredClip, read_shard, shards

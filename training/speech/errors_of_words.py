@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from training.speech.sentences import normal
+from training.speech.clips.sentences import normal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

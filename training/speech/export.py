@@ -9,7 +9,7 @@ import torch
 from ctranslate2.converters import TransformersConverter
 from transformers import WhisperConfig, WhisperForConditionalGeneration
 
-from training.speech.features import HOP, N_FFT
+from training.speech.clips.features import HOP, N_FFT
 from training.speech.network import LARGEST_FRAMES, MELS, TEXT_POSITIONS
 from training.speech.sizes import TrainingSize
 from training.speech.tokens import TOKENIZER, Coder, settings

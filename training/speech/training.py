@@ -19,11 +19,11 @@ from torch.nn import functional
 
 from training.speech.batches import ClipPool, Maker, SpeechBatch
 from training.speech.card import METRICS, read_metrics
-from training.speech.framing import IGNORED
+from training.speech.clips.framing import IGNORED
+from training.speech.clips.sentences import draw_sentence
+from training.speech.clips.spoiling import Spoiler
 from training.speech.network import RecogniserNetwork
-from training.speech.sentences import draw_sentence
 from training.speech.sizes import TrainingSize
-from training.speech.spoiling import Spoiler
 from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
 from training.speech.warm_start import NotReadable, weights_of, widened
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from training.speech.sentences import HELD_OUT, draw_sentence
+from training.speech.clips.sentences import HELD_OUT, draw_sentence
 from training.voices import espeak, festival
 from training.voices.cast import (
     Speaker,

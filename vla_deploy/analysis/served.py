@@ -9,8 +9,8 @@ from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.prompt import chat_about
 from vla_deploy.analysis.question import Analyser, SceneQuestion
 from vla_deploy.model_servers.asking import StructuredAsker
+from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.errors import ModelServerError
-from vla_deploy.model_servers.picture import small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 

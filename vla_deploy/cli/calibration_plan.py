@@ -8,7 +8,7 @@ from drivers.dynamixel.tools.travel import JointRange, ServoMounting
 from vla_deploy.cli.calibration_guide import GuidedJoint
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.mjcf import read_mjcf_names
+from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 
 def read_pose(robot: RobotDescription, text: str) -> dict[str, float]:

@@ -29,7 +29,7 @@ from vla_deploy.perception.camera_tools.lens_fit import MODELS, LensFit, fit_len
 from vla_deploy.perception.camera_tools.selecting import ViewSelection, select
 from vla_deploy.perception.geometry.rotation import angle_rad
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.camera_calibration import (
+from vla_deploy.robots.calibration.camera_calibration import (
     LENS_FILE,
     MOUNTING_FILE,
     require_plausible,
@@ -37,7 +37,7 @@ from vla_deploy.robots.camera_calibration import (
     write_mounting,
 )
 from vla_deploy.robots.description import CameraMounting, LensCalibration
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 TOOL: Final = "vla-deploy camera calibrate"
 CHECK_ERROR_PX: Final = 0.8

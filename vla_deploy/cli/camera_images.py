@@ -19,7 +19,7 @@ from vla_deploy.perception.camera_tools.board import CalibrationBoard, Image
 from vla_deploy.perception.objects.history import JointHistory
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import CameraDescription
-from vla_deploy.robots.model import full_positions
+from vla_deploy.robots.kinematics.model import full_positions
 from vla_deploy.robots.schema import is_number
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.navigation.map_check import as_characters, check_for_robot, describe
-from vla_deploy.navigation.map_file import (
+from vla_deploy.navigation.maps.map_check import as_characters, check_for_robot, describe
+from vla_deploy.navigation.maps.map_file import (
     MapFile,
     MapMode,
     image_of,
@@ -163,7 +163,7 @@ def _require_free(to: Path, *, replace: bool) -> None:
 
 def as_trinary(file: MapFile) -> MapFile:
     """Return the map with the shades that map_server writes; what it calls low stays dark grey."""
-    from vla_deploy.navigation.map_file import FREE_SHADE, OCCUPIED_SHADE, UNKNOWN_SHADE
+    from vla_deploy.navigation.maps.map_file import FREE_SHADE, OCCUPIED_SHADE, UNKNOWN_SHADE
 
     if file.mode is MapMode.TRINARY and not file.negate:
         return file

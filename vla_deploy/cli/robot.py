@@ -7,7 +7,7 @@ from typing import Any
 
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.urdf import urdf_of
+from vla_deploy.robots.kinematics.urdf import urdf_of
 
 EXAMPLES = "  vla-deploy robot urdf --robot butler --out butler.urdf\n"
 URDF_EXAMPLES = """  vla-deploy robot urdf > butler.urdf

@@ -36,7 +36,7 @@ from vla_deploy.cli.servo_wire import (
     wire_of,
 )
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.calibration import (
+from vla_deploy.robots.calibration.calibration import (
     CALIBRATION_FILE,
     JointCalibration,
     read_calibration,

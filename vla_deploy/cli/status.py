@@ -9,7 +9,7 @@ from typing import Any, Final
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.dashboard.robot_state import collect
-from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
+from vla_deploy.navigation.localising.place_judge import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome
 
 KEEPS_UP: Final = 0.95

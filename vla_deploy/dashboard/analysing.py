@@ -14,7 +14,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.robots import load_robot
 from vla_deploy.world import SceneUnreadable, Viewpoint
 

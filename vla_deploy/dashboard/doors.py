@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from vla_deploy.dashboard.errors import PortTaken
-from vla_deploy.ipc.doorbell import short_path
+from vla_deploy.ipc.memory.doorbell import short_path
 
 SOCKET_NAME: Final = "dashboard.sock"
 _BACKLOG: Final = 128

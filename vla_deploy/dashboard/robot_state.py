@@ -6,7 +6,7 @@ import numpy as np
 
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import Sample
-from vla_deploy.navigation.place_judge import Doubt, PlaceState
+from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
 
 
 def collect(link: RobotLink) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
 from vla_deploy.ipc.errors import BadPayload, ClaimRefused
-from vla_deploy.ipc.shared_document import Document
+from vla_deploy.ipc.memory.shared_document import Document
 from vla_deploy.ipc.space import SharedSpace
 
 TOPIC: Final = "claims"

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc.segment import Segment
-from vla_deploy.ipc.slot import SlotReader
+from vla_deploy.ipc.memory.segment import Segment
+from vla_deploy.ipc.memory.slot import SlotReader
 
 _READ_ROUNDS = 4
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.ipc.errors import BadPayload
-from vla_deploy.ipc.frame_ring import Frame
+from vla_deploy.ipc.memory.frame_ring import Frame
 
 MILLIMETRE_M: Final = 0.001
 _RGB_BYTES: Final = 3

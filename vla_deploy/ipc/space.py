@@ -4,16 +4,16 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from drivers.clock import Clock
-from vla_deploy.ipc.cell import CellReader, CellWriter
-from vla_deploy.ipc.doorbell import Doorbell
 from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
-from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
+from vla_deploy.ipc.memory.cell import CellReader, CellWriter
+from vla_deploy.ipc.memory.doorbell import Doorbell
+from vla_deploy.ipc.memory.frame_ring import FrameReader, FrameWriter
+from vla_deploy.ipc.memory.record_ring import RecordReader, RecordWriter
+from vla_deploy.ipc.memory.ring import RingReader, RingWriter
+from vla_deploy.ipc.memory.segment import Segment
+from vla_deploy.ipc.memory.shared_document import SharedDocument
 from vla_deploy.ipc.pulse import PulseReader
-from vla_deploy.ipc.record_ring import RecordReader, RecordWriter
 from vla_deploy.ipc.replay_mark import refuse_in_replay
-from vla_deploy.ipc.ring import RingReader, RingWriter
-from vla_deploy.ipc.segment import Segment
-from vla_deploy.ipc.shared_document import SharedDocument
 from vla_deploy.ipc.topics import TOPICS, Topic, TopicKind
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 Array = NDArray[np.float64]
 

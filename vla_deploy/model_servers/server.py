@@ -5,9 +5,13 @@ from collections.abc import Callable
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.model_servers.admission import Admission
-from vla_deploy.model_servers.backoff import Backoff, may_pass
-from vla_deploy.model_servers.breaker import BreakerState, CircuitBreaker
+from vla_deploy.model_servers.calls.admission import Admission
+from vla_deploy.model_servers.calls.backoff import Backoff, may_pass
+from vla_deploy.model_servers.calls.breaker import BreakerState, CircuitBreaker
+from vla_deploy.model_servers.calls.exchange import Exchange
+from vla_deploy.model_servers.calls.privacy import check_privacy
+from vla_deploy.model_servers.calls.rate import CallRate
+from vla_deploy.model_servers.calls.replies import document_of
 from vla_deploy.model_servers.chat import Chat, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.deadline import Deadline
@@ -19,13 +23,9 @@ from vla_deploy.model_servers.errors import (
     TimedOut,
     Unavailable,
 )
-from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.formats.base import Format, Json, ModelFacts, WireRequest
 from vla_deploy.model_servers.formats.table import FORMATS
 from vla_deploy.model_servers.metrics import CallMetrics
-from vla_deploy.model_servers.privacy import check_privacy
-from vla_deploy.model_servers.rate import CallRate
-from vla_deploy.model_servers.replies import document_of
 from vla_deploy.model_servers.settings import ServerSettings
 
 

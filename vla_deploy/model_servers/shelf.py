@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.clock import Clock
+from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import ServerUnknown
-from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.servers_file import SERVERS_FILE, read_servers
 from vla_deploy.model_servers.settings import ServerSettings

@@ -2,9 +2,9 @@
 
 from typing import Final
 
-from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.maps.grid_map import load_map
+from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.zones import with_zones
 from vla_deploy.robots import RobotDescription
 
 CLEARANCE_MARGIN_M: Final = 0.03

@@ -9,14 +9,14 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.depth_band import depth_band
-from vla_deploy.navigation.mapping import Mapper
-from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
 from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 FRESH_YAW_NS: Final = NS_PER_S // 10
 

@@ -19,7 +19,7 @@ from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.perception.sensors import Sensors
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world.surfaces import furniture_points

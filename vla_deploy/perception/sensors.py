@@ -13,7 +13,7 @@ from drivers.lidar.base import Lidar, Scan
 from drivers.opener import DeviceOpener
 from drivers.reopening import Reopening
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 _log = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from enum import Enum, StrEnum
 from typing import Any, Protocol
 
 from vla_deploy.memory.episode import LastSeen
+from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan

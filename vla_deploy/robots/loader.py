@@ -8,8 +8,9 @@ from xml.etree import ElementTree
 
 from platforms.profile_source import merged
 from vla_deploy.robots import protection_schema, schema
-from vla_deploy.robots.calibration import calibrated
-from vla_deploy.robots.camera_calibration import with_calibration
+from vla_deploy.robots.calibration.calibration import calibrated
+from vla_deploy.robots.calibration.camera_calibration import with_calibration
+from vla_deploy.robots.calibration.overrides import read_overrides, traced
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
     Audio,
@@ -34,8 +35,7 @@ from vla_deploy.robots.description import (
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
-from vla_deploy.robots.overrides import read_overrides, traced
+from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.ros_settings import ROS, ros_settings
 from vla_deploy.robots.schema import RobotFileFault, Shape, check_record

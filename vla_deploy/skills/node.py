@@ -25,10 +25,10 @@ from vla_deploy.planning.plan import Plan
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.advice import Adviser
-from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import SkillLink
+from vla_deploy.skills.movements.arms import believe_fingers, recall_hands
 from vla_deploy.skills.recovery import Recovery
 from vla_deploy.skills.resources import body_of
 from vla_deploy.skills.ros_goals import RosGoals

@@ -2,16 +2,16 @@
 
 from types import MappingProxyType
 
-from vla_deploy.skills.arms import close_gripper, move_arm, open_gripper
+from vla_deploy.skills.actions.find import find_object
+from vla_deploy.skills.actions.hand_over import hand_over
+from vla_deploy.skills.actions.navigate import navigate_to
+from vla_deploy.skills.actions.pick import pick_up
+from vla_deploy.skills.actions.place import place
+from vla_deploy.skills.actions.simple import speak, stop, wait
 from vla_deploy.skills.context import SkillFunction
-from vla_deploy.skills.drive import move, turn
-from vla_deploy.skills.find import find_object
-from vla_deploy.skills.gaze import look_at
-from vla_deploy.skills.hand_over import hand_over
-from vla_deploy.skills.navigate import navigate_to
-from vla_deploy.skills.pick import pick_up
-from vla_deploy.skills.place import place
-from vla_deploy.skills.simple import speak, stop, wait
+from vla_deploy.skills.movements.arms import close_gripper, move_arm, open_gripper
+from vla_deploy.skills.movements.drive import move, turn
+from vla_deploy.skills.movements.gaze import look_at
 
 SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
     {

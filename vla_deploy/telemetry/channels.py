@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from vla_deploy.ipc import BY_NAME, TOPICS, PackedField, Topic, TopicKind
-from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.telemetry.history import Kept
 from vla_deploy.telemetry.schemas.geometry import CAMERA, time_json
 from vla_deploy.telemetry.schemas.well_known import well_known
@@ -24,7 +24,7 @@ _TICK = {
     "writer_pid": {"type": "integer", "description": "pid of control"},
     "cause": {"type": "string"},
     "reaction": {"type": "string"},
-    "record": {**_BYTES, "description": "vla_deploy.ipc.delta, exact to the bit"},
+    "record": {**_BYTES, "description": "vla_deploy.ipc.memory.delta, exact to the bit"},
 }
 
 

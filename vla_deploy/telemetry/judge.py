@@ -8,8 +8,8 @@ from importlib.resources import files
 from typing import Any
 
 from vla_deploy.ipc import BadPayload
-from vla_deploy.ipc.delta import DeltaReader
-from vla_deploy.ipc.packing import Catalogue, types_within
+from vla_deploy.ipc.memory.delta import DeltaReader
+from vla_deploy.ipc.memory.packing import Catalogue, types_within
 from vla_deploy.safety import SafetyInputs, SafetyLimits, SafetyState, Verdict, evaluate
 from vla_deploy.telemetry.errors import FlightForeign
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vla_deploy.ipc import BadPayload, Record
-from vla_deploy.ipc.delta import DeltaReader
+from vla_deploy.ipc.memory.delta import DeltaReader
 from vla_deploy.telemetry.channels import TICKS, TOPIC_CHANNELS, tick_text, value_text
 from vla_deploy.telemetry.history import Kept
 from vla_deploy.telemetry.judge import JUDGED_TYPES, rules_digest

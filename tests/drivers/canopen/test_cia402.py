@@ -11,7 +11,7 @@ from drivers.canopen.cia402 import (
     controlword_for,
     decode_statusword,
 )
-from sim_twin.can.power_state_machine import STATE_BITS, PowerStateMachine
+from sim_twin.can.cia402.power_state_machine import STATE_BITS, PowerStateMachine
 
 
 @given(st.integers(0, 0xFFFF))

@@ -11,7 +11,7 @@ from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.odrive.codec import AxisError
 from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
-from sim_twin.can.odrive import ODriveAxis
+from sim_twin.can.odrive.axis import ODriveAxis
 
 TICK_NS = 4_000_000
 HEARTBEAT_S = 0.1

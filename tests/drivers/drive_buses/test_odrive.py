@@ -30,8 +30,8 @@ from drivers.odrive.endpoints import (
 )
 from drivers.odrive.faults import AxisFault
 from sim_twin.can import MemoryBus
-from sim_twin.can.odrive import _REACTIONS
-from sim_twin.can.odrive_meters import ODriveMeters
+from sim_twin.can.odrive.axis import _REACTIONS
+from sim_twin.can.odrive.meters import ODriveMeters
 
 
 def with_endpoints(bench: Any, path: Path) -> ODriveBus:

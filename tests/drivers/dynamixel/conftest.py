@@ -7,7 +7,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
 from drivers.dynamixel.codec import Instruction, PacketParser
 from drivers.errors import LinkLost
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 from sim_twin.servos.server import FreeServos
 

@@ -8,7 +8,7 @@ from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent
 from drivers.dynamixel.link import PacketLink, ReplyPatience
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.server import FreeServos
 

@@ -24,7 +24,7 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
-from sim_twin.process_stack import ProcessStack
+from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.dashboard.access import Role
 from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile

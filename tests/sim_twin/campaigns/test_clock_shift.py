@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.campaigns.clock_shift import CannotShift, ClockShift
+from sim_twin.campaigns.pressing.clock_shift import CannotShift, ClockShift
 
 ECHO = """
 import sys, time

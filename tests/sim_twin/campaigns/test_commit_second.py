@@ -1,7 +1,7 @@
 """Late ticks around a commit count by themselves; the computer's own stalls explain some."""
 
-from sim_twin.campaigns.commit_second import CommitLook, commit_ns, explained, late_around
-from sim_twin.stillness import Stall
+from sim_twin.campaigns.switching.commit_second import CommitLook, commit_ns, explained, late_around
+from sim_twin.harness.stillness import Stall
 
 S = 1_000_000_000
 LOOKS = [

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.campaigns import fault_matrix
-from sim_twin.campaigns.fault_matrix import Cell, cells, play
-from sim_twin.campaigns.phases import NotSet, Phase, PhaseStage
+from sim_twin.campaigns.faulting import fault_matrix
+from sim_twin.campaigns.faulting.fault_matrix import Cell, cells, play
+from sim_twin.campaigns.faulting.phases import NotSet, Phase, PhaseStage
+from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.report import CampaignCase
-from sim_twin.campaigns.separation import Separation
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import faults_of
-from sim_twin.stack import LockstepControl
+from sim_twin.harness.stack import LockstepControl
 from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")

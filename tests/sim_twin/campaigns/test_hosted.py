@@ -10,8 +10,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sim_twin.campaigns import hog
 from sim_twin.campaigns.hosted import BURDENED, table_with_hog
+from sim_twin.campaigns.pressing import hog
 from vla_deploy.supervisor.table import TABLE
 
 

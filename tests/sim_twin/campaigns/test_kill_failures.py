@@ -1,6 +1,6 @@
 """What follows a kill too late, or not at all, is a failure; what is in time is none."""
 
-from sim_twin.campaigns.kill_failures import late, late_ready
+from sim_twin.campaigns.killing.failures import late, late_ready
 
 
 def test_what_is_in_time_is_no_failure() -> None:

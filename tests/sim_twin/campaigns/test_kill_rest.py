@@ -5,8 +5,8 @@ import signal
 
 import pytest
 
-from sim_twin.campaigns.kill_rest import STILL_RAD, RestWatch
-from sim_twin.campaigns.kill_rules import RULES
+from sim_twin.campaigns.killing.rest import STILL_RAD, RestWatch
+from sim_twin.campaigns.killing.rules import RULES
 
 KILLED = RULES["control", signal.SIGKILL]
 

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from sim_twin.campaigns.kill_rules import (
+from sim_twin.campaigns.killing.rules import (
     COMMANDS,
     GRAVEST,
     PUT_DOWN,

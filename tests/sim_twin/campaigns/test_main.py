@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sim_twin.campaigns import __main__ as campaigns
-from sim_twin.campaigns import kills
+from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 
 REPORT = CampaignReport(

@@ -10,12 +10,13 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sim_twin.campaigns import switches
 from sim_twin.campaigns.orderly_end import EXIT_TERMINATED
+from sim_twin.campaigns.switching import switches
 
 SCRIPT = """
 import sys, tempfile, time
-from sim_twin.campaigns import __main__ as campaigns, fault_matrix
+from sim_twin.campaigns import __main__ as campaigns
+from sim_twin.campaigns.faulting import fault_matrix
 
 def play(cell, seed=0):
     with tempfile.TemporaryDirectory(dir=sys.argv[1], prefix="vla-"):

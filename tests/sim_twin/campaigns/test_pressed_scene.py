@@ -6,8 +6,8 @@ from pathlib import Path
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from platforms.probes import open_probes
-from sim_twin.campaigns.pressed_scene import PROFILE, PressedScene
-from sim_twin.campaigns.troubles import TROUBLES
+from sim_twin.campaigns.pressing.pressed_scene import PROFILE, PressedScene
+from sim_twin.campaigns.pressing.troubles import TROUBLES
 from vla_deploy.supervisor.budgets.emergency import Emergencies, critical_trips_c
 
 

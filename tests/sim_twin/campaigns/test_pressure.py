@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from sim_twin.campaigns import pressure
-from sim_twin.campaigns.pressure_judge import TroubleSeen, judge, steps_of
+from sim_twin.campaigns.pressing import pressure
+from sim_twin.campaigns.pressing.judge import TroubleSeen, judge, steps_of
+from sim_twin.campaigns.pressing.troubles import TROUBLES
 from sim_twin.campaigns.ticks import TickWatch
-from sim_twin.campaigns.troubles import TROUBLES
 
 HOG = next(trouble for trouble in TROUBLES if trouble.name == "memory_hog")
 QUIET = TickWatch(ticks=1000, late=2)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from platforms import ProfileError, load_profile
-from sim_twin.campaigns import switches
-from sim_twin.campaigns.switch_judge import (
+from sim_twin.campaigns.switching import switches
+from sim_twin.campaigns.switching.judge import (
     MOST_MIB_PER_SWITCH,
     SwitchSeen,
     judge,
@@ -17,7 +17,7 @@ from sim_twin.campaigns.switch_judge import (
     slopes,
     ticks_case,
 )
-from sim_twin.campaigns.switch_profiles import BAD, GOOD
+from sim_twin.campaigns.switching.profiles import BAD, GOOD
 from sim_twin.campaigns.ticks import TickWatch
 
 KEPT = SwitchSeen(

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_twin.can.frame_bits import arbitration_key, crc15, frame_bits, stuff_bits
+from sim_twin.can.bus.frame_bits import arbitration_key, crc15, frame_bits, stuff_bits
 
 FRAMES = st.builds(
     lambda extended, can_id, remote, data: can.Message(

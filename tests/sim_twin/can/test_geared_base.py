@@ -8,7 +8,7 @@ import pytest
 from drivers.odrive import EMULATED_ENDPOINTS
 from platforms import load_profile
 from sim_twin.can import MemoryBus
-from sim_twin.clock import SimClock
+from sim_twin.timing.clock import SimClock
 from sim_twin.twin import Twin
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import load_robot

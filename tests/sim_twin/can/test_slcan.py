@@ -16,9 +16,9 @@ from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
 from sim_twin.can import MotorMounting, WheelDrive
+from sim_twin.can.bus.slcan import SlcanAdapter
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
-from sim_twin.can.slcan import SlcanAdapter
-from sim_twin.pty_line import PtyLine
+from sim_twin.ports.pty_line import PtyLine
 
 TICK_NS = 4_000_000
 PATIENCE_NS = 10_000_000_000

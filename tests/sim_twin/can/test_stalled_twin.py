@@ -14,7 +14,7 @@ from drivers.canopen.spec import HOST_NODE_ID
 from platforms import load_profile
 from sim_twin import process
 from sim_twin.can import WheelDrive
-from sim_twin.engine import STEP_NS
+from sim_twin.physics.engine import STEP_NS
 from sim_twin.priority import Priority
 from sim_twin.process import TwinOptions, TwinProcess
 from vla_deploy.control.output.wheels import Wheels

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_twin.can.velocity_loop import VelocityLoop, ramp_towards
+from sim_twin.can.cia402.velocity_loop import VelocityLoop, ramp_towards
 
 VELOCITY = st.floats(-50.0, 50.0)
 STEP = st.floats(0.001, 10.0)

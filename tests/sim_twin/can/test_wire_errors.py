@@ -5,9 +5,9 @@ import can
 import pytest
 
 from sim_twin.can import CanWire, MemoryBus
-from sim_twin.can.error_counters import ErrorCounters, ErrorState
-from sim_twin.can.error_frames import BUS_OFF, CONTROLLER, NO_ACKNOWLEDGEMENT, RESTARTED
-from sim_twin.can.station import QUEUE_FRAMES
+from sim_twin.can.bus.error_counters import ErrorCounters, ErrorState
+from sim_twin.can.bus.error_frames import BUS_OFF, CONTROLLER, NO_ACKNOWLEDGEMENT, RESTARTED
+from sim_twin.can.bus.station import QUEUE_FRAMES
 
 MS = 1_000_000
 

@@ -4,7 +4,7 @@ import can
 import pytest
 
 from sim_twin.can import CanWire, MemoryBus
-from sim_twin.can.frame_bits import INTERMISSION_BITS, frame_bits
+from sim_twin.can.bus.frame_bits import INTERMISSION_BITS, frame_bits
 
 BITRATE = 500_000
 BIT_NS = 2_000

@@ -8,7 +8,7 @@ from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.desk import FaultDesk
 from sim_twin.faults.table import EFFECTS, faults_of
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 
 ELBOW_ID = 3
 

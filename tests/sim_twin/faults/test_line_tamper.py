@@ -5,7 +5,7 @@ from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsi
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
 from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 

@@ -13,7 +13,7 @@ from drivers.errors import DeviceMissing, LinkLost
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import EFFECTS
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 
 FORMAT = AudioFormat(rate_hz=16_000)
 POLL_S = 0.02

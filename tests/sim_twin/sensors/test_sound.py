@@ -7,7 +7,7 @@ from drivers.audio.base import AudioFormat, Samples
 from drivers.audio.pcm_protocol import PcmParser
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from sim_twin.errors import TwinModelMismatch
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from sim_twin.sensors.sound import MicrophoneDevice
 
 SPEECH = AudioFormat(rate_hz=16_000)

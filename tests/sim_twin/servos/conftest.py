@@ -15,7 +15,7 @@ from drivers.dynamixel.codec import (
 )
 from drivers.dynamixel.control_table import MODELS, OperatingMode
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
-from sim_twin.servos.rotor import FreeRotors
+from sim_twin.servos.firmware.rotor import FreeRotors
 
 STEP_NS = 2_000_000
 

@@ -18,7 +18,7 @@ from drivers.dynamixel.codec import (
     unstuff,
 )
 from sim_twin.servos import EmulatedServoSpec, ServoBank
-from sim_twin.servos.instructions import BrokenPacket, InstructionParser
+from sim_twin.servos.protocol.instructions import BrokenPacket, InstructionParser
 
 PING = encode_instruction(1, Instruction.PING)
 STREAMS, CAMPAIGN_STREAMS = 20_000, 1_000_000

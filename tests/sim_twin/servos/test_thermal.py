@@ -1,4 +1,4 @@
-"""Temperatures against the constants that `sim_twin.servos.thermal` documents."""
+"""Temperatures against the constants that `sim_twin.servos.firmware.thermal` documents."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import pytest
 
 from drivers.dynamixel.control_table import HardwareError, OperatingMode
 from drivers.dynamixel.models import MODELS
-from sim_twin.servos.thermal import (
+from sim_twin.servos.firmware.thermal import (
     WINDING_SHARE,
     WINDING_TIME_CONSTANT_S,
     Thermals,

@@ -8,9 +8,9 @@ import pytest
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.codec import BROADCAST_ID, Instruction, encode_instruction
 from drivers.dynamixel.control_table import BAUD_RATES
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
+from sim_twin.servos.protocol.timing import FIFO_BYTES, WireTiming
 from sim_twin.servos.server import FreeServos, make_specs
-from sim_twin.servos.timing import FIFO_BYTES, WireTiming
 
 COUNT = 16
 BLOCK = struct.pack("<HH", 126, 10) + bytes(range(1, COUNT + 1))

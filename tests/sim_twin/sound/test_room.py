@@ -6,7 +6,7 @@ import pytest
 from drivers.audio.base import AudioFormat
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from sim_twin.sensors.sound import LATENCY_NS, MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.hearing import let_arrive
 from sim_twin.sound.room import NOISE_SIGMA, Room

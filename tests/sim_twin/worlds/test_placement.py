@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim_twin.compose import compose
+from sim_twin.physics.compose import compose
 from sim_twin.worlds import draw_poses, load_world
 from vla_deploy.robots import load_robot
 

@@ -3,10 +3,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from sim_twin.renderer import GLContext, open_gl_context
+from sim_twin.pictures.renderer import GLContext, open_gl_context
 from training.detector.classes import CLASSES
 from training.detector.dataset import draw_shard
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 
 pytestmark = pytest.mark.gl
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_twin.renderer import open_gl_context
+from sim_twin.pictures.renderer import open_gl_context
 from training.detector.dataset import Shard, draw_shard
-from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import judge_file, run
 from training.detector.files import FILES, METRICS
+from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 
 SHIPPED = Path(__file__).parents[3] / "vla_deploy" / "models" / "detector"
 NEVER_DRAWN_BEFORE = 9000

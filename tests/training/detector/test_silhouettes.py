@@ -2,8 +2,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from training.detector.drawing import HEIGHT_PX
-from training.detector.silhouettes import extent
+from training.detector.scenes.drawing import HEIGHT_PX
+from training.detector.scenes.silhouettes import extent
 
 WORLD = """
 <mujoco>

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from training.detector.spoil import spoil
+from training.detector.scenes.spoil import spoil
 
 
 def spoiled(level: int) -> np.ndarray:

@@ -5,10 +5,10 @@ from random import Random
 
 import pytest
 
-from training.planner.clause import load_groups
-from training.planner.composing import Composer
-from training.planner.grammar import PatternInvalid, expand, parse
-from training.planner.telling import load_told
+from training.planner.sentences.clause import load_groups
+from training.planner.sentences.composing import Composer
+from training.planner.sentences.grammar import PatternInvalid, expand, parse
+from training.planner.sentences.telling import load_told
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, IMPLIED, STEPS, field_names
 
 

@@ -4,8 +4,8 @@ from random import Random
 
 import pytest
 
-from training.planner.grammar import PatternInvalid
-from training.planner.telling import (
+from training.planner.sentences.grammar import PatternInvalid
+from training.planner.sentences.telling import (
     AFTER,
     BEFORE,
     Mark,

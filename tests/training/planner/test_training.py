@@ -9,10 +9,10 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from training.planner.composing import Composer  # noqa: E402
 from training.planner.export import export  # noqa: E402
 from training.planner.files import MEAN_OF, TOKENIZER  # noqa: E402
 from training.planner.going_on import NEW_SHARE, mean  # noqa: E402
+from training.planner.sentences.composing import Composer  # noqa: E402
 from training.planner.settings import SIZES  # noqa: E402
 from training.planner.training import train  # noqa: E402
 from vla_deploy.inference.language_model import LanguageModel  # noqa: E402

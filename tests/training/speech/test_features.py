@@ -6,7 +6,7 @@ import pytest
 torch = pytest.importorskip("torch")
 faster_whisper = pytest.importorskip("faster_whisper")
 
-from training.speech.features import HOP, frames  # noqa: E402
+from training.speech.clips.features import HOP, frames  # noqa: E402
 
 
 def test_frames_are_those_that_faster_whisper_makes() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 
-from training.speech.pausing import HESITATIONS, hesitating, with_pauses
-from training.speech.sentences import draw_sentence, normal
+from training.speech.clips.pausing import HESITATIONS, hesitating, with_pauses
+from training.speech.clips.sentences import draw_sentence, normal
 
 
 def test_a_pause_changes_no_word() -> None:

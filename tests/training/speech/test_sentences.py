@@ -3,8 +3,8 @@ from pathlib import Path
 
 import numpy as np
 
-from training.speech.planner_commands import draw_planner_command
-from training.speech.sentences import (
+from training.speech.clips.planner_commands import draw_planner_command
+from training.speech.clips.sentences import (
     MOST_WORDS,
     draw_sentence,
     fill,

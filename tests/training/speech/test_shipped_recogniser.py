@@ -8,7 +8,7 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from training.speech.card import AIMS, METRICS, read_metrics, verdict
-from training.speech.sentences import normal
+from training.speech.clips.sentences import normal
 from training.speech.shipping import BEAM, CARD, LEAST_CONFIDENCE, SHIPPED
 from training.speech.trials import heard, noises_alone
 from training.voices.cast import Speaker, say

@@ -18,8 +18,8 @@ from vla_deploy.cli.main import main
 from vla_deploy.perception.camera_tools.board import CalibrationBoard
 from vla_deploy.perception.geometry.lens import rays_of
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.loader import ROBOTS_DIR
-from vla_deploy.robots.model import RobotModel, full_positions
 
 Array = NDArray[np.float64]
 BOARD = CalibrationBoard(square_m=0.055)

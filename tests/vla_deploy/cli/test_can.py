@@ -11,7 +11,7 @@ import pytest
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.can import CanHub, CanWire, WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
-from sim_twin.can.odrive import ODriveAxis
+from sim_twin.can.odrive.axis import ODriveAxis
 from vla_deploy.cli.main import main
 
 CLOCK = MonotonicClock()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.navigation.map_file import MapFile, MapMode, read_map_file, write_map_file
+from vla_deploy.navigation.maps.map_file import MapFile, MapMode, read_map_file, write_map_file
 from vla_deploy.robots import load_robot
 
 KEPT = load_robot("butler").home.map_path

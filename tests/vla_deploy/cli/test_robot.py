@@ -4,7 +4,7 @@ import pytest
 
 from vla_deploy.cli.main import main
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.urdf import urdf_of
+from vla_deploy.robots.kinematics.urdf import urdf_of
 
 
 def test_urdf_is_printed_or_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

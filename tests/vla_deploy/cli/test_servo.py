@@ -19,7 +19,7 @@ from sim_twin.servos.server import FreeServos, serve
 from vla_deploy.cli import servo_find, servo_wire
 from vla_deploy.cli.main import main
 from vla_deploy.cli.servo_wire import SPEEDS
-from vla_deploy.robots.calibration import read_calibration
+from vla_deploy.robots.calibration.calibration import read_calibration
 
 CLOCK = MonotonicClock()
 

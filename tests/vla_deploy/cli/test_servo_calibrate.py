@@ -14,7 +14,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel.control_table import PULSE_RAD
 from drivers.dynamixel.errors import ServoSilent
 from drivers.dynamixel.tools import BenchLink
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -22,7 +22,7 @@ from vla_deploy.cli.main import parser
 from vla_deploy.cli.servo_calibrate import calibrate
 from vla_deploy.cli.servo_wire import ServoWire
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.calibration import CALIBRATION_FILE, read_calibration
+from vla_deploy.robots.calibration.calibration import CALIBRATION_FILE, read_calibration
 from vla_deploy.robots.loader import ROBOTS_DIR
 
 LOWER, UPPER = "LOWER", "UPPER"

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from platforms import load_profile
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from sim_twin.twin import Twin
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace

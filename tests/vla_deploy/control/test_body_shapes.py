@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.control.judging.body_shapes import FLOOR, BodyShapes
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import full_positions
+from vla_deploy.robots.kinematics.model import full_positions
 from vla_deploy.robots.protection import ClearanceLimits
 
 ROBOT = load_robot("butler")

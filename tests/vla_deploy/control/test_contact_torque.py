@@ -5,7 +5,7 @@ import pytest
 
 from vla_deploy.control.judging.contact_torque import FILTER_S, ContactTorque
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 ROBOT = load_robot("butler")
 MODEL = RobotModel(ROBOT)

@@ -5,7 +5,7 @@ from typing import Any as Rig  # the class in conftest.py, which no test can imp
 import pytest
 
 from drivers.errors import DeviceMissing
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 
 
 def press(rig: Rig) -> None:

@@ -5,7 +5,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from drivers.dynamixel import DynamixelBus, HardwareError, ServoSpec
 from drivers.dynamixel.fault_policy import DEFAULT_RULES, FaultAction, FaultRule
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 from vla_deploy.control.output.servo_faults import RULES, ServoFaults

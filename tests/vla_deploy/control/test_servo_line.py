@@ -10,7 +10,7 @@ import pytest
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.opener import DeviceLink, PathOpener
 from platforms import load_profile
-from sim_twin.pty_line import PtyLine
+from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 from vla_deploy.control.output.servos import ServoLine

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from sim_twin.servos import WireTiming
 from vla_deploy.control.output.servos import REOPEN_NS, ServoLine
 from vla_deploy.robots import load_robot

@@ -9,7 +9,7 @@ from vla_deploy.control.modes.stop_plan import StopPlan
 from vla_deploy.control.output.gravity import GravityOffset, stiffness
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import StopCategory
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.safety import Reaction
 
 

@@ -9,7 +9,7 @@ import pytest
 from vla_deploy.control.judging.surroundings import SurroundingsWatch
 from vla_deploy.control.motion.setpoint_rates import SetpointRates
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.robots.model import full_positions
+from vla_deploy.robots.kinematics.model import full_positions
 
 pytestmark = pytest.mark.timeout(180)
 

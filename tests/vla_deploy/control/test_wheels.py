@@ -12,7 +12,7 @@ from platforms import load_profile
 from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
-from sim_twin.can.odrive import ODriveAxis
+from sim_twin.can.odrive.axis import ODriveAxis
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription, load_robot
 

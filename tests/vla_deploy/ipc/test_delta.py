@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.ipc import BadPayload
-from vla_deploy.ipc.delta import DeltaReader, DeltaWriter
-from vla_deploy.ipc.packing import Catalogue
+from vla_deploy.ipc.memory.delta import DeltaReader, DeltaWriter
+from vla_deploy.ipc.memory.packing import Catalogue
 
 NAMES = ("a", "b", "c")
 values = st.none() | st.booleans() | st.integers(0, 3) | st.floats(0, 1) | st.sampled_from("xyz")

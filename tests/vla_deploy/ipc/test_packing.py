@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from vla_deploy.ipc import BadPayload
-from vla_deploy.ipc.packing import Catalogue, Unpacker, types_within
+from vla_deploy.ipc.memory.packing import Catalogue, Unpacker, types_within
 
 
 class Colour(Enum):

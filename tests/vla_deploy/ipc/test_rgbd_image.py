@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc.errors import BadPayload
-from vla_deploy.ipc.frame_ring import Frame
+from vla_deploy.ipc.memory.frame_ring import Frame
 from vla_deploy.ipc.rgbd_image import colours, depths_m, depths_mm
 
 

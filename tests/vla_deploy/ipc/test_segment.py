@@ -14,7 +14,7 @@ from vla_deploy.ipc import (
     TopicKind,
     UnknownTopic,
 )
-from vla_deploy.ipc.layout import is_document, layout_of, record_dtype
+from vla_deploy.ipc.memory.layout import is_document, layout_of, record_dtype
 from vla_deploy.ipc.topics import BY_NAME
 
 PLACE = BY_NAME["pose"]

@@ -2,8 +2,8 @@ import mmap
 
 import pytest
 
-from vla_deploy.ipc.layout import SlotLayout
-from vla_deploy.ipc.slot import SlotReader, SlotWriter
+from vla_deploy.ipc.memory.layout import SlotLayout
+from vla_deploy.ipc.memory.slot import SlotReader, SlotWriter
 
 LAYOUT = SlotLayout(slots=3, capacity_bytes=64, stride_bytes=128)
 

@@ -11,7 +11,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorDesk
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.ipc.segment import Segment
+from vla_deploy.ipc.memory.segment import Segment
 from vla_deploy.ipc.stop_button import StopButton
 
 FORBIDDEN = (

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vla_deploy.ipc import PackedField, SharedSpace, Topic, TopicKind
-from vla_deploy.ipc.layout import file_name, layout_of
+from vla_deploy.ipc.memory.layout import file_name, layout_of
 
 WORD_BYTES = 8
 NEWEST_OFFSET = 96

@@ -5,7 +5,7 @@ from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 SIDES = ("left", "right")
 MAX_LOAD = 0.45

@@ -4,8 +4,8 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.credentials import Secret
-from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 

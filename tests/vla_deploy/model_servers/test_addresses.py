@@ -2,7 +2,7 @@ import socket
 
 import pytest
 
-from vla_deploy.model_servers.addresses import check_address, resolve
+from vla_deploy.model_servers.calls.addresses import check_address, resolve
 from vla_deploy.model_servers.errors import PrivacyRefused, ServerUnreachable, TimedOut
 
 

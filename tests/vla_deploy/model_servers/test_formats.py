@@ -4,12 +4,12 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, Field
 
+from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.table import FORMATS
 from vla_deploy.model_servers.settings import Api
-from vla_deploy.model_servers.wire_schema import is_closed, wire_schema
 
 JPEG = b"\xff\xd8 an image"
 BASE64 = base64.b64encode(JPEG).decode()

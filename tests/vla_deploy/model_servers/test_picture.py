@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vla_deploy.model_servers.picture import LONGEST_PX, MOST_BYTES, small_jpeg
+from vla_deploy.model_servers.calls.picture import LONGEST_PX, MOST_BYTES, small_jpeg
 
 
 @pytest.mark.parametrize("shape", [(480, 640), (1080, 1920), (900, 300), (1, 1)])

@@ -5,9 +5,11 @@ import threading
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from vla_deploy.model_servers.admission import Admission
-from vla_deploy.model_servers.backoff import Backoff, may_pass
-from vla_deploy.model_servers.breaker import BreakerState, CircuitBreaker
+from vla_deploy.model_servers.calls.admission import Admission
+from vla_deploy.model_servers.calls.backoff import Backoff, may_pass
+from vla_deploy.model_servers.calls.breaker import BreakerState, CircuitBreaker
+from vla_deploy.model_servers.calls.privacy import check_privacy
+from vla_deploy.model_servers.calls.rate import CallRate
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
@@ -20,8 +22,6 @@ from vla_deploy.model_servers.errors import (
     TimedOut,
 )
 from vla_deploy.model_servers.metrics import CallMetrics
-from vla_deploy.model_servers.privacy import check_privacy
-from vla_deploy.model_servers.rate import CallRate
 
 TEXT = Chat(messages=(ChatMessage(text="hello"),))
 IMAGE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))

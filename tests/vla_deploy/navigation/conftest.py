@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.grid_map import GridMap
-from vla_deploy.navigation.localisation import Localiser
+from vla_deploy.navigation.localising.localisation import Localiser
+from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.pose import Pose2D
 
 RESOLUTION_M: Final = 0.05

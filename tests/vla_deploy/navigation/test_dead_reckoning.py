@@ -3,7 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.dead_reckoning import FROZEN_SAMPLES, DeadReckoning, OdometryStep
+from vla_deploy.navigation.localising.dead_reckoning import (
+    FROZEN_SAMPLES,
+    DeadReckoning,
+    OdometryStep,
+)
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 
 TICK_NS = 20_000_000

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.maps.grid_map import load_map
 
 YAML = """# a flat
 image: flat.pgm

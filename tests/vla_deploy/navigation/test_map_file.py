@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.grid_map import grid_of
-from vla_deploy.navigation.map_file import (
+from vla_deploy.navigation.maps.grid_map import grid_of
+from vla_deploy.navigation.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
     OCCUPIED_SHADE,
@@ -214,7 +214,7 @@ import sys
 from pathlib import Path
 sys.modules["cv2"] = None
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.map_file import read_map_file
+from vla_deploy.navigation.maps.map_file import read_map_file
 try:
     print(read_map_file(Path(sys.argv[1])).shades.tolist())
 except MapInvalid as error:

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.map_file import (
+from vla_deploy.navigation.localising.scan_match import ScanPoints
+from vla_deploy.navigation.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
     OCCUPIED_SHADE,
     UNKNOWN_SHADE,
     MapFile,
 )
-from vla_deploy.navigation.mapping import Mapper
-from vla_deploy.navigation.occupancy import OccupancyGrid
+from vla_deploy.navigation.maps.mapping import Mapper
+from vla_deploy.navigation.maps.occupancy import OccupancyGrid
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
-from vla_deploy.navigation.scan_match import ScanPoints
 
 if TYPE_CHECKING:
     from conftest import TracedFlat

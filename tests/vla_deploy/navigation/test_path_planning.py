@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner, clearance_of
 
 RADIUS_M = 0.2

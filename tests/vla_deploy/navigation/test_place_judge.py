@@ -1,6 +1,6 @@
 import pytest
 
-from vla_deploy.navigation.place_judge import (
+from vla_deploy.navigation.localising.place_judge import (
     DOUBT_TEXT,
     LOST_AFTER_SCANS,
     LOST_SIGMA_M,

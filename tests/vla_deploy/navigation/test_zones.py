@@ -2,9 +2,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.maps.grid_map import GridMap
+from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.zones import with_zones
 from vla_deploy.robots.description import KeepOutZone
 
 ZONE = KeepOutZone(

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsics
 from platforms import Profile, load_profile
-from sim_twin.compose import compose
 from sim_twin.device import WireDevice
 from sim_twin.faults.line_tamper import LineTamper
-from sim_twin.head_camera import HeadCamera
-from sim_twin.lines import MemoryLine
-from sim_twin.probes import RangeProbe
+from sim_twin.physics.compose import compose
+from sim_twin.physics.probes import RangeProbe
+from sim_twin.pictures.head_camera import HeadCamera
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
@@ -32,7 +32,7 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.node import NodeContext
 
 Rgb = NDArray[np.uint8]

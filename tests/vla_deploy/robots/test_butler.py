@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.robots import RobotFileError, load_robot
-from vla_deploy.robots.calibration import (
+from vla_deploy.robots.calibration.calibration import (
     CALIBRATION_FILE,
     JointCalibration,
     read_calibration,

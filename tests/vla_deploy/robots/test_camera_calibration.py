@@ -10,7 +10,7 @@ import yaml
 
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.robots import RobotFileError, load_robot
-from vla_deploy.robots.camera_calibration import (
+from vla_deploy.robots.calibration.camera_calibration import (
     LENS_FILE,
     MOUNTING_FILE,
     read_lens,
@@ -19,8 +19,8 @@ from vla_deploy.robots.camera_calibration import (
     write_mounting,
 )
 from vla_deploy.robots.description import CameraMounting, LensCalibration
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.loader import ROBOTS_DIR
-from vla_deploy.robots.model import RobotModel, full_positions
 
 CAMERA = load_robot("butler").camera
 LENS = LensCalibration(

@@ -10,10 +10,10 @@ import pytest
 
 from tests.vla_deploy.robots.test_urdf import Invented
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.frame_tree import FrameTransform, FrameTree
-from vla_deploy.robots.model import RobotModel
-from vla_deploy.robots.orientation import matrix
-from vla_deploy.robots.urdf import urdf_of
+from vla_deploy.robots.kinematics.frame_tree import FrameTransform, FrameTree
+from vla_deploy.robots.kinematics.model import RobotModel
+from vla_deploy.robots.kinematics.orientation import matrix
+from vla_deploy.robots.kinematics.urdf import urdf_of
 
 EXACT = 1e-9
 TWO_HINGES = """<body name="wrist" pos="0.1 0.2 0.3" euler="10 20 30">

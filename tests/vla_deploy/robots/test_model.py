@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vla_deploy.robots import RobotDescription, RobotFileError, load_robot
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.robots.loader import ROBOTS_DIR
-from vla_deploy.robots.model import RobotModel
 
 SITES = ("left_grip", "right_grip", "head_camera", "lidar", "imu")
 

@@ -6,9 +6,13 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.robots import RobotFileError, load_robot
-from vla_deploy.robots.calibration import CALIBRATION_FILE, JointCalibration, write_calibration
+from vla_deploy.robots.calibration.calibration import (
+    CALIBRATION_FILE,
+    JointCalibration,
+    write_calibration,
+)
+from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE
 from vla_deploy.robots.loader import ROBOTS_DIR
-from vla_deploy.robots.overrides import OVERRIDES_FILE
 
 
 @pytest.fixture

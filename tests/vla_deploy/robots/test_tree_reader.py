@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel
-from vla_deploy.robots.tree_reader import read_tree
+from vla_deploy.robots.kinematics.model import RobotModel
+from vla_deploy.robots.kinematics.tree_reader import read_tree
 
 TURNED = """
 <mujoco>

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from tests.vla_deploy.robots.conftest import small_robot
 from vla_deploy.robots import RobotDescription, RobotFileError, load_robot
 from vla_deploy.robots.description import CameraMounting
-from vla_deploy.robots.model import RobotModel
-from vla_deploy.robots.urdf import roll_pitch_yaw, urdf_of
+from vla_deploy.robots.kinematics.model import RobotModel
+from vla_deploy.robots.kinematics.urdf import roll_pitch_yaw, urdf_of
 
 EXACT = 1e-9
 FRAMES = {
@@ -385,8 +385,8 @@ class Refuse:
             raise ImportError(f"{name} is not there")
 sys.meta_path.insert(0, Refuse())
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.frame_tree import FrameTree
-from vla_deploy.robots.urdf import urdf_of
+from vla_deploy.robots.kinematics.frame_tree import FrameTree
+from vla_deploy.robots.kinematics.urdf import urdf_of
 robot = load_robot("butler")
 FrameTree.of(robot).transforms({})
 sys.stdout.write(urdf_of(robot))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
-from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import FloorPose

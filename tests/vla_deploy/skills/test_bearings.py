@@ -7,16 +7,21 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Announcer, CellReader, ClaimBook, SharedSpace
-from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
+from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.place_judge import Doubt, PlaceState
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.description import FloorPose
-from vla_deploy.skills.bearings import SEARCH_RATE_RAD_S, SEARCH_S, SEARCH_TURN_RAD, find_myself
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, drive_to
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.link import SkillLink
+from vla_deploy.skills.movements.bearings import (
+    SEARCH_RATE_RAD_S,
+    SEARCH_S,
+    SEARCH_TURN_RAD,
+    find_myself,
+)
+from vla_deploy.skills.movements.drive import BLOCKED_TIMEOUT_S, drive_to
 
 STEP_S = 0.1
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from vla_deploy.robots import load_robot
-from vla_deploy.skills.drive import CRUISE_RATIO, limits_of
+from vla_deploy.skills.movements.drive import CRUISE_RATIO, limits_of
 
 
 @pytest.mark.parametrize(("asked_m_s", "ratio"), [(None, CRUISE_RATIO), (0.2, 0.4), (9.0, 0.9)])

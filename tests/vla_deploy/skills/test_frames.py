@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.robots.description import FloorPose
-from vla_deploy.skills.frames import to_base, to_map
+from vla_deploy.skills.movements.frames import to_base, to_map
 
 COORDINATE = st.floats(-10, 10)
 

@@ -3,7 +3,7 @@ from typing import TYPE_CHECKING, Any
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.gaze import MEMORY_S, SURE_CONFIDENCE, remembered
+from vla_deploy.skills.movements.gaze import MEMORY_S, SURE_CONFIDENCE, remembered
 
 if TYPE_CHECKING:
     from conftest import StandingLink

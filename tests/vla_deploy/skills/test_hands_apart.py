@@ -15,8 +15,8 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import full_positions
-from vla_deploy.skills.carrying import CARRY_POINT_M, RESTARTS, TUCK
+from vla_deploy.robots.kinematics.model import full_positions
+from vla_deploy.skills.movements.carrying import CARRY_POINT_M, RESTARTS, TUCK
 
 Floats = NDArray[np.float64]
 

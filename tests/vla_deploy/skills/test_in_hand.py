@@ -7,10 +7,10 @@ import pytest
 
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.symbolic.state import SymbolicState
-from vla_deploy.skills.arms import recall_hands
+from vla_deploy.skills.actions.pick import pick_up
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.errors import NotPossible
-from vla_deploy.skills.pick import pick_up
+from vla_deploy.skills.movements.arms import recall_hands
 from vla_deploy.skills.world_check import WorldCheck
 
 if TYPE_CHECKING:

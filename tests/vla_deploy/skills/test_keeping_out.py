@@ -7,10 +7,10 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.knowledge import parse_object
 from vla_deploy.robots.description import FloorPose
-from vla_deploy.skills import find
+from vla_deploy.skills.actions import find
+from vla_deploy.skills.actions.navigate import reach
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
-from vla_deploy.skills.navigate import reach
 
 if TYPE_CHECKING:
     from conftest import StandingLink

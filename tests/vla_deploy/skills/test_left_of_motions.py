@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S
+from vla_deploy.skills.movements.drive import BLOCKED_TIMEOUT_S
 
 if TYPE_CHECKING:
     from conftest import Executor

@@ -11,10 +11,10 @@ from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, turn
 from vla_deploy.skills.errors import RobotNotReady, TryAgain
 from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S, SkillLink
-from vla_deploy.skills.motion import move_joints
+from vla_deploy.skills.movements.drive import BLOCKED_TIMEOUT_S, turn
+from vla_deploy.skills.movements.motion import move_joints
 
 
 class SteppedClock:

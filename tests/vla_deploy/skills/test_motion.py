@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vla_deploy.skills.motion import minimum_jerk
+from vla_deploy.skills.movements.motion import minimum_jerk
 
 VELOCITY = np.array([1.0, 2.0, 0.5])
 ACCELERATION = np.array([4.0, 8.0, 2.0])

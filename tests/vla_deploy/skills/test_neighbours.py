@@ -5,8 +5,8 @@ import pytest
 
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.frames import to_map
-from vla_deploy.skills.neighbours import crowding_m
+from vla_deploy.skills.movements.frames import to_map
+from vla_deploy.skills.movements.neighbours import crowding_m
 
 if TYPE_CHECKING:
     from conftest import StandingLink

@@ -2,8 +2,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from vla_deploy.skills.actions.place import BELOW_RIM_M, DEEP_BELOW_RIM_M, below_rim_m
 from vla_deploy.skills.context import Held, SkillContext
-from vla_deploy.skills.place import BELOW_RIM_M, DEEP_BELOW_RIM_M, below_rim_m
 
 if TYPE_CHECKING:
     from conftest import StandingLink

@@ -17,7 +17,7 @@ from vla_deploy.ipc.ros_goals import (
     GoalRequest,
     GoalState,
 )
-from vla_deploy.skills.beyond import conclude, thinned
+from vla_deploy.skills.actions.beyond import conclude, thinned
 from vla_deploy.skills.errors import ServerLost
 from vla_deploy.skills.ros_goals import RosGoals, SentGoal
 

@@ -15,9 +15,9 @@ from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.executors import InlineExecutor
+from vla_deploy.skills.actions.simple import speak
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.link import SkillLink
-from vla_deploy.skills.simple import speak
 from vla_deploy.speech.voice.robot_voice import RobotVoice
 from vla_deploy.speech.voice.tts import EspeakEngine
 

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.frames import to_map
-from vla_deploy.skills.surfaces import APART_M, EDGE_M, free_spots, spots_beside
+from vla_deploy.skills.movements.frames import to_map
+from vla_deploy.skills.movements.surfaces import APART_M, EDGE_M, free_spots, spots_beside
 from vla_deploy.world.document import read_thing
 from vla_deploy.world.relations import is_next_to
 

@@ -3,8 +3,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.frames import to_map
-from vla_deploy.skills.swing import MARGIN_M, heights_above
+from vla_deploy.skills.movements.frames import to_map
+from vla_deploy.skills.movements.swing import MARGIN_M, heights_above
 
 if TYPE_CHECKING:
     from conftest import StandingLink

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.robots.model import full_positions
-from vla_deploy.skills.arms import move_arm
+from vla_deploy.robots.kinematics.model import full_positions
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import NotPossible
-from vla_deploy.skills.underside import BESIDE_M, STEP_BACK_M, way_back_m
+from vla_deploy.skills.movements.arms import move_arm
+from vla_deploy.skills.movements.underside import BESIDE_M, STEP_BACK_M, way_back_m
 
 if TYPE_CHECKING:
     from conftest import StandingLink

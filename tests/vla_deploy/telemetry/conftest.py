@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.stack import LockstepControl
+from sim_twin.harness.stack import LockstepControl
 from vla_deploy.telemetry.flight import Flight, read_flight
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode

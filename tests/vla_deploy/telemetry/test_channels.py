@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import BY_NAME, TOPICS
-from vla_deploy.ipc.layout import record_dtype
+from vla_deploy.ipc.memory.layout import record_dtype
 from vla_deploy.telemetry.channels import cell_text, channels_of
 
 

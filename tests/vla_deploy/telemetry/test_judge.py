@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.ipc.delta import DeltaReader, DeltaWriter
-from vla_deploy.ipc.packing import Catalogue
+from vla_deploy.ipc.memory.delta import DeltaReader, DeltaWriter
+from vla_deploy.ipc.memory.packing import Catalogue
 from vla_deploy.telemetry import judge
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightForeign

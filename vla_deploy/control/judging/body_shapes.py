@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vla_deploy.control.judging.near_pairs import NearPairs
 from vla_deploy.control.motion.axes import any_of
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.mjcf import read_mjcf_names
+from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]

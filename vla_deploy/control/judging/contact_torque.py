@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel.models import MODELS
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 FILTER_S = 0.06
 # After a longer silence the filters begin anew.

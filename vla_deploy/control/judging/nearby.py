@@ -10,7 +10,7 @@ from vla_deploy.control.judging.body_shapes import BodyShapes
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import BY_NAME, CellReader, SharedSpace
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.protection import ZoneSource
 from vla_deploy.safety.zones import BaseMotion, Points, moved
 

@@ -19,7 +19,7 @@ from vla_deploy.control.judging.zone_watch import ZoneWatch
 from vla_deploy.control.motion.axes import Floats, all_of
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.safety.balance import tip_margin_ratio
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings

@@ -5,8 +5,8 @@ from operator import attrgetter
 
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.ipc.delta import DeltaWriter
-from vla_deploy.ipc.packing import Catalogue, types_within
+from vla_deploy.ipc.memory.delta import DeltaWriter
+from vla_deploy.ipc.memory.packing import Catalogue, types_within
 from vla_deploy.safety import SafetyInputs, SafetyLimits, SafetyState, Verdict
 
 _INPUTS = tuple(field.name for field in fields(SafetyInputs))

@@ -10,7 +10,7 @@ from vla_deploy.control.judging.nearby import Nearby
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.robots.protection import Zone, ZoneSource
 from vla_deploy.safety.surroundings import ZoneFinding
 from vla_deploy.safety.zones import (

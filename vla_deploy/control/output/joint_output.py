@@ -12,7 +12,7 @@ from vla_deploy.control.output.limits import SetpointGate
 from vla_deploy.control.output.payload import Payload
 from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 # Of the torque that counts as contact: what a stopped joint may go on pressing with.
 EASED_RATIO: Final = 0.5

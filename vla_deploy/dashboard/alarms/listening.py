@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.told import Document, Told, Word
 from vla_deploy.ipc import TOPICS, Sample, TopicKind
-from vla_deploy.navigation.place_judge import Doubt, PlaceState
+from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
 
 DOCUMENTS: Final = frozenset(
     {

@@ -5,7 +5,7 @@ from typing import Final
 
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Told
-from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
+from vla_deploy.navigation.localising.place_judge import DOUBT_TEXT, Doubt
 
 _LOADING_S: Final = 30.0
 """Models are being loaded for so long after a start; that is no alarm."""

@@ -15,7 +15,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Frame, SharedSpace
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.kinematic_tree import KinematicTree
+from vla_deploy.robots.kinematics.kinematic_tree import KinematicTree
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from vla_deploy.dashboard.live.message import Message, Moment, json_message
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.localising.place_judge import PlaceState
 
 MOST_POINTS: Final = 600
 STEP_M: Final = 0.05

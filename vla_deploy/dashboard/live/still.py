@@ -6,10 +6,10 @@ from typing import Any, Final
 
 import cv2
 
-from vla_deploy.navigation.map_file import MapFile, read_map_file
+from vla_deploy.navigation.maps.map_file import MapFile, read_map_file
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.kinematic_tree import KinematicTree
-from vla_deploy.robots.tree_reader import read_tree
+from vla_deploy.robots.kinematics.kinematic_tree import KinematicTree
+from vla_deploy.robots.kinematics.tree_reader import read_tree
 
 _DIGITS: Final = 6
 

@@ -10,7 +10,7 @@ import numpy as np
 from vla_deploy.dashboard.live.feed import Feed
 from vla_deploy.dashboard.live.message import Message, Moment, json_message, text_message
 from vla_deploy.ipc import TOPICS, CellReader, RingReader, Sample, SharedSpace, Topic, TopicKind
-from vla_deploy.ipc.layout import is_document
+from vla_deploy.ipc.memory.layout import is_document
 
 FASTEST_S: Final = 0.1
 ON_CHANGE_S: Final = 0.5

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any, Final
 from urllib.parse import quote
 
+from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.base import Json, ModelFacts, WireRequest, count, part
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.model_servers.wire_schema import is_closed, wire_schema
 
 OUTPUT_FORMAT: Final = "output_format"
 # Models that know no output format fill in the arguments of a tool that they must use.

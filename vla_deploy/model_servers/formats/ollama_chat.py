@@ -3,6 +3,7 @@
 import base64
 from typing import Final
 
+from vla_deploy.model_servers.calls.wire_schema import wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerTruncated
@@ -15,7 +16,6 @@ from vla_deploy.model_servers.formats.base import (
     part,
 )
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.model_servers.wire_schema import wire_schema
 
 SCHEMA: Final = "schema"
 ANY_JSON: Final = "json"

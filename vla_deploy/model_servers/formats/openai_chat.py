@@ -4,6 +4,7 @@ import base64
 from collections.abc import Mapping
 from typing import Any, Final
 
+from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
@@ -16,7 +17,6 @@ from vla_deploy.model_servers.formats.base import (
     part,
 )
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.model_servers.wire_schema import is_closed, wire_schema
 
 JSON_SCHEMA: Final = "json_schema"
 # llama-cpp-python's server fails on `json_schema`, and takes the schema here instead.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.mjcf import read_mjcf_names
+from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from vla_deploy.perception.geometry.body import BodyMask
 from vla_deploy.perception.objects.hands import Hands, Hold
 from vla_deploy.perception.objects.history import JointHistory
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]

@@ -12,10 +12,10 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.language_model import AnswerBounds, LanguageModel
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.model_servers.asking import StructuredAsker
+from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ModelServerError
-from vla_deploy.model_servers.picture import small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError

@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import TOPICS, CellReader, PulseReader, Sample, SharedSpace
-from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.telemetry.metrics.flow import OWN, PULSES
 
 WINDOW_NS: Final = 5 * NS_PER_S

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.telemetry.metrics.kinds import Kind, Metric
 from vla_deploy.telemetry.metrics.paths import Each, keys, same
 from vla_deploy.telemetry.metrics.takes import count_of

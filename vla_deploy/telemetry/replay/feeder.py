@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import BY_NAME, BadPayload, SharedSpace, Topic, TopicKind
-from vla_deploy.ipc.layout import is_document
+from vla_deploy.ipc.memory.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
 from vla_deploy.telemetry.recording.batch import LOG_CHANNEL

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.ipc.layout import is_document
-from vla_deploy.ipc.record import Scratch
+from vla_deploy.ipc.memory.layout import is_document
+from vla_deploy.ipc.memory.record import Scratch
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.telemetry.recording.summary import Summary

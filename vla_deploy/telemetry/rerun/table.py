@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.ipc import TOPICS, TopicKind
-from vla_deploy.ipc.layout import is_document
+from vla_deploy.ipc.memory.layout import is_document
 from vla_deploy.telemetry.channels import TICKS
 from vla_deploy.telemetry.rerun import flat, plots, shapes, spatial
 from vla_deploy.telemetry.rerun.entity import LOGS, PLOTS, WORLD, Drawn, Entity

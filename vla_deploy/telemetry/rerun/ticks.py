@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc.delta import DeltaReader
+from vla_deploy.ipc.memory.delta import DeltaReader
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.judge import JUDGED_TYPES
 from vla_deploy.telemetry.rerun.entity import Drawn, Entity

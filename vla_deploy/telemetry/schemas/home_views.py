@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.robots import RobotDescription
 from vla_deploy.telemetry.schemas.geometry import CAMERA, MAP, Json, floor_pose_json, time_json
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.telemetry.schemas.robot_views import RobotViews

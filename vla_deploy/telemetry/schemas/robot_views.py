@@ -34,7 +34,7 @@ class RobotViews:
         Raises:
             RobotFileError: pinocchio does not find the robot file's joints in the MJCF.
         """
-        from vla_deploy.robots.model import RobotModel, full_positions  # loads pinocchio
+        from vla_deploy.robots.kinematics.model import RobotModel, full_positions  # loads pinocchio
 
         self._model = RobotModel(robot)
         self._names = robot.joint_names

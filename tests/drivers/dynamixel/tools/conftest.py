@@ -6,7 +6,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.tools import BenchLink
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 

@@ -16,8 +16,8 @@ from vla_deploy.dashboard.live.detections import Detections
 from vla_deploy.dashboard.live.message import Message, Moment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel, full_positions
-from vla_deploy.robots.tree_reader import read_tree
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.tree_reader import read_tree
 
 ROBOT = load_robot("butler")
 WIDE, HIGH = ROBOT.camera.width, ROBOT.camera.height

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.gateways.ros.body_frames import BodyFrames
-from vla_deploy.gateways.ros.points import (
+from vla_deploy.gateways.ros.geometry.body_frames import BodyFrames
+from vla_deploy.gateways.ros.geometry.points import (
     beam_points,
     depth_points,
     mark_seen,
@@ -17,7 +17,7 @@ from vla_deploy.gateways.ros.points import (
     thinned,
 )
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.kinematics.model import RobotModel
 
 BENT = (0.12, -0.2, 0.001, -0.002, 0.05)
 

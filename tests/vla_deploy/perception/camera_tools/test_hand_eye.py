@@ -15,7 +15,7 @@ from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResu
 from vla_deploy.perception.camera_tools.hand_eye import HeadView, fit_hand_eye
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 if TYPE_CHECKING:
     from conftest import BoardCamera

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
+from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.planning.chat_models.chat_model import ServedModel

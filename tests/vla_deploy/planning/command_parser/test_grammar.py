@@ -10,7 +10,7 @@ from tokenizers.models import BPE
 from tokenizers.pre_tokenizers import ByteLevel
 from tokenizers.trainers import BpeTrainer
 
-from training.planner.clause import answer_text
+from training.planner.sentences.clause import answer_text
 from vla_deploy.inference.errors import AnswerFailed
 from vla_deploy.inference.language_model.decoding import Constraint
 from vla_deploy.planning.command_parser.grammar import STEPS, answer_schema

@@ -9,7 +9,7 @@ from drivers.audio.pcm_stream import PcmOutput
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
 from sim_twin.contracts.scripted import ManualClock
-from sim_twin.lines import MemoryLine
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.sound import SpeakerDevice
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.executors import InlineExecutor

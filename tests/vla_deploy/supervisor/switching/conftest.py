@@ -10,7 +10,7 @@ import pytest
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
-from sim_twin.lockstep import Lockstep
+from sim_twin.harness.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.planning.node import PlannerNode

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import BY_NAME, TOPICS, TopicKind
-from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.channels import TICKS, TOPIC_CHANNELS
 from vla_deploy.telemetry.rerun import shapes, spatial

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import BY_NAME
-from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.schemas.geometry import matrix_json
 from vla_deploy.telemetry.schemas.log_lines import RunLogs

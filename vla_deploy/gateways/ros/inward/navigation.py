@@ -11,6 +11,8 @@ from nav2_msgs.action import NavigateToPose
 from drivers.clock import NS_PER_S
 from vla_deploy.client.following import Event
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.gateways.ros.geometry.planar import Planar, inverse, joined, planar_of
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of, yaw_of
 from vla_deploy.gateways.ros.inward.orders import (
     CommandOrder,
     CommandOrders,
@@ -20,9 +22,7 @@ from vla_deploy.gateways.ros.inward.orders import (
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.outward.body import MAP, ODOM
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.planar import Planar, inverse, joined, planar_of
-from vla_deploy.gateways.ros.rotation import quaternion_of, yaw_of
-from vla_deploy.robots.frame_tree import BASE_FRAME
+from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME
 
 FAILED: Final = 9000
 """Jazzy's NavigateToPose has no code but NONE; later ones call this UNKNOWN."""

@@ -10,8 +10,8 @@ from nav2_msgs.action import NavigateToPose
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from drivers.clock import NS_PER_S
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
 from vla_deploy.gateways.ros.outward.body import MAP
-from vla_deploy.gateways.ros.rotation import quaternion_of
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.ipc.ros_goals import GoalKind, GoalRequest, GoalState
 

@@ -14,12 +14,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from vla_deploy.gateways.ros.geometry.planar import inverse, joined, planar_of
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.planar import inverse, joined, planar_of
 from vla_deploy.ipc import Sample
-from vla_deploy.robots.frame_tree import BASE_FRAME, FrameTransform, FrameTree
-from vla_deploy.robots.urdf import urdf_of
+from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
+from vla_deploy.robots.kinematics.urdf import urdf_of
 
 MAP: Final = "map"
 ODOM: Final = "odom"

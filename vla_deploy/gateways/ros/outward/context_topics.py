@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from vla_deploy.gateways.ros.geometry.locator import Locator
+from vla_deploy.gateways.ros.geometry.planar import planar_of
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
 from vla_deploy.gateways.ros.json_topic import JsonTopic
-from vla_deploy.gateways.ros.locator import Locator
 from vla_deploy.gateways.ros.outward.activity import Activity
 from vla_deploy.gateways.ros.outward.objects import described, latest_last
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.planar import planar_of
-from vla_deploy.gateways.ros.rotation import quaternion_of
-from vla_deploy.navigation.map_file import MapFile
+from vla_deploy.navigation.maps.map_file import MapFile
 
 STATE: Final = "/robot/state"
 CONTEXT: Final = "/environment/context"

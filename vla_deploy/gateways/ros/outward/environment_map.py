@@ -12,13 +12,9 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
-from vla_deploy.gateways.ros.body_frames import BODY_RADIUS_M, BodyFrames
-from vla_deploy.gateways.ros.graph import RELIABLE, SENSOR
-from vla_deploy.gateways.ros.outward.body import MAP
-from vla_deploy.gateways.ros.outward.maps import grid_message
-from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.planar import planar_of
-from vla_deploy.gateways.ros.points import (
+from vla_deploy.gateways.ros.geometry.body_frames import BODY_RADIUS_M, BodyFrames
+from vla_deploy.gateways.ros.geometry.planar import planar_of
+from vla_deploy.gateways.ros.geometry.points import (
     beam_points,
     depth_points,
     mark_seen,
@@ -27,9 +23,13 @@ from vla_deploy.gateways.ros.points import (
     planar_pose,
     thinned,
 )
+from vla_deploy.gateways.ros.graph import RELIABLE, SENSOR
+from vla_deploy.gateways.ros.outward.body import MAP
+from vla_deploy.gateways.ros.outward.maps import grid_message
+from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.ipc.rgbd_image import depths_m
-from vla_deploy.navigation.map_file import MapFile
-from vla_deploy.robots.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
+from vla_deploy.navigation.maps.map_file import MapFile
+from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
 
 CLOUD: Final = "/environment_map"
 GRID: Final = "/environment_map/grid"

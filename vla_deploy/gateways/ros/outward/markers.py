@@ -8,12 +8,12 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from vla_deploy.gateways.ros.geometry.locator import Locator
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
 from vla_deploy.gateways.ros.graph import RELIABLE
-from vla_deploy.gateways.ros.locator import Locator
 from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.rotation import quaternion_of
 
 TOPICS: Final = ("/vla_deploy/markers", "/llm_planner/visualization")
 RATE_HZ: Final = 2.0

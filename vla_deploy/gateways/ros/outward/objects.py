@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from vla_deploy_msgs.msg import DetectedObject, DetectedObjectArray
 
 from drivers.clock import NS_PER_S
-from vla_deploy.gateways.ros.body_frames import BodyFrames
+from vla_deploy.gateways.ros.geometry.body_frames import BodyFrames
+from vla_deploy.gateways.ros.geometry.planar import planar_of
+from vla_deploy.gateways.ros.geometry.points import moved, pixels_of, planar_pose
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
 from vla_deploy.gateways.ros.graph import RELIABLE
 from vla_deploy.gateways.ros.json_topic import JsonTopic
 from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.planar import planar_of
-from vla_deploy.gateways.ros.points import moved, pixels_of, planar_pose
-from vla_deploy.gateways.ros.rotation import quaternion_of
-from vla_deploy.robots.frame_tree import OPTICAL_FRAME
+from vla_deploy.robots.kinematics.frame_tree import OPTICAL_FRAME
 
 RATE_HZ: Final = 5.0
 JSON_TOPIC: Final = "/detected_objects"

@@ -1,7 +1,7 @@
 """List what the gateway tells the graph."""
 
-from vla_deploy.gateways.ros.body_frames import BodyFrames
-from vla_deploy.gateways.ros.locator import Locator
+from vla_deploy.gateways.ros.geometry.body_frames import BodyFrames
+from vla_deploy.gateways.ros.geometry.locator import Locator
 from vla_deploy.gateways.ros.outward.body import BodyTopics
 from vla_deploy.gateways.ros.outward.context_topics import ContextTopics
 from vla_deploy.gateways.ros.outward.environment_map import EnvironmentMap

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from vla_deploy.gateways.ros.commands import CommandNews
 from vla_deploy.gateways.ros.feedback import feedback_of
+from vla_deploy.gateways.ros.geometry.locator import Locator
 from vla_deploy.gateways.ros.json_topic import JsonTopic
-from vla_deploy.gateways.ros.locator import Locator
 from vla_deploy.gateways.ros.outward.plan_dialects import (
     Where,
     ranked_actions,

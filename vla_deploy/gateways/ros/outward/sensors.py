@@ -7,13 +7,13 @@ import numpy as np
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 
+from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
 from vla_deploy.gateways.ros.graph import SENSOR
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.gateways.ros.rotation import quaternion_of
 from vla_deploy.ipc import Frame, Sample
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.ipc.topics import SCAN_BEAMS
-from vla_deploy.robots.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
+from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
 
 # Datasheet of the LD19, table 2: 0.02 to 12 m.
 _RANGE_M: Final = (0.02, 12.0)

@@ -1,0 +1,178 @@
+"""Kill, freeze and end every process of the robot at random moments of its work.
+
+The machine is a twin that runs by itself, so physics goes on and judges whatever dies; all lives
+and is judged in its time, so it does not matter how busy this computer is. The robot runs as a
+service does, restarted and watched by `sim_twin.harness.service_runner` in systemd's place.
+"""
+
+import argparse
+import contextlib
+import math
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S
+from sim_twin.campaigns.killing.failures import late_ready, wrong_state
+from sim_twin.campaigns.killing.moment import Work
+from sim_twin.campaigns.killing.rest import RestWatch
+from sim_twin.campaigns.killing.rules import RULES, Injection, KillRule, injections
+from sim_twin.campaigns.machine import Machine
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.robot_service import RobotService, ServiceNotReady
+from sim_twin.campaigns.selection import chosen
+from vla_deploy.supervisor.table import RestartPolicy
+
+INJECTIONS: Final = 200
+_POLL_S: Final = 0.02
+_SETTLE_S: Final = 1.0
+_POLL_LATER_S: Final = 0.05
+
+
+class KillCampaign:
+    """Own a machine and a robot, and do injections one after the other."""
+
+    def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
+        self._hit_ns: dict[str, int] = {}
+        self._machine = Machine(folder / "machine", robot=robot, seed=seed)
+        self._clock = self._machine.clock
+        try:
+            self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
+        except BaseException:
+            self._machine.close()
+            raise
+        self._work = Work(self._robot, self._machine, self._clock)
+
+    def inject(self, injection: Injection) -> CampaignCase:
+        """Do one and judge it."""
+        self._let_run_stably(injection.process)
+        self._robot.make_ready()
+        try:
+            return self._hit(injection)
+        finally:
+            if RULES[injection.process, injection.signal].rest_s is not None:
+                self._work.end()  # the robot stopped, and with it what it was told to do
+            self._hit_ns[injection.process] = self._clock.now_ns()
+
+    def _hit(self, injection: Injection) -> CampaignCase:
+        """Wait for the moment, send the signal, and judge what follows."""
+        rule = RULES[injection.process, injection.signal]
+        met = self._work.meet(injection)
+        self._machine.begin_watch()
+        began_ns = self._clock.now_ns()
+        pid = self._robot.signal(injection.process, injection.signal)
+        rest = RestWatch(rule)
+        ready_s = self._follow(began_ns, rest, injection.process, pid)
+        self._settle(began_ns, rest)
+        state = self._robot.control_state()
+        failures = [*self._machine.hazards(), *rest.failures(), *late_ready(rule.ready_s, ready_s)]
+        if state not in rule.states:
+            failures.append(wrong_state(state, self._robot.why(), rule.states))
+        failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
+        figures = {"rest_s": rest.rest_s, "ready_s": ready_s, "state": state, **met}
+        return CampaignCase(
+            name=injection.name,
+            failures=tuple(failures),
+            figures={**figures, "moved_rad": rest.moved_rad},
+            seconds=self._since(began_ns),
+        )
+
+    def close(self) -> None:
+        """End the robot's work, the robot, then its machine."""
+        with contextlib.ExitStack() as closing:  # each, even where one of them fails
+            closing.callback(self._machine.close)
+            closing.callback(self._robot.close)
+            closing.callback(self._work.end)
+
+    def _let_run_stably(self, process: str) -> None:
+        """Hit a process only after a stable run: six failures in a row are another matter."""
+        stable_ns = round(RestartPolicy().stable_s * NS_PER_S)
+        if process in self._hit_ns:
+            self._clock.sleep_until(self._hit_ns[process] + stable_ns)
+
+    def _follow(self, began_ns: int, rest: RestWatch, process: str, pid: int) -> float:
+        """Watch motion until all is ready again, and return when it was."""
+        rule, ready_s, since_s = rest.rule, math.inf, 0.0
+        while since_s < max(rest.least_s, rule.ready_s) and (
+            since_s < rest.least_s or math.isinf(ready_s)
+        ):
+            since_s = self._look(began_ns, rest)
+            if math.isinf(ready_s) and self._is_back(rule, process, pid):
+                ready_s = since_s
+            self._pause(_POLL_S if since_s < rest.least_s else _POLL_LATER_S)
+        return ready_s
+
+    def _settle(self, began_ns: int, rest: RestWatch) -> None:
+        """Watch on for a while: what comes back must not move anything."""
+        end_ns = self._clock.now_ns() + round(_SETTLE_S * NS_PER_S)
+        while self._clock.now_ns() < end_ns:
+            self._look(began_ns, rest)
+            self._pause(_POLL_LATER_S)
+
+    def _look(self, began_ns: int, rest: RestWatch) -> float:
+        since_s = self._since(began_ns)
+        if rest.wants(since_s):
+            rest.look(since_s, self._machine.truth())
+        return since_s
+
+    def _pause(self, duration_s: float) -> None:
+        self._clock.sleep_until(self._clock.now_ns() + round(duration_s * NS_PER_S))
+
+    def _since(self, began_ns: int) -> float:
+        return (self._clock.now_ns() - began_ns) / NS_PER_S
+
+    def _is_back(self, rule: KillRule, process: str, pid: int) -> bool:
+        if rule.ends:
+            return self._robot.has_ended()
+        return self._robot.is_ready() and self._robot.pid_of(process) not in (0, pid)
+
+
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
+    """Do `options.count` injections, 200 unless told otherwise."""
+    count = INJECTIONS if options.count is None else options.count
+    drawn = injections(count, options.seed)
+    return inject_all(chosen(drawn, options.only, lambda each: each.name), options.seed, tell)
+
+
+def inject_all(
+    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]
+) -> CampaignReport:
+    """Do injections one after the other on one machine."""
+    with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
+        campaign = KillCampaign(Path(folder), seed)
+        try:
+            cases = [told(_injected(campaign, injection), tell) for injection in drawn]
+        finally:
+            campaign.close()
+    return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+
+
+def _injected(campaign: KillCampaign, injection: Injection) -> CampaignCase:
+    try:
+        return campaign.inject(injection)
+    except ServiceNotReady as error:
+        return CampaignCase(name=injection.name, failures=(str(error),))
+
+
+def _share(met: Sequence[Mapping[str, Any]], is_so: Callable[[Mapping[str, Any]], object]) -> float:
+    return sum(bool(is_so(each)) for each in met) / max(len(met), 1)
+
+
+def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
+    """Return what was hit in motion, and each process' longest way to rest and back to ready."""
+    met = [case.figures for case in cases if "motion" in case.figures]
+    summary: dict[str, Any] = {
+        "unsafe": sum(bool(case.failures) for case in cases),
+        "hit_in_motion_ratio": _share(met, lambda each: each["motion"]),
+        "hit_while_carrying_ratio": _share(met, lambda each: each["held"]),
+        "hit_while_picking_ratio": _share(met, lambda each: each["skill"] == "pick_up"),
+        "hit_while_placing_ratio": _share(met, lambda each: each["skill"] == "place"),
+        "hit_while_driving_ratio": _share(met, lambda each: "wheel" in each["motion"]),
+    }
+    for process in sorted({process for process, _ in RULES}):
+        mine = [case.figures for case in cases if case.figures and f"/{process}/" in case.name]
+        rests = [each["rest_s"] for each in mine if not math.isnan(each["rest_s"])]
+        summary[f"{process}_longest_rest_s"] = max(rests, default=math.nan)
+        summary[f"{process}_longest_ready_s"] = max((each["ready_s"] for each in mine), default=0.0)
+    return summary

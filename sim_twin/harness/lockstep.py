@@ -1,0 +1,205 @@
+"""Run the robot's nodes and its twin in one process on simulated time: same seed, same bits."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import can
+
+from drivers.clock import NS_PER_S
+from drivers.errors import DeviceMissing
+from drivers.estop.gpio_button import Contact
+from sim_twin.can import MemoryBus
+from sim_twin.device import WireDevice
+from sim_twin.faults import FaultInjector
+from sim_twin.harness.schedule import HeldDevice, Schedule
+from sim_twin.ports.lines import MemoryLine
+from sim_twin.servos import WireTiming
+from sim_twin.timing.clock import SimClock
+from sim_twin.twin import Twin
+from vla_deploy.robots import load_robot
+from vla_deploy.runtime.node import Node, NodeContext
+
+
+class MemoryOpener:
+    """Open the twin's devices in memory; implements `drivers.opener.DeviceOpener`."""
+
+    def __init__(self, twin: Twin, clock: SimClock) -> None:
+        self.opened: list[HeldDevice] = []
+        self._twin = twin
+        self._clock = clock
+
+    def serial(self, name: str) -> MemoryLine:
+        """Open a serial line.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        lines = self._twin.lines
+        if name not in lines:
+            raise DeviceMissing(f"the twin has no serial device {name!r}; it has {list(lines)}")
+        return self._plugged(name, lines[name])
+
+    def stream(self, name: str) -> MemoryLine:
+        """Open the camera's stream, or that of sound.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        if name in self._twin.stream_lines:
+            return self.input_events(name)
+        self._expect(name, self._twin.robot.camera.device)
+        return self._plugged(name, self._twin.camera_line)
+
+    def can(self, name: str) -> can.BusABC:
+        """Open the CAN bus.
+
+        Raises:
+            DeviceMissing: the robot file does not name it.
+        """
+        self._expect(name, self._twin.robot.can_bus.device)
+        bus = MemoryBus(self._twin.can_wire)
+        self.opened.append(_Leaver(bus))
+        return bus
+
+    def input_events(self, name: str) -> MemoryLine:
+        """Open a device that begins anew for each host, such as the e-stop button.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        lines = self._twin.stream_lines
+        if name not in lines:
+            raise DeviceMissing(f"the twin has no stream {name!r}; it has {list(lines)}")
+        line = self._plugged(name, lines[name])
+        self._twin.announce(name)
+        return line
+
+    def gpio_contact(self, name: str, offset: int) -> Contact:
+        """Refuse: a GPIO line has no wire that the twin could serve.
+
+        Raises:
+            DeviceMissing: always.
+        """
+        raise DeviceMissing(
+            f"{name}: the twin has no GPIO lines; declare the e-stop as HID to run it in the twin"
+        )
+
+    def _plugged(self, name: str, device: WireDevice) -> MemoryLine:
+        plug = self._twin.plugs[name]
+        if not plug.is_in:
+            raise DeviceMissing(f"{name}: unplugged; plug it in")
+        line = MemoryLine(device, self._clock)
+        plug.add_connection(line)
+        self.opened.append(line)
+        return line
+
+    def _expect(self, name: str, known: str) -> None:
+        if name != known:
+            raise DeviceMissing(f"the twin has no device {name!r} of this kind; it has {known!r}")
+
+
+class _Leaver:
+    """Give a CAN bus the `close` that the lines have."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+
+    def close(self) -> None:
+        """Leave the bus; leaving twice is allowed."""
+        self._bus.shutdown()
+
+
+class Lockstep:
+    """Own a twin, its clock and the nodes that run against it.
+
+    Build nodes with `context` (its run directory is `tmp_path`) and `devices`, then `add` them.
+    """
+
+    def __init__(
+        self,
+        robot: str = "butler",
+        world: str = "flat",
+        seed: int = 0,
+        profile: str = "desktop",
+        *,
+        tmp_path: Path,
+        servo_timing: WireTiming | None = None,
+    ) -> None:
+        """Build the robot in its world; without `servo_timing` the servo bus takes no time.
+
+        Raises:
+            RobotFileError: the robot file has faults.
+            ModelMismatch: there is no such world, or robot and world do not fit together.
+        """
+        self.robot = load_robot(robot)
+        self.twin = Twin(self.robot, world, seed, servo_timing)
+        self.clock = SimClock(self.twin)
+        self.devices = MemoryOpener(self.twin, self.clock)
+        self.context = NodeContext(
+            run_dir=tmp_path, robot=robot, profile=profile, devices_dir=None, clock=self.clock
+        )
+        self._schedule = Schedule(self.twin, self.devices.opened)
+
+    @property
+    def now_s(self) -> float:
+        """Return simulated time in seconds."""
+        return self.twin.now_ns / NS_PER_S
+
+    @property
+    def faults(self) -> FaultInjector:
+        """Return what makes the twin's devices fail."""
+        return self.twin.faults
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """Return the running nodes in order of arrival."""
+        return self._schedule.nodes
+
+    def add(self, node: Node) -> None:
+        """Start a node and step it from now on."""
+        self._schedule.add(node)
+
+    def remove(self, node: Node) -> None:
+        """Stop a node in order.
+
+        Raises:
+            KeyError: the node does not run.
+        """
+        self._schedule.remove(node)
+
+    def kill(self, node: Node) -> None:
+        """End a node as `kill -9` does: it is not told, and its open devices just close.
+
+        Raises:
+            KeyError: the node does not run.
+        """
+        self._schedule.kill(node)
+
+    def run_for(self, duration_s: float) -> None:
+        """Run for a span of simulated time."""
+        self._schedule.run_until(lambda: False, self._deadline(duration_s))
+
+    def run_until(self, predicate: Callable[[], bool], timeout_s: float) -> bool:
+        """Run until `predicate()`; return False when `timeout_s` of simulated time passed first."""
+        return self._schedule.run_until(predicate, self._deadline(timeout_s))
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the physics knows; see `sim_twin.physics.truth.Referee`."""
+        return self.twin.engine.referee.truth()
+
+    def inside(self, name: str, container: str) -> dict[str, Any]:
+        """Return whether an object rests in a container.
+
+        Raises:
+            RefereeRefusal: the world has no such object or container.
+        """
+        return self.twin.engine.referee.inside(name, container)
+
+    def close(self) -> None:
+        """Stop every node, the latest first, and release the twin."""
+        self._schedule.stop()
+        self.twin.close()
+
+    def _deadline(self, duration_s: float) -> int:
+        return self.twin.now_ns + round(duration_s * NS_PER_S)

@@ -1,0 +1,31 @@
+"""Turn free shafts by their motors' duty, where no physics engine does it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivers.dynamixel.control_table import ServoDatasheet
+from sim_twin.servos.firmware.profile import Floats
+
+
+class FreeRotors:
+    """Integrate one inertia per motor; the speed implicitly, so that any step is stable.
+
+    torque = stall * duty - stall / no_load * velocity
+    """
+
+    def __init__(self, models: Sequence[ServoDatasheet], inertia_kg_m2: float = 0.01) -> None:
+        self._stall_nm = np.array([model.stall_torque_nm for model in models])
+        self._damping = self._stall_nm / np.array([model.no_load_speed_rad_s for model in models])
+        self._inertia_kg_m2 = inertia_kg_m2
+        self.motion: Floats = np.zeros((2, len(models)))
+        self.position_rad, self.velocity_rad_s = self.motion
+        self.torque_nm: Floats = np.zeros(len(models))
+
+    def advance(self, duty: Floats, dt_s: float) -> None:
+        """Move on by `dt_s` with a constant duty."""
+        per_inertia = dt_s / self._inertia_kg_m2
+        pushed = self.velocity_rad_s + per_inertia * self._stall_nm * duty
+        self.velocity_rad_s[:] = pushed / (1.0 + per_inertia * self._damping)
+        self.torque_nm = self._stall_nm * duty - self._damping * self.velocity_rad_s
+        self.position_rad += self.velocity_rad_s * dt_s

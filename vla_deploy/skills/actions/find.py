@@ -1,0 +1,129 @@
+"""Find an object: in memory, on the furniture in view, then from each viewpoint of the home."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vla_deploy.navigation.errors import NavigationError
+from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.actions.simple import speak
+from vla_deploy.skills.context import Skill, SkillContext, spoken
+from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.movements.carrying import carry
+from vla_deploy.skills.movements.drive import drive_to
+from vla_deploy.skills.movements.frames import to_base, to_map
+from vla_deploy.skills.movements.gaze import DRIVING_GAZE, gaze_at, remembered, turn_head, watch_for
+from vla_deploy.world import Query
+
+# A viewpoint stands this far before the middle of the furniture that it is for.
+FURNITURE_AHEAD_M = 0.5
+FURNITURE_HEIGHT_M = 0.5
+# Within the first distance everything on furniture is recognised, within the second large things.
+SURELY_SEEN_M = 1.5
+PERHAPS_SEEN_M = 2.9
+NECK_RANGE_RAD = 1.7
+# A way that is not much longer than the line of sight leads around no wall.
+DETOUR_RATIO, DETOUR_M = 1.3, 0.6
+GLANCE = (0.0, 0.55)
+# Where the eyes sweep at a viewpoint, as (pan, tilt).
+SWEEP = ((0.0, 0.85), (0.65, 0.65), (-0.65, 0.65))
+
+
+def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Look for an object until it is in the scene, and say which places are left out.
+
+    Raises:
+        TryAgain: it is nowhere to be seen.
+    """
+    query = parse_object(parameters["object"])
+    if remembered(context, query) is not None:
+        return
+    places = context.robot.places
+    shut = {view for name in context.keeps_out & places.keys() for view in places[name].viewpoints}
+    left = {view: None for one in places.values() for view in one.viewpoints if view not in shut}
+    if shut:
+        yield from speak(context, {"text": f"I leave out the {_left_out(context)}."})
+    yield from _look_around(context, query, left)
+    while left and remembered(context, query) is None:
+        viewpoint = min(left, key=lambda one: _way_m(context, one))
+        del left[viewpoint]
+        yield from _search_from(context, viewpoint, query)
+    if remembered(context, query) is None:
+        raise TryAgain(_nowhere(context, query))
+
+
+def _look_around(context: SkillContext, query: Query, left: dict[FloorPose, None]) -> Skill:
+    """Look ahead, then at the furniture in sight; drop the viewpoints that this makes needless."""
+    yield from _sweep(context, query, (GLANCE,))
+    for distance_m, viewpoint in sorted(_in_sight(context, left), key=lambda one: one[0]):
+        if remembered(context, query) is not None:
+            return
+        yield from gaze_at(context, _furniture_of(viewpoint))
+        yield from watch_for(context, query)
+        if distance_m < SURELY_SEEN_M:
+            del left[viewpoint]
+
+
+def _search_from(context: SkillContext, viewpoint: FloorPose, query: Query) -> Skill:
+    """Drive to a viewpoint, watching on the way, and look around from there."""
+    yield from carry(context)
+    yield from turn_head(context, *DRIVING_GAZE)
+    try:
+        yield from drive_to(
+            context, viewpoint, until=lambda: remembered(context, query) is not None
+        )
+    except NotPossible:
+        return  # a viewpoint that cannot be reached now leaves the others to try
+    yield from _sweep(context, query, SWEEP)
+
+
+def _sweep(
+    context: SkillContext, query: Query, directions: tuple[tuple[float, float], ...]
+) -> Skill:
+    for pan_rad, tilt_rad in directions:
+        if remembered(context, query) is not None:
+            return
+        yield from turn_head(context, pan_rad, tilt_rad)
+        yield from watch_for(context, query)
+
+
+def _in_sight(
+    context: SkillContext, viewpoints: Mapping[FloorPose, None]
+) -> list[tuple[float, FloorPose]]:
+    """Return the viewpoints whose furniture can be seen from here, with its distance."""
+    seen = []
+    for viewpoint in viewpoints:
+        x_m, y_m, _ = to_base(context.link.pose, _furniture_of(viewpoint))
+        distance_m, bearing_rad = math.hypot(x_m, y_m), math.atan2(y_m, x_m)
+        if distance_m > PERHAPS_SEEN_M or abs(bearing_rad) > NECK_RANGE_RAD:
+            continue
+        if _way_m(context, viewpoint) < DETOUR_RATIO * distance_m + DETOUR_M:
+            seen.append((distance_m, viewpoint))
+    return seen
+
+
+def _furniture_of(viewpoint: FloorPose) -> tuple[float, float, float]:
+    """Return the point of the map, on the furniture, that a viewpoint looks at."""
+    return (*to_map(viewpoint, FURNITURE_AHEAD_M, 0.0), FURNITURE_HEIGHT_M)
+
+
+def _way_m(context: SkillContext, goal: FloorPose) -> float:
+    pose = context.link.pose
+    try:
+        points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
+    except NavigationError:
+        return math.inf
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _left_out(context: SkillContext) -> str:
+    return " and the ".join(spoken(one) for one in sorted(context.keeps_out))
+
+
+def _nowhere(context: SkillContext, query: Query) -> str:
+    seen = sorted({f"{one['colour']} {one['class']}" for one in context.link.objects})
+    left_out = f", and left out the {_left_out(context)}" if context.keeps_out else ""
+    return f"I cannot find a {query}; I have seen: {', '.join(seen) or 'nothing'}{left_out}"

@@ -1,0 +1,251 @@
+"""Put what a hand holds into a container, on or beside an object, or on a surface's free spot."""
+
+import math
+from collections.abc import Generator, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.skills.actions.navigate import solve_near
+from vla_deploy.skills.context import Held, Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
+from vla_deploy.skills.movements.arms import (
+    believe_fingers,
+    feel_way,
+    lift,
+    move_to_posture,
+    opening_of,
+    set_opening,
+)
+from vla_deploy.skills.movements.carrying import RESTARTS, carry, or_carry
+from vla_deploy.skills.movements.frames import to_base
+from vla_deploy.skills.movements.gaze import kept_in_sight, turn_head, watch
+from vla_deploy.skills.movements.motion import pause
+from vla_deploy.skills.movements.surfaces import Spot, free_spots, spots_beside
+from vla_deploy.skills.movements.swing import heights_above
+from vla_deploy.world import Query
+from vla_deploy.world.relations import NEXT_TO
+
+ABOVE_M = 0.10
+# A thing put into a container is let go this far below the rim: less where the container is low,
+# or where others lie in it, which it must not be pressed on. One put on something: just above.
+BELOW_RIM_M = 0.03
+DEEP_BELOW_RIM_M = 0.075
+ABOVE_FLOOR_M = 0.04
+ABOVE_CONTENTS_M = 0.015
+ABOVE_SURFACE_M = 0.008
+YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
+LOST_OPENING_M = 0.012
+LOOK_AT_TABLE = (0.0, 0.85)
+LET_GO_M = 0.03
+ABOVE_SPEED_RATIO = 0.5
+# What stands so much early has come down: things are seen and held to a few centimetres. What was
+# only felt may reach down much farther than was taken for granted.
+EARLY_M, EARLY_UNKNOWN_M = 0.04, 0.10
+UNKNOWN = "object"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Release:
+    """Hold where the grip lets go, in the base frame, and the joint positions above it."""
+
+    point_m: tuple[float, float, float]
+    above: NDArray[np.float64]
+    above_m: float
+
+
+def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Put what is held `in`, `on` or `next to` a destination within reach.
+
+    Raises:
+        NotPossible: nothing is held any more, or was lost on the way, or the spot is out of reach.
+        TryAgain: the destination was not seen.
+    """
+    hand = context.holding_hand(parameters.get("arm"))
+    held = context.hands[hand]
+    if held is None:
+        raise NotPossible(f"the {hand} hand holds nothing")
+    if opening_of(context, hand) < held.width_m - LOST_OPENING_M:
+        context.hands[hand] = None
+        raise NotPossible(f"the {hand} hand has lost the {held.kind} on the way")
+    release = yield from _release(context, parameters, hand, held)
+    yield from or_carry(context, _put_down(context, hand, held, release))
+    yield from carry(context)
+
+
+def _put_down(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
+    yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
+    yield from _lower(context, hand, held, release)
+    believe_fingers(context)
+    if context.hands[hand] is None:
+        raise NotPossible(f"the {hand} hand has lost the {held.kind} before it was put down")
+    yield from set_opening(context, hand, held.width_m + LET_GO_M)
+    context.hands[hand] = None
+    yield from pause(context, 0.3)
+    yield from lift(context, hand, release.above_m)
+
+
+def _lower(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
+    """Feel the way down until what is held stands, or would.
+
+    Raises:
+        Touched: something is in the way high above that; the hand is over it again.
+    """
+    arm = context.arms[hand]
+    down = arm.forward(context.link.setpoints)
+    down[:3, 3] = release.point_m
+    try:
+        yield from feel_way(context, hand, down)
+    except Touched:
+        left_m = float(arm.forward(context.link.positions)[2, 3]) - release.point_m[2]
+        if left_m > (EARLY_UNKNOWN_M if held.kind == UNKNOWN else EARLY_M):
+            yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
+            raise
+
+
+def _release(
+    context: SkillContext, parameters: Mapping[str, Any], hand: str, held: Held
+) -> Generator[None, None, Release]:
+    """Return where the grip must be when the fingers open, and the posture above it."""
+    try:
+        query = parse_object(parameters["destination"])
+    except UnknownObject:
+        return (yield from _on_surface(context, hand, held))
+    relation = str(parameters["relation"])
+
+    def solve() -> Release:
+        if relation == NEXT_TO:
+            return _beside(context, query, hand, held)
+        return _over_object(context, query, relation, hand, held)
+
+    return (yield from solve_near(context, query, solve))
+
+
+def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None, None, Release]:
+    """Look at the furniture ahead and choose the first free spot that the hand reaches.
+
+    Raises:
+        OutOfReach: there are free spots, all out of reach.
+        TryAgain: there is none in sight.
+    """
+    yield from turn_head(context, *LOOK_AT_TABLE)
+    yield from watch(context)
+    spots = free_spots(context, hand)
+    if not spots:
+        raise TryAgain("I see no free spot within reach to put it down")
+    return _first_reached(context, hand, spots, held)
+
+
+def _first_reached(context: SkillContext, hand: str, spots: Iterable[Spot], held: Held) -> Release:
+    """Return how to let go at the first of some spots that the hand reaches.
+
+    Raises:
+        OutOfReach: it reaches none.
+    """
+    reason = OutOfReach(f"there is no spot for the {hand} hand")
+    for x_m, y_m, z_m in spots:
+        point_m = (x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M)
+        try:
+            return _solve_above(context, hand, point_m, held)
+        except OutOfReach as error:
+            reason = error
+    raise reason
+
+
+def _beside(context: SkillContext, query: Query, hand: str, held: Held) -> Release:
+    """Choose the first free spot around a thing that the hand reaches.
+
+    Raises:
+        OutOfReach: it reaches none of them.
+        TryAgain: the thing is not in sight, or nothing around it is free.
+    """
+    seen = kept_in_sight(context, query)
+    spots = spots_beside(context, hand, seen)
+    if not spots:
+        raise TryAgain(f"I see no free spot next to the {query}")
+    return _first_reached(context, hand, spots, held)
+
+
+def _over_object(
+    context: SkillContext, query: Query, relation: str, hand: str, held: Held
+) -> Release:
+    seen = kept_in_sight(context, query)
+    x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])
+    top_m = z_m + float(seen["size_m"][2]) / 2
+    if relation == "in" and seen["class"] != "box":
+        raise NotPossible(f"a {seen['class']} is no container; put things in a box")
+    lower_m = below_rim_m(context, seen, held) if relation == "in" else -ABOVE_SURFACE_M
+    point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
+    return _solve_above(context, hand, point_m, held)
+
+
+def below_rim_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
+    """Return how deep a thing is lowered into a container: what falls far may topple or break."""
+    spare_m = float(container["size_m"][2]) - max(
+        ABOVE_FLOOR_M, _filled_m(context, container, held)
+    )
+    return min(max(spare_m, BELOW_RIM_M), DEEP_BELOW_RIM_M)
+
+
+def _filled_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
+    """Return how high above a container's floor its contents reach, with room to spare.
+
+    What a hand holds may still be remembered where it was taken from, or be seen above the box.
+    """
+    floor_m = float(container["position_m"][2]) - float(container["size_m"][2]) / 2
+    tops_m = [
+        float(one["position_m"][2]) + float(one["size_m"][2]) / 2
+        for one in context.link.objects
+        if (one.get("rests") or {}).get("of") == container["id"]
+        and (one["class"], one["colour"]) != (held.kind, held.colour)
+    ]
+    return max(tops_m) + ABOVE_CONTENTS_M - floor_m if tops_m else 0.0
+
+
+def _solve_above(
+    context: SkillContext, hand: str, release_m: tuple[float, float, float], held: Held
+) -> Release:
+    """Return the posture above a release point that moves the arm least and can descend.
+
+    Raises:
+        OutOfReach: no yaw of the hand gets there.
+    """
+    now, reasons = context.link.setpoints, [""]
+    for above_m in heights_above(context, release_m, held.below_grip_m, ABOVE_M):
+        found = [
+            above
+            for yaw_rad in YAWS_RAD
+            if (above := _descent(context, hand, release_m, above_m, yaw_rad, reasons)) is not None
+        ]
+        if found:
+            least = min(found, key=lambda positions: float(np.abs(positions - now).max()))
+            return Release(point_m=release_m, above=least, above_m=above_m)
+    x_m, y_m, z_m = release_m
+    raise OutOfReach(
+        f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reasons[-1]}"
+    )
+
+
+def _descent(
+    context: SkillContext,
+    hand: str,
+    release_m: tuple[float, float, float],
+    above_m: float,
+    yaw_rad: float,
+    reasons: list[str],
+) -> NDArray[np.float64] | None:
+    arm, (x_m, y_m, z_m) = context.arms[hand], release_m
+    try:
+        high = hand_down((x_m, y_m, z_m + above_m), yaw_rad)
+        above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
+        arm.straight_line(above, hand_down(release_m, yaw_rad))
+    except ManipulationError as error:
+        reasons.append(str(error))
+        return None
+    return above

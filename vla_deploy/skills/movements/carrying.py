@@ -1,0 +1,135 @@
+"""Bring arms to where they may travel, past what stands on furniture and out from under it."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.movements.arms import arm_joints, arm_targets, lift
+from vla_deploy.skills.movements.frames import side_of
+from vla_deploy.skills.movements.motion import move_joints, settle
+from vla_deploy.skills.movements.underside import leave_underside
+
+AT_POSE_RAD = 0.05
+LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
+# In the base frame: the hand is over furniture, and above what stands on it.
+OUT_IN_FRONT_M = 0.3
+CLEAR_HEIGHT_M = 0.6
+TUCK = "tuck"
+FOLDING_STEPS = 12
+# Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
+CARRY_POINT_M = (0.27, 0.16, 0.72)
+CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
+# One yaw out of reach is no loss: another is tried at once.
+RESTARTS = 2
+
+
+def carry(context: SkillContext) -> Skill:
+    """Bring both arms to where they may travel: tucked when empty, close in front when loaded.
+
+    A hand that is low over furniture is raised first: the way to its chest is no straight line. An
+    arm under furniture is drawn out before.
+
+    Raises:
+        NotPossible: an arm is under furniture, and the robot cannot drive back.
+        TryAgain: something stands behind the robot.
+    """
+    if not all(_is_at(context, _travel_targets(context, hand)) for hand in context.robot.hands):
+        yield from leave_underside(context)
+    for hand in context.robot.hands:
+        yield from _raise_clear(context, hand)
+    targets: dict[str, float] = {}
+    for hand in context.robot.hands:
+        wanted = _travel_targets(context, hand)
+        if not _is_at(context, wanted):
+            targets |= wanted
+    if targets:
+        loaded = any(held is not None for held in context.hands.values())
+        yield from move_joints(
+            context, targets, LOADED_SPEED_RATIO if loaded else EMPTY_SPEED_RATIO
+        )
+        yield from settle(context, list(targets))
+
+
+def _raise_clear(context: SkillContext, hand: str) -> Skill:
+    """Raise a hand that is out in front to a height from which it may swing."""
+    point_m = context.arms[hand].forward(context.link.setpoints)[:3, 3]
+    missing_m = CLEAR_HEIGHT_M - float(point_m[2])
+    if point_m[0] < OUT_IN_FRONT_M or missing_m <= 0.0:
+        return
+    for share in (1.0, 0.5, 0.25):
+        try:
+            yield from lift(context, hand, share * missing_m)
+        except OutOfReach:
+            continue  # the arm may be near its limits: less is better than nothing
+        return
+    yield from _fold_up(context, hand)
+
+
+def _fold_up(context: SkillContext, hand: str) -> Skill:
+    """Raise a hand by the one joint that raises it most on its way to where it is tucked.
+
+    An arm that sank without power lies so twisted that it follows no straight line; with all of
+    its joints at once its hand would sweep over what stands there.
+    """
+    ways = {joint: _way_to_tuck(context, hand, joint) for joint in arm_joints(context, hand)}
+    joint, way = max(ways.items(), key=lambda item: max(item[1]))
+    enough = (one for one in way if one[0] >= CLEAR_HEIGHT_M)
+    _, position = next(enough, max(way))
+    yield from move_joints(context, {joint: position}, EMPTY_SPEED_RATIO)
+    yield from settle(context, (joint,))
+
+
+def _way_to_tuck(context: SkillContext, hand: str, joint: str) -> list[tuple[float, float]]:
+    """Return the hand's height at positions of one joint on its way to where it is tucked."""
+    posture, index = context.link.setpoints.copy(), context.robot.joint_index[joint]
+    found = []
+    for position in np.linspace(posture[index], context.robot.poses[TUCK][joint], FOLDING_STEPS):
+        posture[index] = position
+        height_m = float(context.arms[hand].forward(posture)[2, 3])
+        found.append((height_m, float(position)))
+    return found
+
+
+def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
+    if context.hands.get(hand) is not None:
+        return _carry_targets(context, hand)
+    pose = context.robot.poses[TUCK]
+    return {name: pose[name] for name in arm_joints(context, hand)}
+
+
+def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
+    """Return the carry posture nearest to the present one."""
+    arm = context.arms[hand]
+    point = (CARRY_POINT_M[0], side_of(hand) * CARRY_POINT_M[1], CARRY_POINT_M[2])
+    now = context.link.setpoints
+    found = []
+    for yaw_rad in CARRY_YAWS_RAD:
+        try:
+            found.append(arm.solve(hand_down(point, yaw_rad), now, restarts=RESTARTS).positions)
+        except ManipulationError:
+            continue  # not every yaw is within the wrist's range
+    if not found:
+        raise NotPossible(f"the {hand} hand cannot reach its carry pose {point}")
+    best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
+    return arm_targets(context, hand, best)
+
+
+def or_carry(context: SkillContext, skill: Skill) -> Skill:
+    """Run a skill; where it fails, bring the arms to where they may travel before saying so."""
+    try:
+        yield from skill
+    except (TryAgain, NotPossible):
+        yield from carry(context)
+        raise
+
+
+def _is_at(context: SkillContext, targets: Mapping[str, float]) -> bool:
+    now, index = context.link.setpoints, context.robot.joint_index
+    return all(
+        abs(float(now[index[name]]) - value) < AT_POSE_RAD for name, value in targets.items()
+    )

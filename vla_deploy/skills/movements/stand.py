@@ -1,0 +1,50 @@
+"""Choose where to stand so that the arms reach an object, straight ahead and with room around."""
+
+import math
+from collections.abc import Sequence
+
+from vla_deploy.navigation.follower import wrap_angle
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.context import SkillContext
+from vla_deploy.skills.movements.frames import to_base
+from vla_deploy.world.reach import REACH_M, Stand, is_in_reach, stands_around
+
+# The object goes before one shoulder rather than between them.
+SIDE_M = 0.12
+
+
+def standing_poses(
+    context: SkillContext, position_m: Sequence[float], anew: bool = False
+) -> list[FloorPose]:
+    """Return free poses facing an object, the one quickest to reach first.
+
+    The present pose alone, where it will do, unless they are wanted `anew`.
+    """
+    pose = context.link.pose
+    if not anew and is_in_reach(to_base(pose, position_m)):
+        return [pose]
+    candidates = []
+    for stand in stands_around(position_m, context.planner.is_free):
+        goal = _facing(context, stand)
+        candidates.append((_effort(pose, goal) + 2.0 * (stand.reach_m - REACH_M[0]), stand, goal))
+    return [goal for _, _, goal in sorted(candidates, key=lambda one: (one[0], one[1].step))][:6]
+
+
+def _facing(context: SkillContext, stand: Stand) -> FloorPose:
+    """Turn a stand so that the object comes before the shoulder of the hand that takes it."""
+    side_rad = math.asin(min(1.0, _side_m(context) / stand.reach_m))
+    return FloorPose(x_m=stand.x_m, y_m=stand.y_m, yaw_rad=wrap_angle(stand.bearing_rad - side_rad))
+
+
+def _side_m(context: SkillContext) -> float:
+    """Return how far left (positive) of the centre line the object should end up."""
+    held = [name for name, what in context.hands.items() if what is not None]
+    return -SIDE_M if held == ["right"] else SIDE_M
+
+
+def _effort(pose: FloorPose, goal: FloorPose) -> float:
+    """Estimate the way in metres; a radian of turning counts as a third of a metre."""
+    distance_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
+    heading = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
+    turning = abs(wrap_angle(heading - pose.yaw_rad)) + abs(wrap_angle(goal.yaw_rad - heading))
+    return distance_m + turning / 3.0
