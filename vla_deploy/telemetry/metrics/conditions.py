@@ -1,33 +1,31 @@
-"""Declare what is wrong when: one table for Prometheus' alerts and for ROS 2 diagnostics."""
+"""Declare the alert conditions: one table for Prometheus' alerts and for ROS 2 diagnostics."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from vla_deploy.telemetry.metrics.kinds import Metric, Point
+from vla_deploy.telemetry.metrics.metric import Metric, Point
 from vla_deploy.telemetry.metrics.table import METRICS_BY_NAME
 
-_STATES: Final = "state"
 
-
-class Severity(IntEnum):
-    """Order how bad something is; the numbers are the levels of diagnostic_msgs."""
+class AlertSeverity(IntEnum):
+    """Order the severities; the numbers are the levels of diagnostic_msgs."""
 
     WARNING = 1
     CRITICAL = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
-    """Call it wrong when a metric is beyond a limit for `for_s`.
+class AlertCondition:
+    """Declare that a metric beyond a limit for `for_s` is an alert.
 
-    `where` names label values, one of which each label must have. With `per_s` it is about what a
-    counter gains per second over that time, or, with `of`, for each that the counter `of` gains.
+    `where` lists for a label the values that count. With `per_s` the condition is about the rate
+    of a counter over that time or, with `of`, about its rate relative to that of the counter `of`.
     """
 
     name: str
-    severity: Severity
+    severity: AlertSeverity
     metric: str
     summary: str
     remedy: str
@@ -39,7 +37,7 @@ class Condition:
     of: str = ""
 
     def holds(self, point: Point) -> bool:
-        """Tell whether a value is beyond the limit; one look knows no counter's gain."""
+        """Return whether a value is beyond the limit; False for a rate, which one value has not."""
         if self.per_s or not isinstance(point.value, float):
             return False
         labels = dict(zip(self.declared.labels, point.labels, strict=True))
@@ -55,61 +53,52 @@ class Condition:
         return METRICS_BY_NAME[self.metric]
 
 
-_WARNING: Final = Severity.WARNING
-_CRITICAL: Final = Severity.CRITICAL
+_WARNING: Final = AlertSeverity.WARNING
+_CRITICAL: Final = AlertSeverity.CRITICAL
 
 
-def _state(
-    name: str, severity: Severity, metric: str, states: tuple[str, ...], *texts: str, for_s: int = 0
-) -> Condition:
-    """Declare that some states of a metric are wrong."""
-    summary, remedy = texts
-    label = METRICS_BY_NAME[metric].state_label
-    return Condition(
+def _gauge(
+    name: str,
+    severity: AlertSeverity,
+    metric: str,
+    summary: str,
+    remedy: str,
+    *,
+    above: float = 0.0,
+    states: tuple[str, ...] = (),
+    for_s: int = 0,
+) -> AlertCondition:
+    """Declare that too much of a gauge is wrong, or some states of a metric."""
+    return AlertCondition(
         name=name,
         severity=severity,
         metric=metric,
-        where={label: states},
-        above=0.0,
+        where={METRICS_BY_NAME[metric].state_label: states} if states else {},
+        above=above,
         for_s=for_s,
         summary=summary,
         remedy=remedy,
     )
 
 
-def _above(
-    name: str, severity: Severity, metric: str, limit: float, *texts: str, for_s: int = 0
-) -> Condition:
-    """Declare that too much of a gauge is wrong."""
-    summary, remedy = texts
-    return Condition(
-        name=name,
-        severity=severity,
-        metric=metric,
-        above=limit,
-        for_s=for_s,
-        summary=summary,
-        remedy=remedy,
-    )
-
-
-CONDITIONS: Final[tuple[Condition, ...]] = (
-    _above(
-        *("VlaEstopLatched", _WARNING, "vla_estop_latched", 0.0),
+CONDITIONS: Final[tuple[AlertCondition, ...]] = (
+    _gauge(
+        *("VlaEstopLatched", _WARNING, "vla_estop_latched"),
         *("The emergency stop is latched.", "See why, then: vla-deploy reset, vla-deploy arm"),
     ),
-    _state(
+    _gauge(
         *("VlaSafetyStop", _WARNING, "vla_safety_reaction"),
-        ("protective_stop", "hold", "base_off", "group_stop"),
         *("A safety rule has stopped the robot.", "vla-deploy status names cause and limit"),
+        states=("protective_stop", "hold", "base_off", "group_stop"),
         for_s=10,
     ),
-    _state(
-        *("VlaControlFault", _CRITICAL, "vla_control_state", ("fault",)),
+    _gauge(
+        *("VlaControlFault", _CRITICAL, "vla_control_state"),
         *("Control cannot be armed.", "vla-deploy status names the cause"),
+        states=("fault",),
         for_s=10,
     ),
-    Condition(
+    AlertCondition(
         name="VlaLateTicks",
         severity=_WARNING,
         metric="vla_control_late_ticks_total",
@@ -120,11 +109,12 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="More than 1 % of control's ticks come late.",
         remedy="vla-deploy doctor says what keeps control from its priority",
     ),
-    _state(
-        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state", ("given up",)),
+    _gauge(
+        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state"),
         *("A process has failed too often and is given up.", "vla-deploy logs, vla-deploy crashes"),
+        states=("given up",),
     ),
-    Condition(
+    AlertCondition(
         name="VlaProcessRestarts",
         severity=_WARNING,
         metric="vla_process_restarts_total",
@@ -133,12 +123,12 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="A process is started again and again.",
         remedy="vla-deploy crashes",
     ),
-    _above(
-        *("VlaTopicsLate", _WARNING, "vla_process_alarms", 0.0),
+    _gauge(
+        *("VlaTopicsLate", _WARNING, "vla_process_alarms"),
         *("A process' topics are too old, too slow or not valid.", "vla-deploy status"),
         for_s=10,
     ),
-    Condition(
+    AlertCondition(
         name="VlaCommandsRefused",
         severity=_CRITICAL,
         metric="vla_commands_taken",
@@ -147,25 +137,27 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="The robot takes no commands.",
         remedy="vla-deploy status says why",
     ),
-    _above(
-        *("VlaBudgetBroken", _WARNING, "vla_budget_over", 0.0),
+    _gauge(
+        *("VlaBudgetBroken", _WARNING, "vla_budget_over"),
         *("A budget is broken.", "vla-deploy budget shows the line and what is done about it"),
         for_s=30,
     ),
-    _above(
-        *("VlaBudgetStop", _CRITICAL, "vla_budget_stop", 0.0),
+    _gauge(
+        *("VlaBudgetStop", _CRITICAL, "vla_budget_stop"),
         *("A budget has stopped the robot.", "vla-deploy budget says which"),
     ),
-    _state(
-        *("VlaBusDegraded", _WARNING, "vla_bus_state", ("degraded",)),
+    _gauge(
+        *("VlaBusDegraded", _WARNING, "vla_bus_state"),
         *("A servo bus loses answers.", "Look at cable, connectors and supply"),
+        states=("degraded",),
         for_s=30,
     ),
-    _state(
-        *("VlaBusLost", _CRITICAL, "vla_bus_state", ("lost",)),
+    _gauge(
+        *("VlaBusLost", _CRITICAL, "vla_bus_state"),
         *("A servo bus has used up its error budget.", "Look at cable, connectors and supply"),
+        states=("lost",),
     ),
-    Condition(
+    AlertCondition(
         name="VlaBusFaults",
         severity=_WARNING,
         metric="vla_bus_faults_total",
@@ -175,21 +167,23 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="Something goes wrong on a bus more than once a second.",
         remedy="vla-deploy status --json has the counters; look at the wiring",
     ),
-    _above(
-        *("VlaJointWarm", _WARNING, "vla_joint_temperature_celsius", 65.0),
+    _gauge(
+        *("VlaJointWarm", _WARNING, "vla_joint_temperature_celsius"),
         *("A joint's servo is warm.", "Let it rest, or give it less to hold"),
+        above=65.0,
         for_s=60,
     ),
-    _above(
-        *("VlaJointError", _CRITICAL, "vla_joint_hardware_error", 0.0),
+    _gauge(
+        *("VlaJointError", _CRITICAL, "vla_joint_hardware_error"),
         *("A joint's servo reports a hardware error.", "vla-deploy servo monitor; then reset"),
     ),
-    _above(
-        *("VlaComputerHot", _WARNING, "vla_temperature_celsius", 85.0),
+    _gauge(
+        *("VlaComputerHot", _WARNING, "vla_temperature_celsius"),
         *("The computer is hot.", "Look at fan and airflow; vla-deploy budget"),
+        above=85.0,
         for_s=60,
     ),
-    Condition(
+    AlertCondition(
         name="VlaPowerFault",
         severity=_CRITICAL,
         metric="vla_throttle_events_total",
@@ -199,7 +193,7 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="The supply of the computer fails: under-voltage or average over-current.",
         remedy="Look at battery, cable and power mode",
     ),
-    Condition(
+    AlertCondition(
         name="VlaDiskNearlyFull",
         severity=_WARNING,
         metric="vla_disk_free_ratio",
@@ -208,19 +202,21 @@ CONDITIONS: Final[tuple[Condition, ...]] = (
         summary="A disk that the robot writes to is nearly full.",
         remedy="Make room; the robot's own logs and recordings are bounded",
     ),
-    _state(
-        *("VlaPlaceLost", _WARNING, "vla_place_state", ("lost",)),
+    _gauge(
+        *("VlaPlaceLost", _WARNING, "vla_place_state"),
         *("The robot does not know where it is.", "vla-deploy status says why"),
+        states=("lost",),
         for_s=10,
     ),
-    _above(
-        *("VlaSensorAway", _WARNING, "vla_perception_sensors_away", 0.0),
+    _gauge(
+        *("VlaSensorAway", _WARNING, "vla_perception_sensors_away"),
         *("A sensor gives nothing.", "vla-deploy doctor"),
         for_s=10,
     ),
-    _state(
-        *("VlaSightByForm", _WARNING, "vla_perception_sight", ("form",)),
+    _gauge(
+        *("VlaSightByForm", _WARNING, "vla_perception_sight"),
         *("The robot names things without its network.", "vla-deploy status says why"),
+        states=("form",),
         for_s=60,
     ),
 )

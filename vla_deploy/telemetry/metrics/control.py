@@ -4,12 +4,18 @@ from typing import Final
 
 from vla_deploy.control.state_machine import CONTROL_STATES
 from vla_deploy.safety import Cause, Reaction
-from vla_deploy.telemetry.metrics.kinds import Kind, Metric
-from vla_deploy.telemetry.metrics.paths import Among, Each, Joints, keys, same
-from vla_deploy.telemetry.metrics.takes import count_of, counts_below, counts_between, is_any
+from vla_deploy.telemetry.metrics.metric import (
+    Metric,
+    MetricKind,
+    count_of,
+    counts_below,
+    counts_between,
+    is_any,
+)
+from vla_deploy.telemetry.metrics.paths import among, each, joints, keys, same
 
 _TOPIC: Final = "control_status"
-_BUS: Final = (keys("buses"), Each("bus"))
+_BUS: Final = (keys("buses"), each("bus"))
 _BUS_STATES: Final = ("ok", "degraded", "lost")
 _BUS_FAULTS: Final = (
     *("partial_cycles", "timeouts", "crc_errors", "stuffed", "retries", "late", "suspensions"),
@@ -20,7 +26,7 @@ _BUS_FAULTS: Final = (
 SAFETY: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_control_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="What control is doing about power and motion: 1 for its state, 0 for the others.",
         topic=_TOPIC,
         paths=((keys("state"),),),
@@ -28,7 +34,6 @@ SAFETY: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_estop_latched",
-        kind=Kind.GAUGE,
         help="1 while an emergency stop waits for a person's reset.",
         topic=_TOPIC,
         paths=((keys("estop_latched"),),),
@@ -36,7 +41,7 @@ SAFETY: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_safety_cause",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="What stops or slows the robot: 1 for the cause in force, 0 for the others.",
         topic=_TOPIC,
         paths=((keys("cause"),),),
@@ -45,7 +50,7 @@ SAFETY: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_safety_reaction",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="What is done about it: 1 for the reaction in force, 0 for the others.",
         topic=_TOPIC,
         paths=((keys("reaction"),),),
@@ -54,16 +59,12 @@ SAFETY: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_safety_age_seconds",
-        kind=Kind.GAUGE,
-        unit="seconds",
         help="Age of the measurement by which the robot was judged.",
         topic=_TOPIC,
         paths=((keys("age_s"),),),
     ),
     Metric(
         name="vla_safety_speed_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="Share of its speed that the safety rules leave the base.",
         topic=_TOPIC,
         paths=((keys("speed_ratio"),),),
@@ -74,7 +75,7 @@ SAFETY: Final[tuple[Metric, ...]] = (
 TICKS: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_control_ticks_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Ticks of control since it was started.",
         topic=_TOPIC,
         paths=((keys("tick"),),),
@@ -82,7 +83,7 @@ TICKS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_control_late_ticks_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Ticks that began more than 1.2 periods after the last one.",
         topic=_TOPIC,
         paths=((keys("late_ticks"),),),
@@ -90,8 +91,7 @@ TICKS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_control_period_ratio",
-        kind=Kind.HISTOGRAM,
-        unit="ratio",
+        kind=MetricKind.HISTOGRAM,
         help="Time between the begins of two ticks, as a share of the period in force.",
         topic=_TOPIC,
         paths=((keys("period_ratio"),),),
@@ -99,8 +99,6 @@ TICKS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_control_period_seconds",
-        kind=Kind.GAUGE,
-        unit="seconds",
         help="Time between the begins of two ticks, a running mean of some 50.",
         topic=_TOPIC,
         paths=((keys("period_s"),),),
@@ -108,15 +106,12 @@ TICKS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_control_nominal_period_seconds",
-        kind=Kind.GAUGE,
-        unit="seconds",
         help="Time between two ticks that the profile asks for.",
         topic=_TOPIC,
         paths=((keys("nominal_period_s"),),),
     ),
     Metric(
         name="vla_control_motions",
-        kind=Kind.GAUGE,
         help="Motions under way.",
         topic=_TOPIC,
         paths=((keys("active_motions"),),),
@@ -127,21 +122,21 @@ TICKS: Final[tuple[Metric, ...]] = (
 BUSES: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_bus_cycles_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Cycles of a servo bus since it was opened.",
         topic=_TOPIC,
         paths=((*_BUS, keys("cycles")),),
     ),
     Metric(
         name="vla_bus_frames_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Frames on a CAN bus since it was opened.",
         topic=_TOPIC,
         paths=((*_BUS, same("direction", "sent", "received")),),
     ),
     Metric(
         name="vla_bus_faults_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="What went wrong on a bus since it was opened, by kind.",
         topic=_TOPIC,
         paths=((*_BUS, same("fault", *_BUS_FAULTS)),),
@@ -149,8 +144,7 @@ BUSES: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_bus_answer_seconds",
-        kind=Kind.HISTOGRAM,
-        unit="seconds",
+        kind=MetricKind.HISTOGRAM,
         help="From the request to the whole answer of a servo bus' cycle.",
         topic=_TOPIC,
         paths=((*_BUS, keys("latency")),),
@@ -158,8 +152,6 @@ BUSES: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_bus_answer_p99_seconds",
-        kind=Kind.GAUGE,
-        unit="seconds",
         help="Time that 99 % of a servo bus' cycles kept since it was opened.",
         topic=_TOPIC,
         paths=((*_BUS, keys("latency.p99_s")),),
@@ -167,7 +159,7 @@ BUSES: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_bus_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="Error budget of a servo bus: 1 for its state, 0 for the others.",
         topic=_TOPIC,
         paths=((*_BUS, keys("budget.bus")),),
@@ -175,12 +167,11 @@ BUSES: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_bus_nodes",
-        kind=Kind.GAUGE,
         help="How many servos or drives of a bus have used up their error budget, or part of it.",
         topic=_TOPIC,
         paths=(
             (*_BUS, keys("budget"), same("state", "degraded", "lost")),
-            (*_BUS, Among("state", {"degraded": "degraded_nodes", "lost": "lost_nodes"})),
+            (*_BUS, among("state", {"degraded": "degraded_nodes", "lost": "lost_nodes"})),
         ),
         take=count_of,
     ),
@@ -189,57 +180,45 @@ BUSES: Final[tuple[Metric, ...]] = (
 JOINTS: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_joint_temperature_celsius",
-        kind=Kind.GAUGE,
-        unit="celsius",
         help="Temperature of a joint's servo.",
         topic=_TOPIC,
-        paths=((keys("joints"), Joints("temperature_c")),),
+        paths=((keys("joints"), joints("temperature_c")),),
         kept=True,
     ),
     Metric(
         name="vla_joint_voltage_volts",
-        kind=Kind.GAUGE,
-        unit="volts",
         help="Supply of a joint's servo.",
         topic=_TOPIC,
-        paths=((keys("joints"), Joints("voltage_v")),),
+        paths=((keys("joints"), joints("voltage_v")),),
     ),
     Metric(
         name="vla_joint_effort_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="Current of a joint's servo as a share of its stall current, signed like the joint.",
         topic="joint_state",
-        paths=((Joints("effort_ratio"),),),
+        paths=((joints("effort_ratio"),),),
         kept=True,
     ),
     Metric(
         name="vla_joint_hardware_error",
-        kind=Kind.GAUGE,
         help="1 while a joint's servo reports a hardware error.",
         topic="joint_state",
-        paths=((Joints("error"),),),
+        paths=((joints("error"),),),
         take=is_any,
     ),
     Metric(
         name="vla_joint_torque_enabled",
-        kind=Kind.GAUGE,
         help="1 while a joint has power.",
         topic="joint_state",
-        paths=((Joints("torque_enabled"),),),
+        paths=((joints("torque_enabled"),),),
     ),
     Metric(
         name="vla_joint_age_seconds",
-        kind=Kind.GAUGE,
-        unit="seconds",
         help="Age of a joint's measured position.",
         topic="joint_state",
-        paths=((Joints("age_s"),),),
+        paths=((joints("age_s"),),),
     ),
     Metric(
         name="vla_base_speed_meters_per_second",
-        kind=Kind.GAUGE,
-        unit="meters_per_second",
         help="Speed of the base, forward.",
         topic="base_state",
         paths=((keys("v_m_s"),),),
@@ -247,15 +226,12 @@ JOINTS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_base_turn_radians_per_second",
-        kind=Kind.GAUGE,
-        unit="radians_per_second",
         help="Turn rate of the base, counter-clockwise.",
         topic="base_state",
         paths=((keys("w_rad_s"),),),
     ),
     Metric(
         name="vla_base_enabled",
-        kind=Kind.GAUGE,
         help="1 while the wheel drives have power.",
         topic="base_state",
         paths=((keys("enabled"),),),

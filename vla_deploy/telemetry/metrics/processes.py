@@ -1,34 +1,37 @@
-"""Declare what is measured of the processes, their budgets and the ladder."""
+"""Declare what is measured of the processes, their budgets and the degradation ladder."""
 
 from typing import Final
 
 from vla_deploy.supervisor.lifecycle import State
-from vla_deploy.telemetry.metrics.kinds import Kind, Metric
-from vla_deploy.telemetry.metrics.paths import Each, Named, Path, Rows, keys, same
-from vla_deploy.telemetry.metrics.takes import column, count_of, is_empty, share_of_limit
+from vla_deploy.telemetry.metrics.metric import (
+    Metric,
+    MetricKind,
+    column,
+    count_of,
+    is_empty,
+    share_of_limit,
+)
+from vla_deploy.telemetry.metrics.paths import Path, each, keys, rows, same
 
 _MEGA: Final = 1e6
-_ROWS: Final[Path] = (keys("processes"), Rows({"process": "name"}))
+_ROWS: Final[Path] = (keys("processes"), rows({"process": "name"}))
 
 
-def _of_each(*path: str) -> tuple[Path, ...]:
-    """Lead to one number of every process, the supervisor among them."""
-    inside = keys(".".join(path))
-    return (*_ROWS, inside), (Named("supervisor", "process", "supervisor"), inside)
+def _of_each(key: str) -> tuple[Path, ...]:
+    """Return the paths to one number of every process, the supervisor among them."""
+    return (*_ROWS, keys(key)), (same("process", "supervisor"), keys(key))
 
 
 def _budget(metric: str) -> tuple[Path, ...]:
-    """Lead to the rows of one kind of budget."""
-    return ((keys("rows"), Rows({"process": "process"}, where=(("metric", metric),))),)
+    """Return the path to the rows of one kind of budget."""
+    return ((keys("rows"), rows({"process": "process"}, metric=metric)),)
 
 
-_ALL_ROWS: Final = ((keys("rows"), Rows({"process": "process", "resource": "metric"})),)
+_ALL_ROWS: Final = ((keys("rows"), rows({"process": "process", "resource": "metric"})),)
 
 METRICS: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_process_memory_bytes",
-        kind=Kind.GAUGE,
-        unit="bytes",
         help="Memory of a process and of what it started: PSS, or RSS where PSS cannot be read.",
         topic="process_table",
         paths=_of_each("memory_mb"),
@@ -37,8 +40,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_resident_memory_bytes",
-        kind=Kind.GAUGE,
-        unit="bytes",
         help="Resident memory of a process and of what it started; shared pages count each time.",
         topic="process_table",
         paths=_of_each("rss_mb"),
@@ -46,16 +47,13 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_cpu_seconds_total",
-        kind=Kind.COUNTER,
-        unit="seconds",
+        kind=MetricKind.COUNTER,
         help="CPU time of a process and of what it started, over all its restarts in this run.",
         topic="process_table",
         paths=_of_each("cpu_s"),
     ),
     Metric(
         name="vla_process_cpu_cores",
-        kind=Kind.GAUGE,
-        unit="cores",
         help="Cores that a process used, mean of the last 2 s; total is the robot without a twin.",
         topic="budget",
         paths=_budget("cpu_ratio"),
@@ -64,7 +62,7 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="Where a process stands: 1 for its state, 0 for the others.",
         topic="process_table",
         paths=((*_ROWS, keys("state")),),
@@ -72,7 +70,7 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_restarts_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="How often a process was started again in this run.",
         topic="process_table",
         paths=((*_ROWS, keys("restarts")),),
@@ -80,7 +78,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_alarms",
-        kind=Kind.GAUGE,
         help="How many of a process' topics are too old, too slow or not valid.",
         topic="process_table",
         paths=((*_ROWS, keys("alarms")),),
@@ -88,8 +85,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_memory_peak_bytes",
-        kind=Kind.GAUGE,
-        unit="bytes",
         help="Most memory that all processes together held in this run.",
         topic="process_table",
         paths=((keys("peak_memory_mb"),),),
@@ -97,7 +92,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_commands_taken",
-        kind=Kind.GAUGE,
         help="1 while the robot takes commands, 0 while a process that it needs is given up.",
         topic="process_table",
         paths=((keys("refusal"),),),
@@ -105,8 +99,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_memory_limit_bytes",
-        kind=Kind.GAUGE,
-        unit="bytes",
         help="Memory that the profile grants a process; total is for the whole robot.",
         topic="budget",
         paths=_budget("memory_mb"),
@@ -115,8 +107,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_process_cpu_limit_cores",
-        kind=Kind.GAUGE,
-        unit="cores",
         help="Cores that the profile grants a process; total is for the whole robot.",
         topic="budget",
         paths=_budget("cpu_ratio"),
@@ -124,8 +114,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_budget_used_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="How much of a budget's line is used: above 1 the line is broken.",
         topic="budget",
         paths=_ALL_ROWS,
@@ -134,7 +122,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_budget_over",
-        kind=Kind.GAUGE,
         help="1 while a budget counts as broken, by the times that the profile declares.",
         topic="budget",
         paths=_ALL_ROWS,
@@ -142,7 +129,6 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_ladder_steps",
-        kind=Kind.GAUGE,
         help="How many steps of the ladder are in force.",
         topic="budget",
         paths=((keys("ladder.step"),),),
@@ -150,24 +136,21 @@ METRICS: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_ladder_changes_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Steps of the ladder that were taken and undone in this run.",
         topic="budget",
         paths=((keys("ladder.counts"), same("change", "taken", "undone")),),
     ),
     Metric(
         name="vla_budget_stop",
-        kind=Kind.GAUGE,
         help="1 while a budget demands that the robot stops.",
         topic="budget",
         paths=((keys("stop"),),),
     ),
     Metric(
         name="vla_process_rate_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="Share of its rate at which the ladder lets a process work; only those slowed down.",
         topic="resource_directives",
-        paths=((keys("rate_ratio"), Each("process")),),
+        paths=((keys("rate_ratio"), each("process")),),
     ),
 )

@@ -4,7 +4,14 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, Kind, Metric, Point, Readings
+from vla_deploy.telemetry.metrics import (
+    METRICS,
+    METRICS_BY_NAME,
+    Metric,
+    MetricKind,
+    Point,
+    Readings,
+)
 
 KEPT: Final[Mapping[str, Metric]] = {metric.name: metric for metric in METRICS if metric.kept}
 
@@ -19,8 +26,8 @@ class SeriesMaker:
     def values(self, readings: Readings) -> dict[str, float]:
         """Return the value of each series; a counter begins with its second reading."""
         gauges, counters = (
-            dict(_of_kind(readings, Kind.GAUGE)),
-            dict(_of_kind(readings, Kind.COUNTER)),
+            dict(_of_kind(readings, MetricKind.GAUGE)),
+            dict(_of_kind(readings, MetricKind.COUNTER)),
         )
         elapsed_s = (readings.now_ns - self._before_ns) / NS_PER_S
         before, self._before, self._before_ns = self._before, counters, readings.now_ns
@@ -35,7 +42,7 @@ class SeriesMaker:
         return {**gauges, **rates}
 
 
-def _of_kind(readings: Readings, kind: Kind) -> Iterator[tuple[str, float]]:
+def _of_kind(readings: Readings, kind: MetricKind) -> Iterator[tuple[str, float]]:
     for name, metric in KEPT.items():
         if metric.kind is kind:
             for point in readings.points.get(name, ()):
@@ -51,6 +58,6 @@ def series_of(name: str, point: Point) -> str:
 def unit_of(series: str) -> str:
     """Return what a series is measured in; a counter's is by the second."""
     metric = METRICS_BY_NAME[series.partition("/")[0]]
-    if metric.kind is Kind.COUNTER:
+    if metric.kind is MetricKind.COUNTER:
         return f"{metric.unit or '1'}/s"
     return metric.unit

@@ -14,7 +14,7 @@ from platforms.probes import Reading
 from vla_deploy.control.tick_periods import TickPeriods
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.budgets.documents import board
-from vla_deploy.telemetry.metrics import READ_TOPICS, Look, Looker, Readings, read
+from vla_deploy.telemetry.metrics import READ_TOPICS, Readings, TopicSampler, TopicSnapshot, read
 
 JOINTS = ("left_elbow", "right_elbow")
 OWN = {"version": "1.2.3", "look_s": 0.002, "left_out": 0, "clients": 3}
@@ -169,7 +169,7 @@ class Robot:
     def __init__(self, folder: Path) -> None:
         self.clock = StepClock()
         self.space = SharedSpace(folder / "ipc", self.clock)
-        self.looker = Looker(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
+        self.sampler = TopicSampler(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
         self._writers = {name: self.space.cell_writer(name) for name in READ_TOPICS}
 
     def tell(self, **documents: dict[str, Any]) -> None:
@@ -190,8 +190,8 @@ class Robot:
     def later(self, seconds: float) -> None:
         self.clock.ns += round(seconds * NS_PER_S)
 
-    def look(self) -> Look:
-        return self.looker.look(OWN)
+    def look(self) -> TopicSnapshot:
+        return self.sampler.snapshot(OWN)
 
     def read(self) -> Readings:
         return read(self.look())

@@ -1,38 +1,35 @@
-"""Declare what is measured of hearing, planning, seeing, acting and recording."""
+"""Declare what is measured of planning, speech, perception, localisation and recording."""
 
 from typing import Final
 
 from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.telemetry.metrics.kinds import Kind, Metric
-from vla_deploy.telemetry.metrics.paths import Each, keys, same
-from vla_deploy.telemetry.metrics.takes import count_of
+from vla_deploy.telemetry.metrics.metric import Metric, MetricKind, count_of
+from vla_deploy.telemetry.metrics.paths import each, keys, same
 
 _OUTCOMES: Final = ("planned", "asked", "declined", "refused", "invalid", "late")
-# Speech's own words for them come with its networks, which are not for whoever only counts.
-_VERDICTS: Final = ("accepted", "doubted", "rejected", "stop")
+# Not imported from speech: that would load its networks to count words.
+VERDICTS: Final = ("accepted", "doubted", "rejected", "stop")
 _MODEL: Final = "sight.model"
 
 
-def _seconds(name: str, topic: str, paths: tuple[tuple[str, str], ...], text: str) -> list[Metric]:
-    """Declare median and 95 % of a latency; `paths` are their words and where they are told."""
+def _percentiles(name: str, topic: str, key: str, text: str) -> list[Metric]:
+    """Declare median and 95 % of a latency, found in the document at `key` and their name."""
     return [
         Metric(
-            name=f"vla_{name}_{word}_seconds",
-            kind=Kind.GAUGE,
-            unit="seconds",
-            help=f"{text}, {word}.",
+            name=f"vla_{name}_{percentile}_seconds",
+            help=f"{text}, {percentile}.",
             topic=topic,
-            paths=((keys(key),),),
-            kept=word == "p95",
+            paths=((keys(f"{key}{percentile}_s"),),),
+            kept=percentile == "p95",
         )
-        for word, key in paths
+        for percentile in ("p50", "p95")
     ]
 
 
 PLANNING: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_planner_commands_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Commands that the planner heard, and what came of them, since it was started.",
         topic="planner_status",
         paths=((same("outcome", "heard", "planned", "refused", "asked", "failed"),),),
@@ -40,7 +37,6 @@ PLANNING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_planner_waiting",
-        kind=Kind.GAUGE,
         help="Commands that are being planned, wait, or wait for an answer.",
         topic="planner_status",
         paths=((keys("commands"),),),
@@ -48,14 +44,13 @@ PLANNING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_planner_rung_attempts_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="How often a rung of the planner's ladder was asked, by how that ended.",
         topic="planner_status",
-        paths=((keys("by_rung"), Each("rung"), same("outcome", *_OUTCOMES)),),
+        paths=((keys("by_rung"), each("rung"), same("outcome", *_OUTCOMES)),),
     ),
     Metric(
         name="vla_planner_rungs_away",
-        kind=Kind.GAUGE,
         help="Rungs of the ladder that should plan and cannot.",
         topic="planner_status",
         paths=((keys("away"),),),
@@ -63,7 +58,7 @@ PLANNING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_executor_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="Whether the robot carries out a command: 1 for its state, 0 for the other.",
         topic="executor_status",
         paths=((keys("state"),),),
@@ -74,7 +69,7 @@ PLANNING: Final[tuple[Metric, ...]] = (
 HEARING: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_speech_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="What the ears are doing: 1 for their state, 0 for the others.",
         topic="speech_status",
         paths=((keys("state"),),),
@@ -82,15 +77,14 @@ HEARING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_speech_phrases_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Phrases heard since speech was started, by what became of them.",
         topic="speech_status",
-        paths=((keys("heard"), same("verdict", *_VERDICTS)),),
+        paths=((keys("heard"), same("verdict", *VERDICTS)),),
         kept=True,
     ),
-    *_seconds(
-        *("speech_end_to_text", "speech_status"),
-        (("p50", "heard.end_to_text_p50_s"), ("p95", "heard.end_to_text_p95_s")),
+    *_percentiles(
+        *("speech_end_to_text", "speech_status", "heard.end_to_text_"),
         "From the end of a phrase to its words",
     ),
 )
@@ -98,7 +92,7 @@ HEARING: Final[tuple[Metric, ...]] = (
 SEEING: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_perception_sight",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="How things are named, by the network or by form alone: 1 for the way in force.",
         topic="scene",
         paths=((keys("sight.mode"),),),
@@ -107,7 +101,7 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_perception_inferences_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Runs of the detector's network since it was opened.",
         topic="scene",
         paths=((keys(f"{_MODEL}.runs"),),),
@@ -115,34 +109,31 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_perception_inference_failures_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Runs of the detector's network that failed.",
         topic="scene",
         paths=((keys(f"{_MODEL}.failures"),),),
     ),
     Metric(
         name="vla_perception_inference_busy_seconds_total",
-        kind=Kind.COUNTER,
-        unit="seconds",
+        kind=MetricKind.COUNTER,
         help="Time of all runs of the detector's network.",
         topic="scene",
         paths=((keys(f"{_MODEL}.busy_s"),),),
     ),
-    *_seconds(
-        *("perception_inference", "scene"),
-        (("p50", f"{_MODEL}.p50_s"), ("p95", f"{_MODEL}.p95_s")),
+    *_percentiles(
+        *("perception_inference", "scene", f"{_MODEL}."),
         "Time of a run of the detector's network",
     ),
     Metric(
         name="vla_perception_images_refused_total",
-        kind=Kind.COUNTER,
+        kind=MetricKind.COUNTER,
         help="Images that were too bad to be used.",
         topic="scene",
         paths=((keys("image.refused"),),),
     ),
     Metric(
         name="vla_perception_image_faults",
-        kind=Kind.GAUGE,
         help="What is wrong with the last image.",
         topic="scene",
         paths=((keys("image.faults"),),),
@@ -150,7 +141,6 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_perception_things",
-        kind=Kind.GAUGE,
         help="Things in the scene.",
         topic="scene",
         paths=((keys("objects"),),),
@@ -158,7 +148,6 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_perception_sensors_away",
-        kind=Kind.GAUGE,
         help="Sensors that give nothing.",
         topic="scene",
         paths=((keys("away"),),),
@@ -166,7 +155,7 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_place_state",
-        kind=Kind.STATES,
+        kind=MetricKind.STATES,
         help="What the pose on the map is worth: 1 for its state, 0 for the others.",
         topic="pose",
         paths=((keys("state"),),),
@@ -174,8 +163,6 @@ SEEING: Final[tuple[Metric, ...]] = (
     ),
     Metric(
         name="vla_place_match_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="Share of the lidar's points that lie on the map.",
         topic="pose",
         paths=((keys("match_ratio"),),),
@@ -186,23 +173,18 @@ SEEING: Final[tuple[Metric, ...]] = (
 KEEPING: Final[tuple[Metric, ...]] = (
     Metric(
         name="vla_flight_recorder_held_bytes",
-        kind=Kind.GAUGE,
-        unit="bytes",
         help="What the flight recorder remembers.",
         topic="recorder_status",
         paths=((keys("held_bytes"),),),
     ),
     Metric(
         name="vla_flight_recorder_writing",
-        kind=Kind.GAUGE,
         help="1 while the flight recorder writes a flight.",
         topic="recorder_status",
         paths=((keys("writing"),),),
     ),
     Metric(
         name="vla_twin_pace_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
         help="Simulated time over the time of the wall clock; in twin mode only.",
         topic="twin_status",
         paths=((keys("real_time_factor"),),),

@@ -1,8 +1,8 @@
-"""Write readings for Prometheus: its text format, or OpenMetrics where a scraper asks for it."""
+"""Write the metrics for Prometheus: the text that it scrapes, and its file of alert rules."""
 
 from collections.abc import Iterator
 from math import isinf
-from typing import Final
+from typing import Any, Final
 
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import (
@@ -16,7 +16,14 @@ from prometheus_client.metrics_core import (
 )
 from prometheus_client.registry import Collector, CollectorRegistry
 
-from vla_deploy.telemetry.metrics.kinds import Histogram, Kind, Metric, Point
+from vla_deploy.telemetry.metrics.conditions import CONDITIONS, AlertCondition
+from vla_deploy.telemetry.metrics.metric import (
+    Histogram,
+    Metric,
+    MetricKind,
+    MissingReason,
+    Point,
+)
 from vla_deploy.telemetry.metrics.reading import Readings
 from vla_deploy.telemetry.metrics.table import METRICS_BY_NAME
 
@@ -28,7 +35,7 @@ _MISSING_HELP: Final = (
 
 
 def expose(readings: Readings, accept: str = "") -> tuple[bytes, str]:
-    """Return the text for a scraper, and its content type; `accept` is what it asked for."""
+    """Return the text for a scraper and its content type; `accept` is the request's header."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(_Once(readings))
     encode, content_type = choose_encoder(accept)
@@ -36,7 +43,7 @@ def expose(readings: Readings, accept: str = "") -> tuple[bytes, str]:
 
 
 class _Once(Collector):
-    """Hand out one reading of all metrics."""
+    """Collect one reading of all metrics."""
 
     def __init__(self, readings: Readings) -> None:
         self._readings = readings
@@ -53,12 +60,12 @@ class _Once(Collector):
 def _family(metric: Metric, points: tuple[Point, ...]) -> Family:
     unit = metric.unit
     match metric.kind:
-        case Kind.COUNTER:
+        case MetricKind.COUNTER:
             counter = CounterMetricFamily(metric.name, metric.help, labels=metric.labels, unit=unit)
             for point in points:
                 counter.add_metric(point.labels, _plain(point))
             return counter
-        case Kind.HISTOGRAM:
+        case MetricKind.HISTOGRAM:
             histogram = HistogramMetricFamily(
                 metric.name, metric.help, labels=metric.labels, unit=unit
             )
@@ -68,12 +75,12 @@ def _family(metric: Metric, points: tuple[Point, ...]) -> Family:
                         point.labels, _buckets(point.value), sum_value=point.value.sum
                     )
             return histogram
-        case Kind.INFO:
+        case MetricKind.INFO:
             info = InfoMetricFamily(metric.name.removesuffix("_info"), metric.help, labels=())
             for point in points:
                 info.add_metric((), dict(zip(metric.labels, point.labels, strict=True)))
             return info
-        case Kind.GAUGE | Kind.STATES:
+        case MetricKind.GAUGE | MetricKind.STATES:
             gauge = GaugeMetricFamily(metric.name, metric.help, labels=metric.labels, unit=unit)
             for point in points:
                 gauge.add_metric(point.labels, _plain(point))
@@ -91,3 +98,63 @@ def _buckets(histogram: Histogram) -> list[tuple[str, float]]:
         ("+Inf" if isinf(bound) else f"{bound:g}", total)
         for bound, total in zip(histogram.bounds, histogram.totals, strict=True)
     ]
+
+
+JOB: Final = "vla_deploy"
+_GROUP: Final = "vla_deploy"
+_VITAL: Final = "vla_control_state|vla_process_state"
+
+
+def alert_rules() -> dict[str, Any]:
+    """Return the rule file as plain data."""
+    rules = [_DOWN, _SILENT, *(_rule(condition) for condition in CONDITIONS)]
+    return {"groups": [{"name": _GROUP, "rules": rules}]}
+
+
+def expression(condition: AlertCondition) -> str:
+    """Return the condition in PromQL."""
+    chosen = condition.metric + _selector(condition)
+    if condition.per_s:
+        chosen = f"rate({chosen}[{condition.per_s}s])"
+    if condition.of:
+        chosen += f" / rate({condition.of}[{condition.per_s}s])"
+    if condition.above is not None:
+        return f"{chosen} > {condition.above:g}"
+    return f"{chosen} < {condition.below:g}"
+
+
+def _selector(condition: AlertCondition) -> str:
+    inside = ",".join(f'{label}=~"{"|".join(of)}"' for label, of in condition.where.items())
+    return f"{{{inside}}}" if inside else ""
+
+
+def _rule(condition: AlertCondition) -> dict[str, Any]:
+    return {
+        "alert": condition.name,
+        "expr": expression(condition),
+        "for": f"{condition.for_s}s",
+        "labels": {"severity": condition.severity.name.lower()},
+        "annotations": {"summary": condition.summary, "description": condition.remedy},
+    }
+
+
+_DOWN: Final = {
+    "alert": "VlaRobotUnreachable",
+    "expr": f'up{{job="{JOB}"}} == 0',
+    "for": "30s",
+    "labels": {"severity": "critical"},
+    "annotations": {
+        "summary": "The robot's dashboard cannot be scraped.",
+        "description": "Is the robot switched on, and the token valid? vla-deploy status",
+    },
+}
+_SILENT: Final = {
+    "alert": "VlaProcessSilent",
+    "expr": f'{MISSING}{{metric=~"{_VITAL}",why="{MissingReason.SILENT.value}"}} == 1',
+    "for": "10s",
+    "labels": {"severity": "critical"},
+    "annotations": {
+        "summary": "Control or the supervisor tells nothing.",
+        "description": "vla-deploy status; vla-deploy logs",
+    },
+}
