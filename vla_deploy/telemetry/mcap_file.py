@@ -21,6 +21,8 @@ SPOILED: Final = (
     KeyError,
     EOFError,
 )
+FLIGHT: Final = "flight"
+RECORDING: Final = "recording"
 _SEQUENCE_MASK: Final = 0xFFFF_FFFF
 _CHUNK_BYTES: Final = 256 * 1024
 

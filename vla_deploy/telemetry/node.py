@@ -14,11 +14,11 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.runtime.node import NodeContext
+from vla_deploy.telemetry.flight import FlightHead, write_flight
 from vla_deploy.telemetry.folder import FlightFolder
-from vla_deploy.telemetry.memory import Memory
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
+from vla_deploy.telemetry.topic_history import TopicHistory
 from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
-from vla_deploy.telemetry.writing import FlightHead, write_flight
 
 MESSAGES_AT_ONCE: Final = 150
 _SHOWN_CAUSES = 20
@@ -58,7 +58,7 @@ class RecorderNode:
         self._watcher = Watcher()
         self._debounce = debounce or Debounce()
         self._writing: _Writing | None = None
-        self._memory: Memory
+        self._history: TopicHistory
         self._events: RingWriter
         self._status: CellWriter
         self._status_due_ns = 0
@@ -69,7 +69,7 @@ class RecorderNode:
     def start(self) -> None:
         """Open every topic of the schema table; what is still in the rings counts."""
         self._started_ns = self._clock.now_ns()
-        self._memory = Memory(self._space)
+        self._history = TopicHistory(self._space)
         self._events = self._space.ring_writer("flight_event")
         self._status = self._space.cell_writer("recorder_status")
         if self._rolling is not None:
@@ -108,9 +108,9 @@ class RecorderNode:
             "process_table": self._watcher.table,
             "flight_request": self._request,
         }
-        new = self._memory.refresh(now_ns)
+        new = self._history.refresh(now_ns)
         if self._rolling is not None:
-            self._rolling.step(now_ns, new, self._memory.newest)
+            self._rolling.step(now_ns, new, self._history.newest)
         for channel, kept in new:
             if channel in find:
                 for trigger in find[channel](json.loads(kept.payload), kept.stamp_ns):
@@ -146,7 +146,7 @@ class RecorderNode:
             wall_offset_ns=wall_ns - run_ns,
             triggers=tuple(causes),
         )
-        values, ticks = self._memory.snapshot(run_ns)
+        values, ticks = self._history.snapshot(run_ns)
         progress = write_flight(part, head, values, ticks, at_once=MESSAGES_AT_ONCE)
         self._writing = _Writing(part, causes, progress)
 
@@ -177,7 +177,7 @@ class RecorderNode:
             return
         self._status_due_ns = now_ns + NS_PER_S // 2
         self._status.put_document(
-            {"writing": self._writing is not None, "held_bytes": self._memory.held_bytes}
+            {"writing": self._writing is not None, "held_bytes": self._history.held_bytes}
         )
 
     def _tell(self, event: str, causes: list[Trigger], **details: str) -> None:

@@ -6,13 +6,13 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.telemetry.channels import TICKS
-from vla_deploy.telemetry.flight import Flight, Message
+from vla_deploy.telemetry.recorded_file import RecordedFile, RecordedMessage
 
 Document = Mapping[str, Any]
 Line = dict[str, Any]
 
 
-def time_line(flight: Flight) -> list[Line]:
+def time_line(flight: RecordedFile) -> list[Line]:
     """Return the lines by time; 0 s is the first cause.
 
     Raises:
@@ -37,12 +37,12 @@ def _cause(cause: Document) -> str:
     )
 
 
-def _told(message: Message, before: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
+def _told(message: RecordedMessage, before: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
     """Return what a message says that the one before it in its topic did not say."""
-    who, tell, is_state = _TELLERS[message.topic]
+    who, tell, is_state = _TELLERS[message.channel]
     texts = [text for text in tell(message.document()) if text]
-    known = before.get(message.topic, []) if is_state else []
-    before[message.topic] = texts
+    known = before.get(message.channel, []) if is_state else []
+    before[message.channel] = texts
     yield from ((who, text) for text in texts if text not in known)
 
 

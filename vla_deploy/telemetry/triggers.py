@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 
@@ -22,7 +22,9 @@ class Kind(Enum):
     REQUEST = "request"
 
 
-# How long after it the flight goes on.
+# Kept in memory: 30 s before a trigger, a few after it, and the time until they are written.
+KEPT_NS: Final = 36 * NS_PER_S
+# How long after its trigger a flight goes on.
 AFTER_S: Mapping[Kind, float] = {Kind.STOP: 3.0, Kind.CRASH: 3.0, Kind.REQUEST: 0.0}
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from sim_twin.stack import LockstepControl
-from vla_deploy.telemetry.flight import Flight, read_flight
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
+from vla_deploy.telemetry.recorded_file import RecordedFile, read_flight
 
 WALL_NS = 1_800_000_000_000_000_000
 
@@ -59,12 +59,12 @@ class Rig(LockstepControl):
             self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
             self.run(0.02)
 
-    def flights(self) -> list[Flight]:
-        return [read_flight(path) for path in self.folder.flights()]
+    def flights(self) -> list[RecordedFile]:
+        return [read_flight(path) for path in self.folder.files()]
 
-    def wait_for_flight(self) -> Flight:
-        before = len(self.folder.flights())
-        assert self.lockstep.run_until(lambda: len(self.folder.flights()) > before, 60.0)
+    def wait_for_flight(self) -> RecordedFile:
+        before = len(self.folder.files())
+        assert self.lockstep.run_until(lambda: len(self.folder.files()) > before, 60.0)
         return self.flights()[-1]
 
 
@@ -72,7 +72,7 @@ class Rig(LockstepControl):
 class Stopped:
     """Hold the flight of a drive that an operator stopped at `stopped_ns`."""
 
-    flight: Flight
+    flight: RecordedFile
     stopped_ns: int
     now_ns: int
     ticks_before: int

@@ -115,7 +115,7 @@ def record(name: str, to: Path) -> None:
         stack.arm()
         SCENES[name](stack)
         stack.space.ring_writer("flight_request").publish({"source": "example", "reason": name})
-        if not stack.lockstep.run_until(lambda: bool(folder.flights()), 30.0):
+        if not stack.lockstep.run_until(lambda: bool(folder.files()), 30.0):
             sys.exit(f"{name}: no flight was written")
         shutil.copyfile(folder.find("latest"), to)
         stack.close()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.telemetry.errors import FlightMissing
-from vla_deploy.telemetry.folder import Bounds, FlightFolder, folder_of
+from vla_deploy.telemetry.folder import FlightFolder, FolderBounds, folder_of
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -17,7 +17,7 @@ def saved(folder, label="x", size=10):
 
 
 def names(folder):
-    return [path.name for path in folder.flights()]
+    return [path.name for path in folder.files()]
 
 
 def test_flights_are_numbered_whatever_the_clock_says(tmp_path):
@@ -28,14 +28,14 @@ def test_flights_are_numbered_whatever_the_clock_says(tmp_path):
 
 
 def test_the_oldest_goes_when_there_are_too_many(tmp_path):
-    folder = FlightFolder(tmp_path, Bounds(files=3, spare_bytes=0))
+    folder = FlightFolder(tmp_path, FolderBounds(files=3, spare_bytes=0))
     for _ in range(5):
         saved(folder)
     assert names(folder) == [f"00000{number}-x.mcap" for number in (3, 4, 5)]
 
 
 def test_the_oldest_goes_when_they_are_too_large(tmp_path):
-    folder = FlightFolder(tmp_path, Bounds(total_bytes=250, spare_bytes=0))
+    folder = FlightFolder(tmp_path, FolderBounds(total_bytes=250, spare_bytes=0))
     for _ in range(5):
         saved(folder, size=100)
     assert names(folder) == ["000004-x.mcap", "000005-x.mcap"]

@@ -13,8 +13,8 @@ from vla_deploy.ipc.packing import Catalogue
 from vla_deploy.telemetry import judge
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightForeign
-from vla_deploy.telemetry.flight import read_flight
 from vla_deploy.telemetry.judge import JUDGED_TYPES, judge_again
+from vla_deploy.telemetry.recorded_file import read_flight
 
 FLIGHTS = sorted((Path(__file__).parent / "flights").glob("*.mcap"))
 DRIVING = FLIGHTS[0].with_name("estop_while_driving.mcap")

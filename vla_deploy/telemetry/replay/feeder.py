@@ -3,36 +3,35 @@
 import base64
 import json
 import logging
+import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+import cv2
+import numpy as np
+
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import BY_NAME, BadPayload, Kind, SharedSpace, Topic
+from vla_deploy.ipc import BY_NAME, BadPayload, Field, Kind, SharedSpace, Topic
 from vla_deploy.ipc.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
-from vla_deploy.telemetry.recording.batch import LOG_CHANNEL
-from vla_deploy.telemetry.replay.decoding import (
-    document_of,
-    fields_of,
-    image_payload,
-    shifted,
-)
-from vla_deploy.telemetry.replay.source import Recorded
+from vla_deploy.telemetry.recorded_file import RecordedMessage
+from vla_deploy.telemetry.schemas.views import LOG
 
 _OWN: Final = frozenset({"replay_request", "replay_status"})
 _LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
-_LOOK_NS: Final = NS_PER_S // 10  # a recorder looks that seldom, at the most
+_LOOK_NS: Final = NS_PER_S // 10  # at most this between two reads of a recorder
+_STAMP_SUFFIX: Final = "_ns"
 _IMAGE_PARTS: Final = ("colour", "depth")
 LASTING: Final = (Kind.CELL, Kind.FRAME)
-"""Topics whose value is so until the next one comes."""
+"""Topics whose value is valid until the next one."""
 _log = logging.getLogger(__name__)
 
 
 def fed_topics() -> tuple[Topic, ...]:
-    """Return the topics that a file may speak for: not those of processes that run now."""
+    """Return the topics to be fed from a file: not those of processes that run now."""
     return tuple(
         topic
         for topic in BY_NAME.values()
@@ -40,8 +39,8 @@ def fed_topics() -> tuple[Topic, ...]:
     )
 
 
-class Feeder:
-    """Write what was recorded, as fresh as it was then; `unfit` counts what does not fit."""
+class TopicFeeder:
+    """Write recorded messages as new values; `unfit` counts those that do not fit their topic."""
 
     def __init__(self, space: SharedSpace, logs: Path, clock: Clock) -> None:
         self.unfit = 0
@@ -49,26 +48,26 @@ class Feeder:
         self._logs = logs
         self._clock = clock
         self._topics = {topic.name: topic for topic in fed_topics()}
-        self._puts: dict[str, Callable[[Recorded], None]] = {}
+        self._puts: dict[str, Callable[[RecordedMessage], None]] = {}
         self._images: dict[str, tuple[int, dict[str, bytes]]] = {}
-        self._lasting: dict[str, Recorded] = {}
+        self._lasting: dict[str, RecordedMessage] = {}
         logs.mkdir(parents=True, exist_ok=True)
 
     def hold(self, at_ns: int) -> None:
-        """Show what was in time at a moment of the file as in time again: the file stands there."""
+        """Write again what was fresh at a moment of the file, while the replay stands there."""
         for message in tuple(self._lasting.values()):
             deadline_s = self._topics[message.channel.partition("/")[0]].deadline_s
             allowed_ns = deadline_s * NS_PER_S + _LOOK_NS
             if not deadline_s or at_ns - message.at_ns <= allowed_ns:
                 self.feed(message)
 
-    def feed(self, message: Recorded) -> None:
-        """Put one message into its topic; what no longer fits the topic is left out, counted."""
+    def feed(self, message: RecordedMessage) -> None:
+        """Put one message into its topic; one that does not fit is left out and counted."""
         topic, _, _ = message.channel.partition("/")
         if topic in self._topics and self._topics[topic].kind in LASTING:
             self._lasting[message.channel] = message
         try:
-            if message.channel == LOG_CHANNEL:
+            if message.channel == LOG:
                 self._log_line(message)
             elif topic in self._topics:
                 self._put_of(topic)(message)
@@ -77,7 +76,7 @@ class Feeder:
                 _log.warning("%s: left out: %s", message.channel, error)
             self.unfit += 1
 
-    def _put_of(self, name: str) -> Callable[[Recorded], None]:
+    def _put_of(self, name: str) -> Callable[[RecordedMessage], None]:
         if name not in self._puts:
             topic = self._topics[name]
             kind = topic.kind
@@ -85,33 +84,33 @@ class Feeder:
             self._puts[name] = self._packed(topic) if is_packed else _OPENERS[kind](self, name)
         return self._puts[name]
 
-    def _packed(self, topic: Topic) -> Callable[[Recorded], None]:
+    def _packed(self, topic: Topic) -> Callable[[RecordedMessage], None]:
         writer = self._space.cell_writer(topic.name)
-        return lambda message: writer.put(**fields_of(topic, document_of(message.text)))
+        return lambda message: writer.put(**fields_of(topic, message.document()))
 
-    def _document(self, name: str) -> Callable[[Recorded], None]:
+    def _document(self, name: str) -> Callable[[RecordedMessage], None]:
         writer = self._space.cell_writer(name)
         return lambda message: writer.put_document(self._shifted(message))
 
-    def _event(self, name: str) -> Callable[[Recorded], None]:
+    def _event(self, name: str) -> Callable[[RecordedMessage], None]:
         writer = self._space.ring_writer(name)
 
-        def publish(message: Recorded) -> None:
+        def publish(message: RecordedMessage) -> None:
             writer.publish(self._shifted(message))
 
         return publish
 
-    def _record(self, name: str) -> Callable[[Recorded], None]:
+    def _record(self, name: str) -> Callable[[RecordedMessage], None]:
         writer = self._space.record_writer(name)
         return lambda message: writer.append(tick_bytes(message.text))
 
-    def _frame(self, name: str) -> Callable[[Recorded], None]:
+    def _frame(self, name: str) -> Callable[[RecordedMessage], None]:
         writer = self._space.frame_writer(name)
 
-        def put(message: Recorded) -> None:
+        def put(message: RecordedMessage) -> None:
             sequence, parts = self._images.get(name, (-1, {}))
             parts = parts if sequence == message.sequence else {}
-            data = base64.b64decode(document_of(message.text)["data"])
+            data = base64.b64decode(message.document()["data"])
             parts[message.channel.partition("/")[2]] = data
             self._images[name] = message.sequence, parts
             if all(part in parts for part in _IMAGE_PARTS):
@@ -121,14 +120,14 @@ class Feeder:
 
         return put
 
-    def _shifted(self, message: Recorded) -> dict[str, Any]:
+    def _shifted(self, message: RecordedMessage) -> dict[str, Any]:
         shift_ns = self._clock.now_ns() - message.stamp_ns
-        moved: dict[str, Any] = shifted(document_of(message.text), shift_ns)
+        moved: dict[str, Any] = shifted(message.document(), shift_ns)
         return moved
 
-    def _log_line(self, message: Recorded) -> None:
-        """Write a line where `vla-deploy logs` and the dashboard look for it."""
-        line = document_of(message.text)
+    def _log_line(self, message: RecordedMessage) -> None:
+        """Write a line to the log files that `vla-deploy logs` and the dashboard read."""
+        line = message.document()
         at_s = line["timestamp"]["sec"] + line["timestamp"]["nsec"] / NS_PER_S
         written = {
             "stamp_ns": self._clock.now_ns(),
@@ -145,9 +144,54 @@ class Feeder:
                 log.write(json.dumps(written) + "\n")
 
 
-_OPENERS: Final[Mapping[Kind, Callable[[Feeder, str], Callable[[Recorded], None]]]] = {
-    Kind.CELL: Feeder._document,
-    Kind.RING: Feeder._event,
-    Kind.RECORD: Feeder._record,
-    Kind.FRAME: Feeder._frame,
+_OPENERS: Final[Mapping[Kind, Callable[[TopicFeeder, str], Callable[[RecordedMessage], None]]]] = {
+    Kind.CELL: TopicFeeder._document,
+    Kind.RING: TopicFeeder._event,
+    Kind.RECORD: TopicFeeder._record,
+    Kind.FRAME: TopicFeeder._frame,
 }
+
+
+def fields_of(topic: Topic, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a packed cell; what another version did not record is zero."""
+    return {field.name: _value(field, document.get(field.name)) for field in topic.fields}
+
+
+def shifted(document: Any, shift_ns: int) -> Any:
+    """Return a document with its stamps moved from the recorded run's clock into this one's.
+
+    By the naming rule of all topics, a stamp is a whole number whose name ends in `_ns`.
+    """
+    if isinstance(document, dict):
+        return {
+            key: value + shift_ns
+            if key.endswith(_STAMP_SUFFIX) and type(value) is int and value > 0
+            else shifted(value, shift_ns)
+            for key, value in document.items()
+        }
+    if isinstance(document, list):
+        return [shifted(one, shift_ns) for one in document]
+    return document
+
+
+def image_payload(colour: bytes, depth: bytes) -> tuple[bytes, int, int]:
+    """Return an image's payload for the frame ring, its width and its height.
+
+    Raises:
+        ValueError: the parts are no JPEG and 16-bit PNG of one size.
+    """
+    pixels = cv2.imdecode(np.frombuffer(colour, np.uint8), cv2.IMREAD_COLOR)
+    depths = cv2.imdecode(np.frombuffer(depth, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or depths is None or depths.shape != pixels.shape[:2]:
+        raise ValueError("an image whose colour and depth do not belong together")
+    height, width = depths.shape
+    rgb = np.ascontiguousarray(pixels[..., ::-1])
+    return rgb.tobytes() + depths.astype("<u2").tobytes(), width, height
+
+
+def _value(field: Field, recorded: Any) -> Any:
+    nothing = math.nan if field.dtype.startswith("f") else 0
+    if field.shape == 1:
+        return nothing if recorded is None else recorded
+    values = recorded if isinstance(recorded, list) else []
+    return [nothing if value is None else value for value in values][: field.shape]

@@ -14,11 +14,10 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
-from vla_deploy.telemetry.memory import Memory
-from vla_deploy.telemetry.recording.building import rolling_recorder
 from vla_deploy.telemetry.recording.folder import RecordingFolder
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.recording.settings import RecordingSettings
+from vla_deploy.telemetry.topic_history import TopicHistory
 
 WALL_NS = 1_800_000_000_000_000_000
 STEP_S = 0.04
@@ -58,14 +57,14 @@ class Rig:
         self._base = self.space.cell_writer("base_state")
         self._control = self.space.cell_writer("control_status")
         self._control.put_document({"state": "armed", "tick": 1})
-        self._memory = Memory(self.space)
+        self._history = TopicHistory(self.space)
         self.recorder: RollingRecorder
         self._open: list[RollingRecorder] = []
 
     def begin(self, executor: Executor | None = None, **settings: Any) -> None:
         chosen = RecordingSettings(**{"spare_mb": 0.0, **settings})
         self.folder = RecordingFolder(self.folder_path, chosen.bounds)
-        self.recorder = rolling_recorder(
+        self.recorder = RollingRecorder(
             self.context,
             self.space,
             lambda: WALL_NS + self.clock.now_ns(),
@@ -89,7 +88,7 @@ class Rig:
             self._base.put(x_m=x_m, y_m=0.0, yaw_rad=0.0, v_m_s=0.0, w_rad_s=0.0, enabled=1)
             each()
             now_ns = self.clock.now_ns()
-            self.recorder.step(now_ns, self._memory.refresh(now_ns), self._memory.newest)
+            self.recorder.step(now_ns, self._history.refresh(now_ns), self._history.newest)
 
     def ask(self, **request: Any) -> None:
         self.requests.publish({"act": "start", "source": "test", **request})

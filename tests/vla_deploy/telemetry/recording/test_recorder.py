@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from vla_deploy.ipc import TOPICS
 from vla_deploy.telemetry.channels import channels_of
-from vla_deploy.telemetry.recording import feed, recorder
+from vla_deploy.telemetry.recording import recorder
 from vla_deploy.telemetry.schemas.views import CHANNELS
 
 Usage = namedtuple("Usage", "total used free")
@@ -161,7 +161,7 @@ def test_a_request_that_cannot_be_is_refused_with_the_reason(
 def test_a_disk_that_hangs_holds_nobody_up_and_what_is_lost_is_counted(
     rig: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(feed, "BACKLOG_BYTES", 2000)
+    monkeypatch.setattr(recorder, "BACKLOG_BYTES", 2000)
     stuck = Stuck()
     rig.begin(executor=stuck)
     rig.ask(topics=["base_state"])

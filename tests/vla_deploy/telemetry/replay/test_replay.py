@@ -15,14 +15,12 @@ from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.ipc import ReplayOnly, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.telemetry.errors import FlightUnreadable, ReplayRefused
+from vla_deploy.telemetry.recorded_file import RecordedMessage, read_file
 from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.recording_file import RecordedRun
-from vla_deploy.telemetry.recording.request import RecordingWish
-from vla_deploy.telemetry.replay.decoding import shifted
-from vla_deploy.telemetry.replay.feeder import Feeder
-from vla_deploy.telemetry.replay.node import ReplayNode
-from vla_deploy.telemetry.replay.pace import Pace
-from vla_deploy.telemetry.replay.source import Recorded, Source
+from vla_deploy.telemetry.recording.request import RecordingRequest
+from vla_deploy.telemetry.replay.feeder import TopicFeeder, shifted
+from vla_deploy.telemetry.replay.node import PlaybackPosition, ReplayNode
 
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
@@ -48,7 +46,7 @@ class Shown:
     def __init__(self, run_dir: Path, file: Path, **options: Any) -> None:
         self.clock = StepClock()
         run_dir.mkdir(parents=True, exist_ok=True)
-        self.node = ReplayNode(run_dir, Source(file), self.clock, **options)
+        self.node = ReplayNode(run_dir, read_file(file), self.clock, **options)
         self.link = RobotLink(run_dir, self.clock)
         self.node.start()
         self.requests = self.link.space.ring_writer("replay_request")
@@ -121,10 +119,12 @@ def test_what_stands_still_stays_fresh(shown: Shown) -> None:
 def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path) -> None:
     clock = StepClock()
     space = SharedSpace(tmp_path / "ipc", clock, is_replay=True)
-    feeder, cell = Feeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
+    feeder, cell = TopicFeeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
     fields = {"stamp_ns": 1, "x_m": 2.0}
     feeder.feed(
-        Recorded(channel="pose", at_ns=0, stamp_ns=0, sequence=1, text=json.dumps(fields).encode())
+        RecordedMessage(
+            channel="pose", at_ns=0, stamp_ns=0, sequence=1, text=json.dumps(fields).encode()
+        )
     )
     for at_s, is_fresh in ((0.1, True), (5.0, False)):
         clock.time_ns += 2 * NS_PER_S
@@ -207,7 +207,7 @@ def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
     one = OneRecording(
         run_dir,
         run,
-        RecordingWish(duration_s=2.0),
+        RecordingRequest(duration_s=2.0),
         tmp_path / "x.mcap",
         image_period_s=0.1,
         clock=clock,
@@ -264,8 +264,8 @@ def test_only_stamps_are_moved_into_this_runs_clock() -> None:
 
 
 def test_a_pace_goes_on_from_where_it_was_changed() -> None:
-    pace = Pace(1000 * NS_PER_S, 1100 * NS_PER_S, 0)
-    pace.go_at(10 * NS_PER_S, 4.0)
+    pace = PlaybackPosition(1000 * NS_PER_S, 1100 * NS_PER_S, 0)
+    pace.set_speed(10 * NS_PER_S, 4.0)
     assert pace.position_ns(15 * NS_PER_S) == 1030 * NS_PER_S
     pace.pause(15 * NS_PER_S, paused=True)
     assert pace.position_ns(99 * NS_PER_S) == 1030 * NS_PER_S
@@ -280,4 +280,4 @@ def test_what_is_no_recording_of_ours_is_refused_with_its_name(tmp_path: Path) -
         path = tmp_path / "x.mcap"
         path.write_bytes(data)
         with pytest.raises(FlightUnreadable, match=r"x\.mcap: no whole recording"):
-            Source(path)
+            read_file(path)

@@ -12,7 +12,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.recording_file import RecordedRun
-from vla_deploy.telemetry.recording.request import RecordingWish
+from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.rerun.entity import Entity
 
 WALL_NS = 1_800_000_000 * NS_PER_S
@@ -103,7 +103,7 @@ class Run:
         OneRecording(
             self.run_dir,
             RecordedRun(run_id="r", robot="butler", profile="desktop"),
-            RecordingWish(duration_s=2.0, **wish),  # type: ignore[arg-type]
+            RecordingRequest(duration_s=2.0, **wish),  # type: ignore[arg-type]
             path,
             image_period_s=0.5,
             clock=self.clock,
