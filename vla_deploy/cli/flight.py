@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
-from vla_deploy.telemetry.judge import Judgement, judge_again, rules_digest
+from vla_deploy.telemetry.judge import FlightJudgement, judge_again, rules_digest
 from vla_deploy.telemetry.recorded_file import RecordedFile, read_flight
 from vla_deploy.telemetry.timeline import time_line
 
@@ -98,7 +99,7 @@ def run_judge(arguments: argparse.Namespace) -> int:
         judgement = judge_again(tick_bytes(message.text) for message in flight.messages(TICKS))
         agreed &= judgement.difference is None
         same = flight.rules == rules_digest()
-        results.append({"file": path.name, "same_rules": same, **judgement.document})
+        results.append({"file": path.name, "same_rules": same, **asdict(judgement)})
         if not arguments.json:
             print(f"{path.name}: {_verdict(judgement)}")
         if not arguments.json and judgement.difference and not same:
@@ -156,7 +157,7 @@ def _wall(flight: RecordedFile, stamp_ns: int) -> str:
     return f"{datetime.fromtimestamp(at_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _verdict(judgement: Judgement) -> str:
+def _verdict(judgement: FlightJudgement) -> str:
     unread = f"; {judgement.unread} before the first complete one" if judgement.unread else ""
     difference = judgement.difference
     if difference is None:

@@ -11,7 +11,7 @@ from vla_deploy.telemetry.recording.recorder import RollingRecorder
 
 
 def build(context: NodeContext) -> RecorderNode:
-    """Build the node from what the process was started with."""
+    """Build the node."""
     return RecorderNode(
         context,
         FlightFolder(folder_of(context.run_dir.parent)),

@@ -20,21 +20,21 @@ from vla_deploy.telemetry.channels import (
 )
 from vla_deploy.telemetry.judge import JUDGED_TYPES, rules_digest
 from vla_deploy.telemetry.mcap_file import FLIGHT, McapFile
-from vla_deploy.telemetry.triggers import Trigger
+from vla_deploy.telemetry.triggers import FlightTrigger
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightHead:
-    """Say whose flight it is; `wall_offset_ns` turns monotonic stamps into wall clock."""
+    """Identify the run of a flight; adding `wall_offset_ns` to stamps gives wall clock."""
 
     run_id: str
     robot: str
     profile: str
     wall_offset_ns: int
-    triggers: tuple[Trigger, ...]
+    triggers: tuple[FlightTrigger, ...]
 
     def metadata(self) -> dict[str, str]:
-        """Return it as the file carries it: texts only."""
+        """Return the metadata of the file: texts only."""
         causes = [{**asdict(one), "kind": one.kind.value} for one in self.triggers]
         return {
             "run_id": self.run_id,
@@ -89,7 +89,7 @@ def _ticks(ticks: Sequence[Record]) -> Iterator[tuple[str, TopicValue, bytes]]:
 
 
 def _row(reader: DeltaReader, record: Record) -> dict[str, Any] | None:
-    """Return a tick's values for people to read; what cannot be read is recorded all the same."""
+    """Return a tick's values for people, or None; the record is written in any case."""
     try:
         return reader.row(record.payload)
     except BadPayload:

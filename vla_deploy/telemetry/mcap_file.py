@@ -1,4 +1,4 @@
-"""Write an MCAP file of JSON messages in zstd chunks, and know what a spoiled one raises."""
+"""Write MCAP files of JSON messages in zstd chunks; list what a spoiled file raises."""
 
 import os
 import struct
@@ -11,7 +11,7 @@ from zstandard import ZstdError
 
 from vla_deploy.telemetry.channels import Channel
 
-# What the library and what it unpacks with raise on bytes that are no MCAP; lz4: RuntimeError.
+# Raised by the library and its decompressors on bytes that are no MCAP; lz4: RuntimeError.
 SPOILED: Final = (
     McapError,
     struct.error,
@@ -28,12 +28,12 @@ _CHUNK_BYTES: Final = 256 * 1024
 
 
 class McapFile:
-    """Write messages to an open file, each on a channel that was declared for it."""
+    """Write messages to an open file, each on a channel declared before."""
 
     def __init__(
         self, file: BinaryIO, channels: Iterable[Channel], name: str, metadata: Mapping[str, str]
     ) -> None:
-        """Begin the file with what it says of itself.
+        """Begin the file with its metadata.
 
         Raises:
             OSError: the disk refuses it.
@@ -71,17 +71,17 @@ class McapFile:
         )
 
     def flush(self) -> None:
-        """Hand what there is to the kernel, as a whole chunk: a killed process leaves it.
+        """Write a whole chunk to the kernel, so that it outlives a killed process.
 
         Raises:
             OSError: the disk refuses it.
         """
-        # The library ends a chunk by size only; one of few messages would wait for minutes.
+        # The library ends a chunk by size only: with few messages that takes minutes.
         self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
         self._file.flush()
 
     def finish(self) -> None:
-        """Write the index and everything to the disk.
+        """Write the index, and sync the file to the disk.
 
         Raises:
             OSError: the disk refuses it.

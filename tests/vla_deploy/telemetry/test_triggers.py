@@ -1,4 +1,4 @@
-from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
+from vla_deploy.telemetry.triggers import Debounce, FlightTrigger, TriggerDetector, TriggerKind
 
 S = 1_000_000_000
 
@@ -23,7 +23,7 @@ def table(**rows):
 
 
 def stop(at_s, what="estop"):
-    return Trigger(kind=Kind.STOP, what=what, at_ns=round(at_s * S))
+    return FlightTrigger(kind=TriggerKind.STOP, what=what, at_ns=round(at_s * S))
 
 
 def causes(watcher, *documents):
@@ -32,7 +32,7 @@ def causes(watcher, *documents):
 
 def test_a_stop_calls_once_when_it_begins():
     told = causes(
-        Watcher(),
+        TriggerDetector(),
         status("armed"),
         status("stopping", "estop"),
         status("stopped", "estop"),
@@ -45,7 +45,7 @@ def test_a_stop_calls_once_when_it_begins():
 
 def test_a_graver_cause_during_a_stop_calls_again():
     told = causes(
-        Watcher(),
+        TriggerDetector(),
         status("armed"),
         status("stopped", "following_error"),
         status("stopped", "estop"),
@@ -54,33 +54,35 @@ def test_a_graver_cause_during_a_stop_calls_again():
 
 
 def test_a_fault_that_forbids_arming_calls():
-    assert causes(Watcher(), status("disarmed"), status("fault", "can_bus_lost")) == [
+    assert causes(TriggerDetector(), status("disarmed"), status("fault", "can_bus_lost")) == [
         [],
         ["can_bus_lost"],
     ]
 
 
 def test_an_orderly_disarm_and_a_restricted_base_call_nobody():
-    told = causes(Watcher(), status("armed"), status("stopping"), status("armed", "stale_command"))
+    told = causes(
+        TriggerDetector(), status("armed"), status("stopping"), status("armed", "stale_command")
+    )
     assert told == [[], [], []]
 
 
 def test_what_was_so_before_the_recorder_came_calls_nobody():
-    watcher = Watcher()
+    watcher = TriggerDetector()
     assert watcher.status(status("stopped", "estop"), 0) == []
     assert watcher.table(table(control=("back-off", 3)), 0) == []
 
 
 def test_a_recorder_that_comes_after_one_that_crashed_calls():
-    watcher = Watcher()
+    watcher = TriggerDetector()
     (trigger,) = watcher.table(table(control=("ready", 3), recorder=("starting", 1)), 5)
-    assert (trigger.kind, trigger.what, trigger.detail) == (Kind.CRASH, "recorder", "killed")
+    assert (trigger.kind, trigger.what, trigger.detail) == (TriggerKind.CRASH, "recorder", "killed")
     assert watcher.table(table(control=("ready", 3), recorder=("ready", 1)), 6) == []
-    assert Watcher().table(table(recorder=("starting", 0)), 5) == []
+    assert TriggerDetector().table(table(recorder=("starting", 0)), 5) == []
 
 
 def test_each_crash_of_a_process_calls_once():
-    watcher = Watcher()
+    watcher = TriggerDetector()
     rows = (
         ("ready", 0),
         ("back-off", 0),
@@ -94,7 +96,7 @@ def test_each_crash_of_a_process_calls_once():
 
 
 def test_an_orderly_stop_of_a_process_is_no_crash():
-    watcher = Watcher()
+    watcher = TriggerDetector()
     watcher.table(table(planner=("ready", 0)), 0)
     assert watcher.table(table(planner=("stopping", 0)), 0) == []
     assert watcher.table(table(planner=("stopped", 0)), 0) == []
@@ -128,7 +130,7 @@ def test_a_request_waits_for_nothing():
     debounce = Debounce()
     debounce.add(stop(10))
     assert debounce.take(13 * S)
-    debounce.add(Trigger(kind=Kind.REQUEST, what="request", at_ns=14 * S))
+    debounce.add(FlightTrigger(kind=TriggerKind.REQUEST, what="request", at_ns=14 * S))
     assert debounce.take(14 * S)
 
 

@@ -14,8 +14,9 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.runtime.state_dir import state_dir_of
+from vla_deploy.telemetry.errors import TrendsUnavailable
 from vla_deploy.telemetry.metrics import READ_TOPICS, Readings, TopicSampler, read
-from vla_deploy.telemetry.trends import SeriesMaker, TrendStore, TrendsUnavailable
+from vla_deploy.telemetry.trends import SeriesMaker, TrendStore
 
 PERIOD_NS: Final = NS_PER_S
 TRENDS_DIR: Final = "trends"

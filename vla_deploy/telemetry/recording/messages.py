@@ -19,20 +19,12 @@ from vla_deploy.telemetry.channels import (
     value_text,
 )
 from vla_deploy.telemetry.recording.request import ChannelSelection
-from vla_deploy.telemetry.schemas.foxglove_json import time_json
+from vla_deploy.telemetry.schemas.foxglove_json import LOG_LEVELS, time_json
 from vla_deploy.telemetry.schemas.views import LOG, ViewDrawer
 from vla_deploy.telemetry.topic_follower import TopicFollower, image_values
 
 _LINE_BYTES: Final = 300
 _LOG_PERIOD_NS: Final = NS_PER_S // 2
-_LOG_LEVELS: Final[Mapping[str, int]] = {  # of foxglove.Log
-    "DEBUG": 1,
-    "INFO": 2,
-    "WARNING": 3,
-    "ERROR": 4,
-    "CRITICAL": 5,
-}
-_UNKNOWN_LEVEL: Final = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,9 +37,10 @@ class LoggedLine:
     def text(self, wall_offset_ns: int) -> bytes:
         """Return it as `foxglove.Log`; `wall_offset_ns` turns the stamp into wall clock."""
         line = self.line
+        level = str(line.get("level"))
         message = {
             "timestamp": time_json(self.stamp_ns + wall_offset_ns),
-            "level": _LOG_LEVELS.get(str(line.get("level")), _UNKNOWN_LEVEL),
+            "level": LOG_LEVELS.index(level) if level in LOG_LEVELS else 0,
             "message": "\n".join(str(line[key]) for key in ("message", "traceback") if key in line),
             "name": str(line.get("process", "")),
             "file": str(line.get("file", "")),

@@ -13,7 +13,7 @@ from vla_deploy.runtime.executors import low_priority_thread
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.one_line import one_line
 from vla_deploy.telemetry.channels import ChannelValue
-from vla_deploy.telemetry.errors import RecordingRefused, SettingsInvalid
+from vla_deploy.telemetry.errors import RecordingRefused, RecordingSettingsInvalid
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.messages import Collector
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
@@ -240,7 +240,7 @@ class BatchWriter:
 def _settings(context: NodeContext) -> RecordingSettings:
     try:
         return read_settings(context.run_dir.parent).recording
-    except SettingsInvalid as error:
+    except RecordingSettingsInvalid as error:
         _log.error("degraded: recording goes by its defaults: %s", error)
         return RecordingSettings()
 

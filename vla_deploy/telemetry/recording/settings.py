@@ -9,7 +9,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from vla_deploy.runtime.state_dir import config_dir_of
-from vla_deploy.telemetry.errors import SettingsInvalid
+from vla_deploy.telemetry.errors import RecordingSettingsInvalid
 from vla_deploy.telemetry.folder import FolderBounds
 from vla_deploy.telemetry.recording.request import EVERYTHING, RecordingRequest
 
@@ -90,7 +90,7 @@ def read_settings(base: Path) -> TelemetrySettings:
     """Return the settings of the runs of a runtime directory; the defaults where there is no file.
 
     Raises:
-        SettingsInvalid: it is no TOML, or has faults; all of them are listed.
+        RecordingSettingsInvalid: it is no TOML, or has faults; all of them are listed.
     """
     file = config_dir_of(base) / SETTINGS_FILE
     try:
@@ -98,11 +98,11 @@ def read_settings(base: Path) -> TelemetrySettings:
     except FileNotFoundError:
         return TelemetrySettings()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsInvalid((f"{file}: expected a TOML document: {error}",)) from error
+        raise RecordingSettingsInvalid((f"{file}: expected a TOML document: {error}",)) from error
     try:
         return TelemetrySettings.model_validate(document)
     except ValidationError as error:
-        raise SettingsInvalid(tuple(_faults(file, error))) from error
+        raise RecordingSettingsInvalid(tuple(_faults(file, error))) from error
 
 
 def _faults(file: Path, error: ValidationError) -> Iterator[str]:

@@ -18,10 +18,10 @@ from vla_deploy.ipc.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
 from vla_deploy.telemetry.recorded_file import RecordedMessage
+from vla_deploy.telemetry.schemas.foxglove_json import LOG_LEVELS
 from vla_deploy.telemetry.schemas.views import LOG
 
 _OWN: Final = frozenset({"replay_request", "replay_status"})
-_LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
 _LOOK_NS: Final = NS_PER_S // 10  # at most this between two reads of a recorder
 _STAMP_SUFFIX: Final = "_ns"
 _IMAGE_PARTS: Final = ("colour", "depth")
@@ -132,7 +132,7 @@ class TopicFeeder:
         written = {
             "stamp_ns": self._clock.now_ns(),
             "time": datetime.fromtimestamp(at_s, UTC).isoformat(timespec="milliseconds"),
-            "level": _LEVELS[line["level"]],
+            "level": LOG_LEVELS[line["level"]],
             "process": line["name"],
             "message": line["message"],
             "file": line["file"],

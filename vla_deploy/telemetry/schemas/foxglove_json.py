@@ -16,6 +16,8 @@ MAP: Final = "map"
 BASE: Final = "base"
 CAMERA: Final = "camera"
 ODOM: Final = "odom"
+LOG_LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
+"""By the numbers of `foxglove.Log`."""
 _PREFIX: Final = "foxglove."
 
 Json = dict[str, Any]
