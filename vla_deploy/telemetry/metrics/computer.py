@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from vla_deploy.telemetry.metrics.metric import Metric, MetricKind
+from vla_deploy.telemetry.metrics.metric import Metric
 from vla_deploy.telemetry.metrics.paths import PathStep, among, each, keys
 
 TOPIC: Final = "board"
@@ -15,10 +15,10 @@ def _gauge(name: str, text: str, *, reading: str = "", kept: bool = False) -> Me
     return Metric(name=f"vla_{name}", help=text, topic=TOPIC, paths=(path,), kept=kept)
 
 
-def _family(name: str, text: str, step: PathStep, kind: MetricKind = MetricKind.GAUGE) -> Metric:
+def _family(name: str, text: str, step: PathStep) -> Metric:
     """Declare readings that differ in a label."""
     path = (keys("readings"), step)
-    return Metric(name=f"vla_{name}", help=text, topic=TOPIC, paths=(path,), kind=kind)
+    return Metric(name=f"vla_{name}", help=text, topic=TOPIC, paths=(path,))
 
 
 METRICS: Final[tuple[Metric, ...]] = (
@@ -62,7 +62,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         "throttle_events_total",
         "Under-voltage (oc1), average (oc2) and instantaneous (oc3) over-current since boot.",
         each("kind", "throttle_count."),
-        MetricKind.COUNTER,
     ),
     _family(
         "pressure_ratio",

@@ -36,6 +36,10 @@ class MissingReason(Enum):
     UNREADABLE = "unreadable"  # it cannot be read on this computer; the document says why
 
 
+# By the last word of a name.
+_KINDS: Final = {"total": MetricKind.COUNTER, "info": MetricKind.INFO}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Histogram:
     """Carry counts up to each upper bound, the last one infinite, and the sum of all values."""
@@ -83,12 +87,20 @@ class Metric:
     help: str
     topic: str
     paths: tuple[Path, ...]
-    kind: MetricKind = MetricKind.GAUGE
     scale: float = 1.0
     take: Callable[[Any], Value | None] = number
     states: tuple[str, ...] = ()
     state_label: str = "state"
     kept: bool = False
+
+    @property
+    def kind(self) -> MetricKind:
+        """Return the kind: of counters and infos their name says it."""
+        if self.states:
+            return MetricKind.STATES
+        if self.take in (counts_between, counts_below):
+            return MetricKind.HISTOGRAM
+        return _KINDS.get(self.name.rpartition("_")[2], MetricKind.GAUGE)
 
     @property
     def unit(self) -> str:

@@ -1,11 +1,11 @@
 """Declare what is measured of the processes, their budgets and the degradation ladder."""
 
+from functools import partial
 from typing import Final
 
 from vla_deploy.supervisor.lifecycle import State
 from vla_deploy.telemetry.metrics.metric import (
     Metric,
-    MetricKind,
     column,
     count_of,
     is_empty,
@@ -13,6 +13,9 @@ from vla_deploy.telemetry.metrics.metric import (
 )
 from vla_deploy.telemetry.metrics.paths import Path, each, keys, rows, same
 
+_process = partial(Metric, topic="process_table")
+_budget = partial(Metric, topic="budget")
+_directive = partial(Metric, topic="resource_directives")
 _MEGA: Final = 1e6
 _ROWS: Final[Path] = (keys("processes"), rows({"process": "name"}))
 
@@ -22,7 +25,7 @@ def _of_each(key: str) -> tuple[Path, ...]:
     return (*_ROWS, keys(key)), (same("process", "supervisor"), keys(key))
 
 
-def _budget(metric: str) -> tuple[Path, ...]:
+def _rows_of(metric: str) -> tuple[Path, ...]:
     """Return the path to the rows of one kind of budget."""
     return ((keys("rows"), rows({"process": "process"}, metric=metric)),)
 
@@ -30,127 +33,106 @@ def _budget(metric: str) -> tuple[Path, ...]:
 _ALL_ROWS: Final = ((keys("rows"), rows({"process": "process", "resource": "metric"})),)
 
 METRICS: Final[tuple[Metric, ...]] = (
-    Metric(
+    _process(
         name="vla_process_memory_bytes",
         help="Memory of a process and of what it started: PSS, or RSS where PSS cannot be read.",
-        topic="process_table",
         paths=_of_each("memory_mb"),
         scale=_MEGA,
         kept=True,
     ),
-    Metric(
+    _process(
         name="vla_process_resident_memory_bytes",
         help="Resident memory of a process and of what it started; shared pages count each time.",
-        topic="process_table",
         paths=_of_each("rss_mb"),
         scale=_MEGA,
     ),
-    Metric(
+    _process(
         name="vla_process_cpu_seconds_total",
-        kind=MetricKind.COUNTER,
         help="CPU time of a process and of what it started, over all its restarts in this run.",
-        topic="process_table",
         paths=_of_each("cpu_s"),
     ),
-    Metric(
+    _budget(
         name="vla_process_cpu_cores",
         help="Cores that a process used, mean of the last 2 s; total is the robot without a twin.",
-        topic="budget",
-        paths=_budget("cpu_ratio"),
+        paths=_rows_of("cpu_ratio"),
         take=column("measured"),
         kept=True,
     ),
-    Metric(
+    _process(
         name="vla_process_state",
-        kind=MetricKind.STATES,
         help="Where a process stands: 1 for its state, 0 for the others.",
-        topic="process_table",
         paths=((*_ROWS, keys("state")),),
         states=tuple(state.value for state in State),
     ),
-    Metric(
+    _process(
         name="vla_process_restarts_total",
-        kind=MetricKind.COUNTER,
         help="How often a process was started again in this run.",
-        topic="process_table",
         paths=((*_ROWS, keys("restarts")),),
         kept=True,
     ),
-    Metric(
+    _process(
         name="vla_process_alarms",
         help="How many of a process' topics are too old, too slow or not valid.",
-        topic="process_table",
         paths=((*_ROWS, keys("alarms")),),
         take=count_of,
     ),
-    Metric(
+    _process(
         name="vla_memory_peak_bytes",
         help="Most memory that all processes together held in this run.",
-        topic="process_table",
         paths=((keys("peak_memory_mb"),),),
         scale=_MEGA,
     ),
-    Metric(
+    _process(
         name="vla_commands_taken",
         help="1 while the robot takes commands, 0 while a process that it needs is given up.",
-        topic="process_table",
         paths=((keys("refusal"),),),
         take=is_empty,
     ),
-    Metric(
+    _budget(
         name="vla_process_memory_limit_bytes",
         help="Memory that the profile grants a process; total is for the whole robot.",
-        topic="budget",
-        paths=_budget("memory_mb"),
+        paths=_rows_of("memory_mb"),
         take=column("limit"),
         scale=_MEGA,
     ),
-    Metric(
+    _budget(
         name="vla_process_cpu_limit_cores",
         help="Cores that the profile grants a process; total is for the whole robot.",
-        topic="budget",
-        paths=_budget("cpu_ratio"),
+        paths=_rows_of("cpu_ratio"),
         take=column("limit"),
     ),
-    Metric(
+    _budget(
         name="vla_budget_used_ratio",
         help="How much of a budget's line is used: above 1 the line is broken.",
-        topic="budget",
         paths=_ALL_ROWS,
         take=share_of_limit,
         kept=True,
     ),
-    Metric(
+    _budget(
         name="vla_budget_over",
         help="1 while a budget counts as broken, by the times that the profile declares.",
-        topic="budget",
         paths=_ALL_ROWS,
         take=column("over"),
     ),
-    Metric(
+    _budget(
         name="vla_ladder_steps",
         help="How many steps of the ladder are in force.",
-        topic="budget",
         paths=((keys("ladder.step"),),),
         kept=True,
     ),
-    Metric(
+    _budget(
         name="vla_ladder_changes_total",
-        kind=MetricKind.COUNTER,
         help="Steps of the ladder that were taken and undone in this run.",
-        topic="budget",
         paths=((keys("ladder.counts"), same("change", "taken", "undone")),),
     ),
-    Metric(
+    _budget(
         name="vla_budget_stop",
         help="1 while a budget demands that the robot stops.",
-        topic="budget",
         paths=((keys("stop"),),),
     ),
-    Metric(
+    _directive(
         name="vla_process_rate_ratio",
         help="Share of its rate at which the ladder lets a process work; only those slowed down.",
-        topic="resource_directives",
         paths=((keys("rate_ratio"), each("process")),),
     ),
 )

@@ -5,12 +5,7 @@ from math import isinf
 from typing import Any, Final
 
 from prometheus_client.exposition import choose_encoder
-from prometheus_client.metrics_core import (
-    CounterMetricFamily,
-    GaugeMetricFamily,
-    HistogramMetricFamily,
-    InfoMetricFamily,
-)
+from prometheus_client.metrics_core import GaugeMetricFamily
 from prometheus_client.metrics_core import (
     Metric as Family,
 )
@@ -27,6 +22,8 @@ from vla_deploy.telemetry.metrics.metric import (
 from vla_deploy.telemetry.metrics.reading import Readings
 from vla_deploy.telemetry.metrics.table import METRICS_BY_NAME
 
+# Types of Prometheus where they differ from our kinds.
+_TYPES: Final = {MetricKind.STATES: "gauge"}
 MISSING: Final = "vla_metric_missing"
 _MISSING_HELP: Final = (
     "1 for each metric that has no value now, by why: its topic is silent, does not tell it, or "
@@ -58,46 +55,20 @@ class _Once(Collector):
 
 
 def _family(metric: Metric, points: tuple[Point, ...]) -> Family:
-    unit = metric.unit
-    match metric.kind:
-        case MetricKind.COUNTER:
-            counter = CounterMetricFamily(metric.name, metric.help, labels=metric.labels, unit=unit)
-            for point in points:
-                counter.add_metric(point.labels, _plain(point))
-            return counter
-        case MetricKind.HISTOGRAM:
-            histogram = HistogramMetricFamily(
-                metric.name, metric.help, labels=metric.labels, unit=unit
-            )
-            for point in points:
-                if isinstance(point.value, Histogram):
-                    histogram.add_metric(
-                        point.labels, _buckets(point.value), sum_value=point.value.sum
-                    )
-            return histogram
-        case MetricKind.INFO:
-            info = InfoMetricFamily(metric.name.removesuffix("_info"), metric.help, labels=())
-            for point in points:
-                info.add_metric((), dict(zip(metric.labels, point.labels, strict=True)))
-            return info
-        case MetricKind.GAUGE | MetricKind.STATES:
-            gauge = GaugeMetricFamily(metric.name, metric.help, labels=metric.labels, unit=unit)
-            for point in points:
-                gauge.add_metric(point.labels, _plain(point))
-            return gauge
-
-
-def _plain(point: Point) -> float:
-    if isinstance(point.value, Histogram):
-        raise TypeError("a histogram is no plain number")
-    return point.value
-
-
-def _buckets(histogram: Histogram) -> list[tuple[str, float]]:
-    return [
-        ("+Inf" if isinf(bound) else f"{bound:g}", total)
-        for bound, total in zip(histogram.bounds, histogram.totals, strict=True)
-    ]
+    name = metric.name.removesuffix("_total").removesuffix("_info")
+    family = Family(name, metric.help, _TYPES.get(metric.kind, metric.kind.value), metric.unit)
+    for point in points:
+        labels = dict(zip(metric.labels, point.labels, strict=True))
+        value = point.value
+        if isinstance(value, Histogram):
+            for bound, total in zip(value.bounds, value.totals, strict=True):
+                le = "+Inf" if isinf(bound) else f"{bound:g}"
+                family.add_sample(f"{name}_bucket", {**labels, "le": le}, total)
+            family.add_sample(f"{name}_count", labels, value.totals[-1])
+            family.add_sample(f"{name}_sum", labels, value.sum)
+        else:
+            family.add_sample(metric.name, labels, value)
+    return family
 
 
 JOB: Final = "vla_deploy"

@@ -5,17 +5,21 @@ metrics are here.
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Final
 
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.telemetry.metrics import computer, control, model_metrics, processes
-from vla_deploy.telemetry.metrics.metric import Metric, MetricKind
+from vla_deploy.telemetry.metrics.metric import Metric
 from vla_deploy.telemetry.metrics.paths import Path, each, facts, keys
 
 PULSES: Final = "pulses"
 """Not a topic: count, rate and age of every topic, as the reader of the metrics measures them."""
 OWN: Final = "own"
 """Not a topic: what the reader of the metrics reports of itself."""
+_pulse = partial(Metric, topic=PULSES)
+_own = partial(Metric, topic=OWN)
+_process = partial(Metric, topic="process_table")
 
 
 def _of_each(key: str) -> tuple[Path, ...]:
@@ -23,62 +27,50 @@ def _of_each(key: str) -> tuple[Path, ...]:
 
 
 FLOW: Final[tuple[Metric, ...]] = (
-    Metric(
+    _pulse(
         name="vla_topic_messages_total",
-        kind=MetricKind.COUNTER,
         help="Values ever put to a topic of the shared memory in this run.",
-        topic=PULSES,
         paths=_of_each("messages"),
     ),
-    Metric(
+    _pulse(
         name="vla_topic_rate_hertz",
         help="How often a topic is written, over the last 5 s.",
-        topic=PULSES,
         paths=_of_each("rate_hz"),
         kept=True,
     ),
-    Metric(
+    _pulse(
         name="vla_topic_age_seconds",
         help="Age of the newest value of a topic that has a deadline.",
-        topic=PULSES,
         paths=_of_each("age_s"),
     ),
-    Metric(
+    _pulse(
         name="vla_topic_deadline_seconds",
         help="Age above which a reader calls a topic stale.",
-        topic=PULSES,
         paths=_of_each("deadline_s"),
     ),
-    Metric(
+    _process(
         name="vla_robot_info",
-        kind=MetricKind.INFO,
         help="Which robot this is, by which profile it runs, and whether it is a twin.",
-        topic="process_table",
         paths=((keys("head"), facts("robot", "profile", "twin")),),
     ),
-    Metric(
+    _own(
         name="vla_build_info",
-        kind=MetricKind.INFO,
         help="Version of vla_deploy.",
-        topic=OWN,
         paths=((facts("version"),),),
     ),
-    Metric(
+    _own(
         name="vla_metrics_look_seconds",
         help="Time that reading all metrics took the last time.",
-        topic=OWN,
         paths=((keys("look_s"),),),
     ),
-    Metric(
+    _own(
         name="vla_metrics_left_out",
         help="Series left out because their metric has more than may be.",
-        topic=OWN,
         paths=((keys("left_out"),),),
     ),
-    Metric(
+    _own(
         name="vla_dashboard_clients",
         help="Pages that follow the robot live.",
-        topic=OWN,
         paths=((keys("clients"),),),
         kept=True,
     ),

@@ -19,7 +19,7 @@ from vla_deploy.telemetry.schemas.foxglove_json import Json, foxglove_schema
 from vla_deploy.telemetry.schemas.robot_views import RobotViews
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class TopicView:
     """Draw a topic's values on a channel of its own, at most one every `period_s`.
 
@@ -33,7 +33,7 @@ class TopicView:
     period_s: float = 0.1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ConstantView:
     """Draw what does not change while the robot runs."""
 
@@ -51,64 +51,30 @@ LOG: Final = "view/log"
 LOG_SCHEMA: Final = "foxglove.Log"
 
 VIEWS: Final[tuple[TopicView, ...]] = (
+    TopicView("view/joints", "foxglove.JointStates", "joint_state", RobotViews.joints),
+    TopicView("view/frames", "foxglove.FrameTransforms", "joint_state", RobotViews.frames),
     TopicView(
-        channel="view/joints",
-        schema_name="foxglove.JointStates",
-        topic="joint_state",
-        draw=RobotViews.joints,
+        "view/base_frame", "foxglove.FrameTransforms", "pose", _plain(robot_views.base_frame)
     ),
+    TopicView("view/pose", "foxglove.PoseInFrame", "pose", _plain(robot_views.pose)),
+    TopicView("view/odometry", "foxglove.Odometry", "base_state", _plain(robot_views.odometry)),
+    TopicView("view/scan", "foxglove.LaserScan", "scan", RobotViews.scan),
     TopicView(
-        channel="view/frames",
-        schema_name="foxglove.FrameTransforms",
-        topic="joint_state",
-        draw=RobotViews.frames,
-    ),
-    TopicView(
-        channel="view/base_frame",
-        schema_name="foxglove.FrameTransforms",
-        topic="pose",
-        draw=_plain(robot_views.base_frame),
-    ),
-    TopicView(
-        channel="view/pose",
-        schema_name="foxglove.PoseInFrame",
-        topic="pose",
-        draw=_plain(robot_views.pose),
-    ),
-    TopicView(
-        channel="view/odometry",
-        schema_name="foxglove.Odometry",
-        topic="base_state",
-        draw=_plain(robot_views.odometry),
-    ),
-    TopicView(
-        channel="view/scan",
-        schema_name="foxglove.LaserScan",
-        topic="scan",
-        draw=RobotViews.scan,
-    ),
-    TopicView(
-        channel="view/near_obstacles",
-        schema_name="foxglove.PointCloud",
-        topic="near_obstacles",
-        draw=_plain(robot_views.obstacles),
+        "view/near_obstacles",
+        "foxglove.PointCloud",
+        "near_obstacles",
+        _plain(robot_views.obstacles),
         period_s=0.2,
     ),
     TopicView(
-        channel="view/scene",
-        schema_name="foxglove.SceneUpdate",
-        topic="scene",
-        draw=_plain(scene_views.scene),
-        period_s=0.5,
+        "view/scene", "foxglove.SceneUpdate", "scene", _plain(scene_views.scene), period_s=0.5
     ),
 )
 
 CONSTANT_VIEWS: Final[tuple[ConstantView, ...]] = (
-    ConstantView(channel="view/map", schema_name="foxglove.Grid", draw=scene_views.home_map),
-    ConstantView(channel="view/zones", schema_name="foxglove.SceneUpdate", draw=scene_views.zones),
-    ConstantView(
-        channel="view/lens", schema_name="foxglove.CameraCalibration", draw=robot_views.lens
-    ),
+    ConstantView("view/map", "foxglove.Grid", scene_views.home_map),
+    ConstantView("view/zones", "foxglove.SceneUpdate", scene_views.zones),
+    ConstantView("view/lens", "foxglove.CameraCalibration", robot_views.lens),
 )
 
 
