@@ -4,9 +4,9 @@ TelemetryError
 ├── FlightMissing             there is no such file: list what there is
 ├── FlightUnreadable          the file is cut off, spoiled, or not ours: take another one
 ├── FlightForeign             a version with other rules recorded it: judge it with that one
-├── ReplayRefused             a replay cannot do what is asked: ask for something else
+├── ReplayRefused             a replay cannot do what is requested: request something else
 ├── ExtraMissing              an optional part is missing: the text says how to get it
-├── RecordingRefused          a recording cannot be made as it was asked for: ask for another
+├── RecordingRefused          a recording cannot be made as requested: request another
 ├── RecordingSettingsInvalid  recording.toml has faults, all of them are listed: mend the file
 ├── TrendsUnavailable         the files of the history cannot be made: make room, or mend the folder
 └── SeriesUnknown             the history has no such series: list those it has

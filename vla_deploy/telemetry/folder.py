@@ -5,9 +5,11 @@ import os
 import re
 import shutil
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import ClassVar
 
+from drivers.clock import NS_PER_S
 from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.telemetry.errors import FlightMissing
 
@@ -135,6 +137,11 @@ class FlightFolder(NumberedFolder):
 
     noun = "flight"
     verb = "flight"
+
+
+def dated(wall_ns: int, label: str) -> str:
+    """Return the label of a file that begins at a time."""
+    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}-{label}"
 
 
 def final_name(part: Path) -> str:

@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +14,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.flight import FlightHead, write_flight
-from vla_deploy.telemetry.folder import FlightFolder
+from vla_deploy.telemetry.folder import FlightFolder, dated
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.topic_history import TopicHistory
 from vla_deploy.telemetry.triggers import Debounce, FlightTrigger, TriggerDetector, TriggerKind
@@ -135,7 +134,8 @@ class RecorderNode:
             return
         wall_ns, run_ns = self._wall_ns(), self._clock.now_ns()
         try:
-            part = self._folder.unfinished(_label(wall_ns, causes[0]))
+            what = re.sub(r"[^a-z0-9_]+", "_", causes[0].what.lower())[:40]
+            part = self._folder.unfinished(dated(wall_ns, what))
         except OSError as error:
             self._failed(causes, error)
             return
@@ -183,8 +183,3 @@ class RecorderNode:
     def _publish(self, event: str, causes: list[FlightTrigger], **details: str) -> None:
         whats = [cause.what for cause in causes[:_SHOWN_CAUSES]]
         self._events.publish({"event": event, "causes": whats, **details})
-
-
-def _label(wall_ns: int, cause: FlightTrigger) -> str:
-    what = re.sub(r"[^a-z0-9_]+", "_", cause.what.lower())[:40]
-    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}-{what}"

@@ -1,4 +1,4 @@
-"""Follow the cells and rings of a run: what is new in them since the last look."""
+"""Follow the cells and rings of a run: what is new in them since the last read."""
 
 import json
 from collections.abc import Iterator

@@ -18,8 +18,8 @@ from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_di
 from vla_deploy.telemetry.recording.messages import Collector
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
 from vla_deploy.telemetry.recording.request import START, STOP, RecordingRequest, parse_request
+from vla_deploy.telemetry.recording.rolling_writer import RollingWriter
 from vla_deploy.telemetry.recording.settings import RecordingSettings, read_settings
-from vla_deploy.telemetry.recording.tape import FileLimits, Tape
 
 BACKLOG_BYTES: Final = 24 * 2**20
 CLOSE_TIMEOUT_S: Final = 6.0
@@ -56,7 +56,7 @@ class RollingRecorder:
         self._folder = folder or RecordingFolder(recordings_dir_of(base), self._settings.bounds)
         self._executor = executor or low_priority_thread(context.clock, WRITING_S)
         self._always = self._settings.request if self._settings.always else None
-        self._writer: BatchWriter | None = None
+        self._queue: WriteQueue | None = None
         self._request = RecordingRequest()
         self._ends_ns: int | None = None
         self._refused = ""
@@ -85,9 +85,9 @@ class RollingRecorder:
         if self._ends_ns is not None and now_ns >= self._ends_ns:
             self._end()
             self._begin(self._always)
-        if self._writer is not None:
-            values = _joined(newest(), new) if self._writer.is_fresh else new
-            self._writer.submit(now_ns, values)
+        if self._queue is not None:
+            values = _joined(newest(), new) if self._queue.is_fresh else new
+            self._queue.submit(now_ns, values)
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + _STATUS_PERIOD_NS
             self._status.put_document(self.document(now_ns))
@@ -97,8 +97,8 @@ class RollingRecorder:
 
         The backlog is dropped: there is time to finish the file or to write the last values.
         """
-        if self._writer is not None:
-            self._writer.drop_backlog()
+        if self._queue is not None:
+            self._queue.drop_backlog()
         closing = self._end()
         try:
             if closing is not None:
@@ -109,11 +109,11 @@ class RollingRecorder:
 
     def document(self, now_ns: int) -> dict[str, Any]:
         """Return the document of `recording_status`."""
-        if self._writer is None:
+        if self._queue is None:
             return {"state": _OFF, "refused": self._refused, "last": self._last}
         left_s = None if self._ends_ns is None else max(0.0, (self._ends_ns - now_ns) / NS_PER_S)
         return {
-            **self._writer.document(),
+            **self._queue.document(),
             "label": self._request.label,
             "source": self._request.source,
             "topics": ", ".join(self._request.topics)[:_MAX_TEXT],
@@ -160,32 +160,31 @@ class RollingRecorder:
         run = RecordedRun(
             run_id=context.run_dir.resolve().name, robot=context.robot, profile=context.profile
         )
-        limits = FileLimits(size_bytes=round(settings.file_mb * 1e6), duration_s=settings.file_s)
-        tape = Tape(self._folder, run, request, limits, self._clock, self._wall_ns)
-        self._writer = BatchWriter(tape, collector, self._executor)
+        writer = RollingWriter(self._folder, run, request, settings, self._clock, self._wall_ns)
+        self._queue = WriteQueue(writer, collector, self._executor)
         if request.duration_s is not None:
             self._ends_ns = self._clock.now_ns() + round(request.duration_s * NS_PER_S)
         by = request.source or "nobody named"
         _log.info("recording %s for %s", ", ".join(request.topics), by)
 
     def _end(self) -> "Future[None] | None":
-        writer, self._writer = self._writer, None
+        queue, self._queue = self._queue, None
         self._ends_ns = None
-        if writer is None:
+        if queue is None:
             return None
-        self._last = writer.document()
-        return writer.close()
+        self._last = queue.document()
+        return queue.close()
 
 
-class BatchWriter:
+class WriteQueue:
     """Pass batches of one recording to the writer's thread, so that a slow disk delays no step.
 
     Batches beyond a bounded backlog are dropped and counted.
     """
 
-    def __init__(self, tape: Tape, collector: Collector, executor: Executor) -> None:
+    def __init__(self, writer: RollingWriter, collector: Collector, executor: Executor) -> None:
         self.is_fresh = True
-        self._tape = tape
+        self._writer = writer
         self._collector = collector
         self._executor = executor
         self._backlog: deque[tuple[Future[None], int]] = deque()
@@ -206,7 +205,7 @@ class BatchWriter:
         if self.backlog_bytes + batch.size_bytes > BACKLOG_BYTES:
             self._dropped += batch.count
             return
-        self._backlog.append((self._executor.submit(self._tape.write, batch), batch.size_bytes))
+        self._backlog.append((self._executor.submit(self._writer.write, batch), batch.size_bytes))
 
     def drop_backlog(self) -> None:
         """Drop what waits to be written."""
@@ -215,7 +214,7 @@ class BatchWriter:
 
     def close(self) -> "Future[None]":
         """Have the file finished, after what still waits is written."""
-        return self._executor.submit(self._tape.close)
+        return self._executor.submit(self._writer.close)
 
     @property
     def backlog_bytes(self) -> int:
@@ -224,7 +223,7 @@ class BatchWriter:
 
     def document(self) -> dict[str, Any]:
         """Return the state of the recording; `lost` counts values that are in no file."""
-        report = self._tape.report
+        report = self._writer.report
         return {
             "state": report.state.value,
             "why": report.why,

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import BY_NAME, BadPayload, Field, Kind, SharedSpace, Topic
+from vla_deploy.ipc import BY_NAME, BadPayload, Field, FrameWriter, Kind, SharedSpace, Topic
 from vla_deploy.ipc.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
@@ -48,7 +48,7 @@ class TopicFeeder:
         self._logs = logs
         self._clock = clock
         self._topics = {topic.name: topic for topic in fed_topics()}
-        self._puts: dict[str, Callable[[RecordedMessage], None]] = {}
+        self._writers: dict[str, Any] = {}
         self._images: dict[str, tuple[int, dict[str, bytes]]] = {}
         self._lasting: dict[str, RecordedMessage] = {}
         logs.mkdir(parents=True, exist_ok=True)
@@ -70,55 +70,48 @@ class TopicFeeder:
             if message.channel == LOG:
                 self._log_line(message)
             elif topic in self._topics:
-                self._put_of(topic)(message)
+                self._put(self._topics[topic], message)
         except (BadPayload, ValueError, KeyError, TypeError) as error:
             if not self.unfit:
                 _log.warning("%s: left out: %s", message.channel, error)
             self.unfit += 1
 
-    def _put_of(self, name: str) -> Callable[[RecordedMessage], None]:
-        if name not in self._puts:
-            topic = self._topics[name]
-            kind = topic.kind
-            is_packed = kind is Kind.CELL and not is_document(topic)
-            self._puts[name] = self._packed(topic) if is_packed else _OPENERS[kind](self, name)
-        return self._puts[name]
+    def _put(self, topic: Topic, message: RecordedMessage) -> None:
+        writer = self._writer(topic)
+        match topic.kind:
+            case Kind.CELL if is_document(topic):
+                writer.put_document(self._shifted(message))
+            case Kind.CELL:
+                writer.put(**fields_of(topic, message.document()))
+            case Kind.RING:
+                writer.publish(self._shifted(message))
+            case Kind.RECORD:
+                writer.append(tick_bytes(message.text))
+            case Kind.FRAME:
+                self._put_image(topic.name, writer, message)
 
-    def _packed(self, topic: Topic) -> Callable[[RecordedMessage], None]:
-        writer = self._space.cell_writer(topic.name)
-        return lambda message: writer.put(**fields_of(topic, message.document()))
+    def _writer(self, topic: Topic) -> Any:
+        """Return the writer of a topic, opened when first needed."""
+        if topic.name not in self._writers:
+            openers: Mapping[Kind, Callable[[str], Any]] = {
+                Kind.CELL: self._space.cell_writer,
+                Kind.RING: self._space.ring_writer,
+                Kind.RECORD: self._space.record_writer,
+                Kind.FRAME: self._space.frame_writer,
+            }
+            self._writers[topic.name] = openers[topic.kind](topic.name)
+        return self._writers[topic.name]
 
-    def _document(self, name: str) -> Callable[[RecordedMessage], None]:
-        writer = self._space.cell_writer(name)
-        return lambda message: writer.put_document(self._shifted(message))
-
-    def _event(self, name: str) -> Callable[[RecordedMessage], None]:
-        writer = self._space.ring_writer(name)
-
-        def publish(message: RecordedMessage) -> None:
-            writer.publish(self._shifted(message))
-
-        return publish
-
-    def _record(self, name: str) -> Callable[[RecordedMessage], None]:
-        writer = self._space.record_writer(name)
-        return lambda message: writer.append(tick_bytes(message.text))
-
-    def _frame(self, name: str) -> Callable[[RecordedMessage], None]:
-        writer = self._space.frame_writer(name)
-
-        def put(message: RecordedMessage) -> None:
-            sequence, parts = self._images.get(name, (-1, {}))
-            parts = parts if sequence == message.sequence else {}
-            data = base64.b64decode(message.document()["data"])
-            parts[message.channel.partition("/")[2]] = data
-            self._images[name] = message.sequence, parts
-            if all(part in parts for part in _IMAGE_PARTS):
-                payload, width, height = image_payload(parts["colour"], parts["depth"])
-                now_ns = self._clock.now_ns()
-                writer.put(payload, width=width, height=height, stamp_ns=now_ns)
-
-        return put
+    def _put_image(self, name: str, writer: FrameWriter, message: RecordedMessage) -> None:
+        """Keep one part of an image, and put the image once it is complete."""
+        sequence, parts = self._images.get(name, (-1, {}))
+        parts = parts if sequence == message.sequence else {}
+        parts[message.channel.partition("/")[2]] = base64.b64decode(message.document()["data"])
+        self._images[name] = message.sequence, parts
+        if all(part in parts for part in _IMAGE_PARTS):
+            payload, width, height = image_payload(parts["colour"], parts["depth"])
+            now_ns = self._clock.now_ns()
+            writer.put(payload, width=width, height=height, stamp_ns=now_ns)
 
     def _shifted(self, message: RecordedMessage) -> dict[str, Any]:
         shift_ns = self._clock.now_ns() - message.stamp_ns
@@ -142,14 +135,6 @@ class TopicFeeder:
         if name not in LIVE_OWNERS:
             with (self._logs / f"{name or 'unknown'}.log").open("a", encoding="utf-8") as log:
                 log.write(json.dumps(written) + "\n")
-
-
-_OPENERS: Final[Mapping[Kind, Callable[[TopicFeeder, str], Callable[[RecordedMessage], None]]]] = {
-    Kind.CELL: TopicFeeder._document,
-    Kind.RING: TopicFeeder._event,
-    Kind.RECORD: TopicFeeder._record,
-    Kind.FRAME: TopicFeeder._frame,
-}
 
 
 def fields_of(topic: Topic, document: Mapping[str, Any]) -> dict[str, Any]:

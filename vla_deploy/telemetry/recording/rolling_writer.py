@@ -6,16 +6,16 @@ All of it runs in the writer's thread, so that a slow disk delays nothing else.
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from enum import Enum
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.telemetry.folder import final_name
+from vla_deploy.telemetry.folder import dated, final_name
 from vla_deploy.telemetry.recording.folder import RecordingFolder
 from vla_deploy.telemetry.recording.messages import DraftMessage, MessageDrafter, TopicBatch
 from vla_deploy.telemetry.recording.recording_file import RecordedRun, RecordingFile
 from vla_deploy.telemetry.recording.request import RecordingRequest
+from vla_deploy.telemetry.recording.settings import RecordingSettings
 
 FLUSH_S: Final = 1.0
 RETRY_S: Final = 10.0
@@ -23,7 +23,7 @@ _FULL: Final = "the disk is as full as it may be; make room on it"
 _log = logging.getLogger(__name__)
 
 
-class TapeState(Enum):
+class RecordingState(Enum):
     """Name the states of a recording."""
 
     BEGINNING = "beginning"
@@ -34,10 +34,10 @@ class TapeState(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TapeReport:
+class RecordingReport:
     """Report on a recording; replaced as a whole, for another thread reads it."""
 
-    state: TapeState = TapeState.BEGINNING
+    state: RecordingState = RecordingState.BEGINNING
     why: str = ""
     file: str = ""
     file_bytes: int = 0
@@ -46,15 +46,7 @@ class TapeReport:
     unwritten: int = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FileLimits:
-    """Bound one file."""
-
-    size_bytes: int
-    duration_s: float
-
-
-class Tape:
+class RollingWriter:
     """Write the files of one recording; each begins with the lasting values of before."""
 
     def __init__(
@@ -62,16 +54,17 @@ class Tape:
         folder: RecordingFolder,
         run: RecordedRun,
         request: RecordingRequest,
-        limits: FileLimits,
+        settings: RecordingSettings,
         clock: Clock,
         wall_ns: Callable[[], int],
     ) -> None:
-        self.report = TapeReport()
+        self.report = RecordingReport()
         self._folder = folder
         self._run = run
         self._selection = request.selection
         self._label = request.label
-        self._limits = limits
+        self._file_bytes = round(settings.file_mb * 1e6)
+        self._file_s = settings.file_s
         self._clock = clock
         self._wall_ns = wall_ns
         self._drafter = MessageDrafter(run.robot, request.selection.takes)
@@ -100,7 +93,7 @@ class Tape:
             self._finish()
         except OSError as error:
             self._fail(error, 0)
-        self._report(TapeState.ENDED, self.report.why)
+        self._report(RecordingState.ENDED, self.report.why)
 
     def _add(self, file: RecordingFile, batch: TopicBatch) -> None:
         before = file.messages
@@ -117,9 +110,9 @@ class Tape:
             return None
         self._retry_ns = now_ns + round(RETRY_S * NS_PER_S)
         offset_ns = self._wall_ns() - now_ns
-        part = self._folder.unfinished(f"{_moment(now_ns + offset_ns)}-{self._label}")
+        part = self._folder.unfinished(dated(now_ns + offset_ns, self._label))
         if self._folder.is_disk_full():
-            self._report(TapeState.PAUSED, _FULL)
+            self._report(RecordingState.PAUSED, _FULL)
             return None
         file = RecordingFile(part, self._run, self._selection, now_ns, offset_ns)
         self._file, self._retry_ns = file, 0
@@ -139,16 +132,16 @@ class Tape:
         now_ns = self._clock.now_ns()
         self._flush_ns = now_ns + round(FLUSH_S * NS_PER_S)
         size_bytes = file.flush()
-        self._report(TapeState.RECORDING, "", size_bytes)
-        is_old = now_ns - file.began_ns >= self._limits.duration_s * NS_PER_S
-        if is_old or size_bytes >= self._limits.size_bytes:
+        self._report(RecordingState.RECORDING, "", size_bytes)
+        is_old = now_ns - file.began_ns >= self._file_s * NS_PER_S
+        if is_old or size_bytes >= self._file_bytes:
             self._finish()
             return
         self._folder.prune_for(size_bytes)
         if self._folder.is_disk_full():
             self._finish()
             self._retry_ns = now_ns + round(RETRY_S * NS_PER_S)
-            self._report(TapeState.PAUSED, _FULL)
+            self._report(RecordingState.PAUSED, _FULL)
 
     def _finish(self) -> None:
         file, self._file = self._file, None
@@ -163,12 +156,12 @@ class Tape:
         self._unwritten += unwritten
         self._retry_ns = self._clock.now_ns() + round(RETRY_S * NS_PER_S)
         reason = f"{self._folder.path}: {error.strerror or error}"
-        if self.report.state is not TapeState.FAILED:
+        if self.report.state is not RecordingState.FAILED:
             _log.error("nothing is recorded: %s; tried again every %.0f s", reason, RETRY_S)
-        self._report(TapeState.FAILED, reason)
+        self._report(RecordingState.FAILED, reason)
 
-    def _report(self, state: TapeState, why: str, size_bytes: int = 0) -> None:
-        self.report = TapeReport(
+    def _report(self, state: RecordingState, why: str, size_bytes: int = 0) -> None:
+        self.report = RecordingReport(
             state=state,
             why=why,
             file="" if self._file is None else final_name(self._file.path),
@@ -177,7 +170,3 @@ class Tape:
             files=self._files,
             unwritten=self._unwritten,
         )
-
-
-def _moment(wall_ns: int) -> str:
-    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}"
