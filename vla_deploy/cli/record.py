@@ -14,11 +14,12 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.watched_run import watched_run
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
+from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 from vla_deploy.telemetry.recording.request import STOP, RecordingRequest, checked
 from vla_deploy.telemetry.recording.settings import read_settings
 
@@ -139,20 +140,12 @@ def run_once(arguments: argparse.Namespace) -> int:
     """Record into one file until the time is over, or Ctrl-C."""
     request = _request(arguments)
     session = attach(arguments.runtime_base)
-    table = session.document("process_table") or {}
-    run = RecordedRun(
-        run_id=session.run_dir.resolve().name,
-        robot=str(table.get("robot", "")),
-        profile=str(table.get("profile", "")),
-    )
     settings = read_settings(session.base).recording
     one = OneRecording(
-        session.run_dir,
-        run,
+        watched_run(session),
         request,
         arguments.output,
         image_period_s=settings.image_period_s,
-        clock=session.clock,
         wall_ns=time.time_ns,
     )
     stops: list[int] = []

@@ -3,13 +3,13 @@
 import heapq
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from vla_deploy.ipc import BadPayload, Record
 from vla_deploy.ipc.delta import DeltaReader
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.channels import (
     TICKS,
     TOPIC_CHANNELS,
@@ -19,52 +19,38 @@ from vla_deploy.telemetry.channels import (
     value_text,
 )
 from vla_deploy.telemetry.judge import JUDGED_TYPES, rules_digest
-from vla_deploy.telemetry.mcap_file import FLIGHT, McapFile
+from vla_deploy.telemetry.mcap_file import FLIGHT, McapFile, run_metadata
 from vla_deploy.telemetry.triggers import FlightTrigger
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightHead:
-    """Identify the run of a flight; adding `wall_offset_ns` to stamps gives wall clock."""
-
-    run_id: str
-    robot: str
-    profile: str
-    wall_offset_ns: int
-    triggers: tuple[FlightTrigger, ...]
-
-    def metadata(self) -> dict[str, str]:
-        """Return the metadata of the file: texts only."""
-        causes = [{**asdict(one), "kind": one.kind.value} for one in self.triggers]
-        return {
-            "run_id": self.run_id,
-            "robot": self.robot,
-            "profile": self.profile,
-            "vla_deploy": version("vla-deploy"),
-            "rules": rules_digest(),
-            "wall_offset_ns": str(self.wall_offset_ns),
-            "causes": json.dumps(causes),
-        }
 
 
 def write_flight(
     path: Path,
-    head: FlightHead,
+    context: NodeContext,
+    triggers: Sequence[FlightTrigger],
     values: Sequence[ChannelValue],
     ticks: Sequence[Record],
     *,
+    wall_offset_ns: int,
     at_once: int,
 ) -> Iterator[None]:
     """Write a flight to `path`, and yield after every `at_once` messages.
 
+    Adding `wall_offset_ns` to stamps gives wall clock.
+
     Raises:
         OSError: the disk refuses it.
     """
+    metadata = {
+        **run_metadata(context),
+        "rules": rules_digest(),
+        "wall_offset_ns": str(wall_offset_ns),
+        "causes": json.dumps([{**asdict(one), "kind": one.kind.value} for one in triggers]),
+    }
     with path.open("wb") as file:
-        mcap = McapFile(file, TOPIC_CHANNELS, FLIGHT, head.metadata())
-        messages = _messages(values, ticks, head.wall_offset_ns)
+        mcap = McapFile(file, TOPIC_CHANNELS, FLIGHT, metadata)
+        messages = _messages(values, ticks, wall_offset_ns)
         for count, (channel, value, text) in enumerate(messages, start=1):
-            mcap.add(channel, value.stamp_ns + head.wall_offset_ns, text, value.sequence)
+            mcap.add(channel, value.stamp_ns + wall_offset_ns, text, value.sequence)
             if count % at_once == 0:
                 yield
         mcap.finish()

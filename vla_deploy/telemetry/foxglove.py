@@ -78,8 +78,7 @@ class FoxgloveNode:
         self.port = self._server.port
         self._messages = RunMessages(
             self._space,
-            self._context.run_dir,
-            self._context.robot,
+            self._context,
             self._selection,
             image_period_s=_IMAGE_PERIOD_S,
             wanted=self._is_watched,

@@ -3,12 +3,14 @@
 import os
 import struct
 from collections.abc import Iterable, Mapping
+from importlib.metadata import version
 from typing import BinaryIO, Final
 
 from mcap.exceptions import McapError
 from mcap.writer import CompressionType, Writer
 from zstandard import ZstdError
 
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.channels import Channel
 
 # Raised by the library and its decompressors on bytes that are no MCAP; lz4: RuntimeError.
@@ -25,6 +27,16 @@ FLIGHT: Final = "flight"
 RECORDING: Final = "recording"
 _SEQUENCE_MASK: Final = 0xFFFF_FFFF
 _CHUNK_BYTES: Final = 256 * 1024
+
+
+def run_metadata(context: NodeContext) -> dict[str, str]:
+    """Return what every file says of the run that it is of."""
+    return {
+        "run_id": context.run_dir.resolve().name,
+        "robot": context.robot,
+        "profile": context.profile,
+        "vla_deploy": version("vla-deploy"),
+    }
 
 
 class McapFile:

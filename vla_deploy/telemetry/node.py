@@ -13,7 +13,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.runtime.node import NodeContext
-from vla_deploy.telemetry.flight import FlightHead, write_flight
+from vla_deploy.telemetry.flight import write_flight
 from vla_deploy.telemetry.folder import FlightFolder, dated
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.topic_history import TopicHistory
@@ -139,15 +139,16 @@ class RecorderNode:
         except OSError as error:
             self._failed(causes, error)
             return
-        head = FlightHead(
-            run_id=self._context.run_dir.resolve().name,
-            robot=self._context.robot,
-            profile=self._context.profile,
-            wall_offset_ns=wall_ns - run_ns,
-            triggers=tuple(causes),
-        )
         values, ticks = self._history.snapshot(run_ns)
-        progress = write_flight(part, head, values, ticks, at_once=MESSAGES_AT_ONCE)
+        progress = write_flight(
+            part,
+            self._context,
+            causes,
+            values,
+            ticks,
+            wall_offset_ns=wall_ns - run_ns,
+            at_once=MESSAGES_AT_ONCE,
+        )
         self._writing = _Writing(part, causes, progress)
 
     def _finish(self) -> None:

@@ -10,6 +10,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import BY_NAME, TOPICS, Frame, FrameReader, Kind, Record, SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.logs import LOGS_DIR
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.supervisor.log_files import LogTail, processes_in
 from vla_deploy.telemetry.channels import (
     TICKS,
@@ -221,16 +222,15 @@ class RunMessages:
     def __init__(
         self,
         space: SharedSpace,
-        run_dir: Path,
-        robot: str,
+        context: NodeContext,
         selection: ChannelSelection,
         *,
         image_period_s: float,
         wanted: Callable[[str], bool],
     ) -> None:
         self._follower = TopicFollower(space, from_start=False)
-        self._collector = Collector(space, run_dir, selection, image_period_s)
-        self._drafter = MessageDrafter(robot, wanted)
+        self._collector = Collector(space, context.run_dir, selection, image_period_s)
+        self._drafter = MessageDrafter(context.robot, wanted)
         self.constant_views = self._drafter.constant_views
 
     def new(self, now_ns: int, wall_offset_ns: int) -> Iterator[DraftMessage]:

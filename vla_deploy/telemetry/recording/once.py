@@ -5,11 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.recording.messages import RunMessages
-from vla_deploy.telemetry.recording.recording_file import RecordedRun, RecordingFile
+from vla_deploy.telemetry.recording.recording_file import RecordingFile
 from vla_deploy.telemetry.recording.request import RecordingRequest
 
 PERIOD_NS: Final = NS_PER_S // 25
@@ -25,23 +26,20 @@ class OneRecording:
 
     def __init__(
         self,
-        run_dir: Path,
-        run: RecordedRun,
+        context: NodeContext,
         request: RecordingRequest,
         path: Path,
         *,
         image_period_s: float,
-        clock: Clock,
         wall_ns: Callable[[], int],
     ) -> None:
         self._path = path
-        self._clock = clock
+        self._clock = clock = context.clock
         self._duration_s = request.duration_s
-        self._space = SharedSpace(run_dir / "ipc", clock)
+        self._space = SharedSpace(context.run_dir / "ipc", clock)
         self._messages = RunMessages(
             self._space,
-            run_dir,
-            run.robot,
+            context,
             request.selection,
             image_period_s=image_period_s,
             wanted=request.selection.takes,
@@ -50,7 +48,7 @@ class OneRecording:
         self._part = path.with_name(f".{path.name}.part")
         offset_ns = wall_ns() - now_ns
         try:
-            self._file = RecordingFile(self._part, run, request.selection, now_ns, offset_ns)
+            self._file = RecordingFile(self._part, context, request.selection, now_ns, offset_ns)
         except OSError as error:
             raise _refused(path, error) from error
 

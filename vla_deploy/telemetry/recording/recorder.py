@@ -16,7 +16,7 @@ from vla_deploy.telemetry.channels import ChannelValue
 from vla_deploy.telemetry.errors import RecordingRefused, RecordingSettingsInvalid
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.messages import Collector
-from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
+from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 from vla_deploy.telemetry.recording.request import START, STOP, RecordingRequest, parse_request
 from vla_deploy.telemetry.recording.rolling_writer import RollingWriter
 from vla_deploy.telemetry.recording.settings import RecordingSettings, read_settings
@@ -157,10 +157,7 @@ class RollingRecorder:
         collector = Collector(
             self._space, context.run_dir, request.selection, settings.image_period_s
         )
-        run = RecordedRun(
-            run_id=context.run_dir.resolve().name, robot=context.robot, profile=context.profile
-        )
-        writer = RollingWriter(self._folder, run, request, settings, self._clock, self._wall_ns)
+        writer = RollingWriter(context, self._folder, request, settings, self._wall_ns)
         self._queue = WriteQueue(writer, collector, self._executor)
         if request.duration_s is not None:
             self._ends_ns = self._clock.now_ns() + round(request.duration_s * NS_PER_S)

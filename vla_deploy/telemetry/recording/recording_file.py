@@ -1,14 +1,13 @@
 """Write one file of a recording."""
 
 import contextlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from importlib.metadata import version
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.channels import TOPIC_CHANNELS, Channel
-from vla_deploy.telemetry.mcap_file import RECORDING, McapFile
+from vla_deploy.telemetry.mcap_file import RECORDING, McapFile, run_metadata
 from vla_deploy.telemetry.recording.messages import DraftMessage
 from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.schemas.views import CHANNELS
@@ -17,22 +16,13 @@ ALL_CHANNELS: Final[tuple[Channel, ...]] = (*TOPIC_CHANNELS, *CHANNELS)
 """The channels of every topic and every view."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordedRun:
-    """Identify the run that is recorded."""
-
-    run_id: str
-    robot: str
-    profile: str
-
-
 class RecordingFile:
     """Hold one open file; messages older than it are placed at its beginning."""
 
     def __init__(
         self,
         path: Path,
-        run: RecordedRun,
+        context: NodeContext,
         selection: ChannelSelection,
         began_ns: int,
         offset_ns: int,
@@ -49,7 +39,8 @@ class RecordingFile:
         self._stream = path.open("wb")
         try:
             channels = [one for one in ALL_CHANNELS if selection.takes(one.topic)]
-            self._mcap = McapFile(self._stream, channels, RECORDING, self._metadata(run))
+            metadata = {**run_metadata(context), "wall_offset_ns": str(offset_ns)}
+            self._mcap = McapFile(self._stream, channels, RECORDING, metadata)
         except OSError:
             self._stream.close()
             raise
@@ -90,12 +81,3 @@ class RecordingFile:
         """Close a file that the disk refuses; its whole messages can be recovered."""
         with contextlib.suppress(OSError):  # it closes the file all the same
             self._stream.close()
-
-    def _metadata(self, run: RecordedRun) -> Mapping[str, str]:
-        return {
-            "run_id": run.run_id,
-            "robot": run.robot,
-            "profile": run.profile,
-            "vla_deploy": version("vla-deploy"),
-            "wall_offset_ns": str(self.offset_ns),
-        }

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.folder import dated, final_name
 from vla_deploy.telemetry.recording.folder import RecordingFolder
 from vla_deploy.telemetry.recording.messages import DraftMessage, MessageDrafter, TopicBatch
-from vla_deploy.telemetry.recording.recording_file import RecordedRun, RecordingFile
+from vla_deploy.telemetry.recording.recording_file import RecordingFile
 from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.recording.settings import RecordingSettings
 
@@ -51,23 +52,22 @@ class RollingWriter:
 
     def __init__(
         self,
+        context: NodeContext,
         folder: RecordingFolder,
-        run: RecordedRun,
         request: RecordingRequest,
         settings: RecordingSettings,
-        clock: Clock,
         wall_ns: Callable[[], int],
     ) -> None:
         self.report = RecordingReport()
         self._folder = folder
-        self._run = run
+        self._context = context
         self._selection = request.selection
         self._label = request.label
         self._file_bytes = round(settings.file_mb * 1e6)
         self._file_s = settings.file_s
-        self._clock = clock
+        self._clock = context.clock
         self._wall_ns = wall_ns
-        self._drafter = MessageDrafter(run.robot, request.selection.takes)
+        self._drafter = MessageDrafter(context.robot, request.selection.takes)
         self._file: RecordingFile | None = None
         self._lasting: dict[str, DraftMessage] = {}
         self._messages = self._files = self._unwritten = 0
@@ -114,7 +114,7 @@ class RollingWriter:
         if self._folder.is_disk_full():
             self._report(RecordingState.PAUSED, _FULL)
             return None
-        file = RecordingFile(part, self._run, self._selection, now_ns, offset_ns)
+        file = RecordingFile(part, self._context, self._selection, now_ns, offset_ns)
         self._file, self._retry_ns = file, 0
         self._begin(file, now_ns)
         return file

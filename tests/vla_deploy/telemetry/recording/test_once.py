@@ -8,20 +8,15 @@ import pytest
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
 from vla_deploy.telemetry.recording.request import RecordingRequest
-
-RUN = RecordedRun(run_id="run", robot="butler", profile="desktop")
 
 
 def one(rig: Any, path: Path, **wish: Any) -> OneRecording:
     return OneRecording(
-        rig.run_dir,
-        RUN,
+        rig.context,
         RecordingRequest(**wish),
         path,
         image_period_s=0.5,
-        clock=rig.clock,
         wall_ns=lambda: 1_800_000_000_000_000_000 + rig.clock.now_ns(),
     )
 

@@ -14,10 +14,10 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.ipc import ReplayOnly, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import FlightUnreadable, ReplayRefused
 from vla_deploy.telemetry.recorded_file import RecordedMessage, read_file
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
 from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.replay.feeder import TopicFeeder, shifted
 from vla_deploy.telemetry.replay.node import PlaybackPosition, ReplayNode
@@ -203,14 +203,14 @@ def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
     clock, run_dir = StepClock(), tmp_path / "recorded"
     (run_dir / "logs").mkdir(parents=True)
     space = SharedSpace(run_dir / "ipc", clock)
-    run = RecordedRun(run_id="r", robot="butler", profile="desktop")
+    context = NodeContext(
+        run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
+    )
     one = OneRecording(
-        run_dir,
-        run,
+        context,
         RecordingRequest(duration_s=2.0),
         tmp_path / "x.mcap",
         image_period_s=0.1,
-        clock=clock,
         wall_ns=lambda: 1_800_000_000 * NS_PER_S + clock.now_ns(),
     )
     pixels = np.zeros((48, 64, 3), np.uint8)

@@ -10,8 +10,8 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
 from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.rerun.entity import Entity
 
@@ -59,6 +59,13 @@ class Run:
         (run_dir / "logs").mkdir(parents=True)
         self.run_dir = run_dir
         self.clock = StepClock()
+        self.context = NodeContext(
+            run_dir=run_dir,
+            robot="butler",
+            profile="desktop",
+            devices_dir=None,
+            clock=self.clock,
+        )
         self.space = SharedSpace(run_dir / "ipc", self.clock)
         self._cells = {
             name: self.space.cell_writer(name)
@@ -101,12 +108,10 @@ class Run:
     def record(self, path: Path, **wish: object) -> None:
         """Record two seconds of it."""
         OneRecording(
-            self.run_dir,
-            RecordedRun(run_id="r", robot="butler", profile="desktop"),
+            self.context,
             RecordingRequest(duration_s=2.0, **wish),  # type: ignore[arg-type]
             path,
             image_period_s=0.5,
-            clock=self.clock,
             wall_ns=self.clock.wall_ns,
         ).run(lambda: False)
 

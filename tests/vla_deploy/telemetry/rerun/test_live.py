@@ -3,7 +3,6 @@
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.rerun.entity_logger import EntityLogger
 from vla_deploy.telemetry.rerun.live import RerunNode
@@ -11,11 +10,8 @@ from vla_deploy.telemetry.rerun.live import RerunNode
 
 def followed(run: Any, taken: Any, selection: ChannelSelection) -> EntityLogger:
     """Follow for six seconds, a value of each kind in every tenth."""
-    context = NodeContext(
-        run_dir=run.run_dir, robot="butler", profile="desktop", devices_dir=None, clock=run.clock
-    )
     logger = EntityLogger(taken)
-    node = RerunNode(context, selection, logger, run.clock.wall_ns)
+    node = RerunNode(run.context, selection, logger, run.clock.wall_ns)
     node.start()
     for _ in range(60):
         run.clock.time_ns += NS_PER_S // 10
