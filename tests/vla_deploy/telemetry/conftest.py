@@ -1,17 +1,37 @@
-"""Give the tests a robot in the twin with a flight recorder on board, in lock-step."""
+"""Provide a clock, a run, and a robot in the twin with a flight recorder, in lock-step."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepControl
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
 from vla_deploy.telemetry.recorded_file import RecordedFile, read_flight
 
 WALL_NS = 1_800_000_000_000_000_000
+
+
+class StepClock:
+    """Stand still until a test moves it; `each` runs after every wait."""
+
+    def __init__(self) -> None:
+        self.time_ns = 100 * NS_PER_S
+        self.each: Callable[[], None] = lambda: None
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def wall_ns(self) -> int:
+        return WALL_NS + self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+        self.each()
 
 
 class Rig(LockstepControl):
@@ -76,6 +96,21 @@ class Stopped:
     stopped_ns: int
     now_ns: int
     ticks_before: int
+
+
+@pytest.fixture
+def clock() -> StepClock:
+    return StepClock()
+
+
+@pytest.fixture
+def context(tmp_path: Path, clock: StepClock) -> NodeContext:
+    """Return the context of a run whose topics the test writes."""
+    run_dir = tmp_path / "base" / "run"
+    (run_dir / "logs").mkdir(parents=True)
+    return NodeContext(
+        run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
+    )
 
 
 @pytest.fixture

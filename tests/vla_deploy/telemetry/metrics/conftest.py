@@ -1,4 +1,4 @@
-"""Let a robot's processes tell what they tell, as far as the metrics read it."""
+"""Provide a robot whose processes report what the metrics read."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,19 +18,6 @@ from vla_deploy.telemetry.metrics import READ_TOPICS, Readings, TopicSampler, To
 
 JOINTS = ("left_elbow", "right_elbow")
 OWN = {"version": "1.2.3", "look_s": 0.002, "left_out": 0, "clients": 3}
-
-
-class StepClock:
-    """Pass time only when it is told to."""
-
-    def __init__(self) -> None:
-        self.ns = 100 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 def control_status() -> dict[str, Any]:
@@ -166,8 +153,8 @@ class Robot:
 
     documents = DOCUMENTS
 
-    def __init__(self, folder: Path) -> None:
-        self.clock = StepClock()
+    def __init__(self, folder: Path, clock: Any) -> None:
+        self.clock = clock
         self.space = SharedSpace(folder / "ipc", self.clock)
         self.sampler = TopicSampler(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
         self._writers = {name: self.space.cell_writer(name) for name in READ_TOPICS}
@@ -188,7 +175,7 @@ class Robot:
         self._writers["pose"].put(**place, match_ratio=0.9, state=1, doubt=0)
 
     def later(self, seconds: float) -> None:
-        self.clock.ns += round(seconds * NS_PER_S)
+        self.clock.time_ns += round(seconds * NS_PER_S)
 
     def look(self) -> TopicSnapshot:
         return self.sampler.snapshot(OWN)
@@ -198,8 +185,8 @@ class Robot:
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(tmp_path)
+def robot(tmp_path: Path, clock: Any) -> Iterator[Robot]:
+    robot = Robot(tmp_path, clock)
     yield robot
     robot.space.close()
 

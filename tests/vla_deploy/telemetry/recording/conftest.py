@@ -19,39 +19,18 @@ from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.recording.settings import RecordingSettings
 from vla_deploy.telemetry.topic_history import TopicHistory
 
-WALL_NS = 1_800_000_000_000_000_000
 STEP_S = 0.04
-
-
-class StepClock:
-    """Stand still until told otherwise."""
-
-    def __init__(self) -> None:
-        self.time_ns = 100 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
 
 
 class Rig:
     """Hold a run directory, what its processes would write, and the recorder."""
 
-    def __init__(self, tmp_path: Path) -> None:
-        self.clock = StepClock()
-        self.run_dir = tmp_path / "base" / "run"
-        (self.run_dir / "logs").mkdir(parents=True)
-        self.space = SharedSpace(self.run_dir / "ipc", self.clock)
+    def __init__(self, tmp_path: Path, context: NodeContext, clock: Any) -> None:
+        self.clock = clock
+        self.context = context
+        self.run_dir = context.run_dir
+        self.space = SharedSpace(self.run_dir / "ipc", clock)
         self.folder_path = tmp_path / "recordings"
-        self.context = NodeContext(
-            run_dir=self.run_dir,
-            robot="butler",
-            profile="desktop",
-            devices_dir=None,
-            clock=self.clock,
-        )
         self.requests = self.space.ring_writer("recording_request")
         self.status = self.space.cell_reader("recording_status")
         self._base = self.space.cell_writer("base_state")
@@ -67,7 +46,7 @@ class Rig:
         self.recorder = RollingRecorder(
             self.context,
             self.space,
-            lambda: WALL_NS + self.clock.now_ns(),
+            self.clock.wall_ns,
             settings=chosen,
             folder=self.folder,
             executor=executor or InlineExecutor(),
@@ -100,8 +79,8 @@ class Rig:
 
 
 @pytest.fixture
-def rig(tmp_path: Path) -> Iterator[Rig]:
-    rig = Rig(tmp_path)
+def rig(tmp_path: Path, context: NodeContext, clock: Any) -> Iterator[Rig]:
+    rig = Rig(tmp_path, context, clock)
     yield rig
     rig.close()
 

@@ -17,7 +17,7 @@ def one(rig: Any, path: Path, **wish: Any) -> OneRecording:
         RecordingRequest(**wish),
         path,
         image_period_s=0.5,
-        wall_ns=lambda: 1_800_000_000_000_000_000 + rig.clock.now_ns(),
+        wall_ns=rig.clock.wall_ns,
     )
 
 

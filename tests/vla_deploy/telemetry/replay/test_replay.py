@@ -1,7 +1,7 @@
 """Replay flights of the twin and recordings: the topics of a run come alive, and nothing else."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +25,11 @@ from vla_deploy.telemetry.replay.node import PlaybackPosition, ReplayNode
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
 
-class StepClock:
-    """Stand still until told otherwise."""
-
-    def __init__(self) -> None:
-        self.time_ns = 50 * NS_PER_S
-        self.each: Callable[[], None] = lambda: None
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-        self.each()
-
-
 class Shown:
     """Hold a replay and somebody who looks at it."""
 
-    def __init__(self, run_dir: Path, file: Path, **options: Any) -> None:
-        self.clock = StepClock()
+    def __init__(self, run_dir: Path, file: Path, clock: Any, **options: Any) -> None:
+        self.clock = clock
         run_dir.mkdir(parents=True, exist_ok=True)
         self.node = ReplayNode(run_dir, read_file(file), self.clock, **options)
         self.link = RobotLink(run_dir, self.clock)
@@ -66,8 +51,8 @@ class Shown:
 
 
 @pytest.fixture
-def shown(tmp_path: Path) -> Iterator[Shown]:
-    shown = Shown(tmp_path / "run", FLIGHT)
+def shown(tmp_path: Path, clock: Any) -> Iterator[Shown]:
+    shown = Shown(tmp_path / "run", FLIGHT, clock)
     yield shown
     shown.close()
 
@@ -116,8 +101,7 @@ def test_what_stands_still_stays_fresh(shown: Shown) -> None:
     assert shown.link.fresh("control_status", 0.5) is not None
 
 
-def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path) -> None:
-    clock = StepClock()
+def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path, clock: Any) -> None:
     space = SharedSpace(tmp_path / "ipc", clock, is_replay=True)
     feeder, cell = TopicFeeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
     fields = {"stamp_ns": 1, "x_m": 2.0}
@@ -166,8 +150,8 @@ def test_a_replay_pauses_goes_on_and_changes_its_speed(shown: Shown) -> None:
     assert shown.told()["position_s"] == pytest.approx(paused["position_s"] + 0.4, abs=0.15)
 
 
-def test_a_replay_begins_again_at_its_end_where_that_is_wanted(tmp_path: Path) -> None:
-    shown = Shown(tmp_path / "run", FLIGHT, loop=True)
+def test_a_replay_begins_again_at_its_end_where_that_is_wanted(tmp_path: Path, clock: Any) -> None:
+    shown = Shown(tmp_path / "run", FLIGHT, clock, loop=True)
     length_s = shown.told()["duration_s"]
     shown.requests.publish({"act": "seek", "value": length_s - 0.2})
     shown.run(1.0)
@@ -198,20 +182,17 @@ def test_what_a_replay_cannot_do_is_refused_and_it_goes_on(
     assert told["state"] == "playing"
 
 
-def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
+def test_images_logs_and_events_come_back_as_they_were(
+    tmp_path: Path, context: NodeContext, clock: Any
+) -> None:
     """Record a run that this test plays, then replay the file."""
-    clock, run_dir = StepClock(), tmp_path / "recorded"
-    (run_dir / "logs").mkdir(parents=True)
-    space = SharedSpace(run_dir / "ipc", clock)
-    context = NodeContext(
-        run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
-    )
+    space = SharedSpace(context.run_dir / "ipc", clock)
     one = OneRecording(
         context,
         RecordingRequest(duration_s=2.0),
         tmp_path / "x.mcap",
         image_period_s=0.1,
-        wall_ns=lambda: 1_800_000_000 * NS_PER_S + clock.now_ns(),
+        wall_ns=clock.wall_ns,
     )
     pixels = np.zeros((48, 64, 3), np.uint8)
     cv2.circle(pixels, (30, 20), 10, (250, 10, 10), -1)
@@ -229,12 +210,12 @@ def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
         ring.publish({"command_id": "c-1", "event": "said", "text": "hello"})
         scene.put_document({"stamp_ns": now_ns, "objects": [], "surfaces": [], "bystanders": []})
         line = {"stamp_ns": now_ns, "level": "WARNING", "process": "planner", "message": "slow"}
-        (run_dir / "logs" / "planner.log").write_text(json.dumps(line) + "\n")
+        (context.run_dir / "logs" / "planner.log").write_text(json.dumps(line) + "\n")
 
     clock.each = once
     one.run(lambda: False)
     space.close()
-    shown = Shown(tmp_path / "run", tmp_path / "x.mcap")
+    shown = Shown(tmp_path / "run", tmp_path / "x.mcap", clock)
     events = shown.link.events("task_event", from_start=True)
     shown.run(3.0)
     frame = shown.link.frame("rgbd", 10.0)

@@ -2,20 +2,19 @@
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.rerun.entity import Entity
 
-WALL_NS = 1_800_000_000 * NS_PER_S
 SCENE = {
     "objects": [
         {
@@ -34,39 +33,14 @@ SCENE = {
 }
 
 
-class StepClock:
-    """Stand still until told otherwise; `each` happens after every wait."""
-
-    def __init__(self) -> None:
-        self.time_ns = 100 * NS_PER_S
-        self.each: Callable[[], None] = lambda: None
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-        self.each()
-
-    def wall_ns(self) -> int:
-        return WALL_NS + self.time_ns
-
-
 class Run:
     """Hold a run directory whose topics, logs and images the test writes."""
 
-    def __init__(self, run_dir: Path) -> None:
-        (run_dir / "logs").mkdir(parents=True)
-        self.run_dir = run_dir
-        self.clock = StepClock()
-        self.context = NodeContext(
-            run_dir=run_dir,
-            robot="butler",
-            profile="desktop",
-            devices_dir=None,
-            clock=self.clock,
-        )
-        self.space = SharedSpace(run_dir / "ipc", self.clock)
+    def __init__(self, context: NodeContext, clock: Any) -> None:
+        self.clock = clock
+        self.context = context
+        self.run_dir = context.run_dir
+        self.space = SharedSpace(self.run_dir / "ipc", clock)
         self._cells = {
             name: self.space.cell_writer(name)
             for name in ("joint_state", "pose", "scan", "near_obstacles", "scene", "control_status")
@@ -142,8 +116,8 @@ class Taken:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Iterator[Run]:
-    run = Run(tmp_path / "run")
+def run(context: NodeContext, clock: Any) -> Iterator[Run]:
+    run = Run(context, clock)
     yield run
     run.space.close()
 
