@@ -87,7 +87,7 @@ class RecorderNode:
     def stop(self) -> None:
         """Write what waits to be written, and close the topics.
 
-        A killed supervisor is noticed by the parent of this process, which is then another one.
+        A killed supervisor is recognised by the changed parent of this process.
         """
         if os.getppid() != self._parent_pid:
             now_ns = self._clock.now_ns()

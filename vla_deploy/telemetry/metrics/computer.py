@@ -3,7 +3,7 @@
 from typing import Final
 
 from vla_deploy.telemetry.metrics.metric import Metric
-from vla_deploy.telemetry.metrics.paths import PathStep, among, each, keys
+from vla_deploy.telemetry.metrics.paths import PathStep, among, at, each, keys, path
 
 TOPIC: Final = "board"
 _PRESSURES: Final = {name: f"psi_{name}_ratio" for name in ("cpu", "memory", "io")}
@@ -11,14 +11,12 @@ _PRESSURES: Final = {name: f"psi_{name}_ratio" for name in ("cpu", "memory", "io
 
 def _gauge(name: str, text: str, *, reading: str = "", kept: bool = False) -> Metric:
     """Declare one reading; its own name is given where the metric has another one."""
-    path = (keys(f"readings.{reading or name}"),)
-    return Metric(name=f"vla_{name}", help=text, topic=TOPIC, paths=(path,), kept=kept)
+    return Metric(f"vla_{name}", text, at(f"readings.{reading or name}"), topic=TOPIC, kept=kept)
 
 
 def _family(name: str, text: str, step: PathStep) -> Metric:
     """Declare readings that differ in a label."""
-    path = (keys("readings"), step)
-    return Metric(name=f"vla_{name}", help=text, topic=TOPIC, paths=(path,))
+    return Metric(f"vla_{name}", text, path(keys("readings"), step), topic=TOPIC)
 
 
 METRICS: Final[tuple[Metric, ...]] = (

@@ -1,7 +1,7 @@
 """Declare what a metric is, the values read for it, and how a document's value becomes one."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from enum import Enum
 from itertools import accumulate
 from math import inf
@@ -74,7 +74,7 @@ def number(value: Any) -> float | None:
     return float(value) if isinstance(value, bool | int | float) else None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Metric:
     """Declare one metric: its name by the conventions of Prometheus, and where it is read from.
 
@@ -85,8 +85,9 @@ class Metric:
 
     name: str
     help: str
-    topic: str
     paths: tuple[Path, ...]
+    _: KW_ONLY
+    topic: str
     scale: float = 1.0
     take: Callable[[Any], Value | None] = number
     states: tuple[str, ...] = ()

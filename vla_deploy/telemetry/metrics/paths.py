@@ -46,6 +46,16 @@ def keys(dotted: str) -> PathStep:
     return PathStep(follow, key=names[-1])
 
 
+def path(*steps: PathStep) -> tuple[Path, ...]:
+    """Return the paths of a metric that has one."""
+    return (steps,)
+
+
+def at(dotted: str) -> tuple[Path, ...]:
+    """Return the paths of a metric whose value is found by keys alone."""
+    return path(keys(dotted))
+
+
 def each(label: str, prefix: str = "") -> PathStep:
     """Return the step to every member of an object whose key has a prefix.
 

@@ -11,7 +11,7 @@ from typing import Final
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.telemetry.metrics import computer, control, model_metrics, processes
 from vla_deploy.telemetry.metrics.metric import Metric
-from vla_deploy.telemetry.metrics.paths import Path, each, facts, keys
+from vla_deploy.telemetry.metrics.paths import Path, at, each, facts, keys, path
 
 PULSES: Final = "pulses"
 """Not a topic: count, rate and age of every topic, as the reader of the metrics measures them."""
@@ -23,57 +23,54 @@ _process = partial(Metric, topic="process_table")
 
 
 def _of_each(key: str) -> tuple[Path, ...]:
-    return ((each("topic"), keys(key)),)
+    return path(each("topic"), keys(key))
 
 
 FLOW: Final[tuple[Metric, ...]] = (
     _pulse(
-        name="vla_topic_messages_total",
-        help="Values ever put to a topic of the shared memory in this run.",
-        paths=_of_each("messages"),
+        "vla_topic_messages_total",
+        "Values ever put to a topic of the shared memory in this run.",
+        _of_each("messages"),
     ),
     _pulse(
-        name="vla_topic_rate_hertz",
-        help="How often a topic is written, over the last 5 s.",
-        paths=_of_each("rate_hz"),
+        "vla_topic_rate_hertz",
+        "How often a topic is written, over the last 5 s.",
+        _of_each("rate_hz"),
         kept=True,
     ),
     _pulse(
-        name="vla_topic_age_seconds",
-        help="Age of the newest value of a topic that has a deadline.",
-        paths=_of_each("age_s"),
+        "vla_topic_age_seconds",
+        "Age of the newest value of a topic that has a deadline.",
+        _of_each("age_s"),
     ),
     _pulse(
-        name="vla_topic_deadline_seconds",
-        help="Age above which a reader calls a topic stale.",
-        paths=_of_each("deadline_s"),
+        "vla_topic_deadline_seconds",
+        "Age above which a reader calls a topic stale.",
+        _of_each("deadline_s"),
     ),
     _process(
-        name="vla_robot_info",
-        help="Which robot this is, by which profile it runs, and whether it is a twin.",
-        paths=((keys("head"), facts("robot", "profile", "twin")),),
+        "vla_robot_info",
+        "Which robot this is, by which profile it runs, and whether it is a twin.",
+        path(keys("head"), facts("robot", "profile", "twin")),
     ),
     _own(
-        name="vla_build_info",
-        help="Version of vla_deploy.",
-        paths=((facts("version"),),),
+        "vla_build_info",
+        "Version of vla_deploy.",
+        path(
+            facts("version"),
+        ),
     ),
     _own(
-        name="vla_metrics_look_seconds",
-        help="Time that reading all metrics took the last time.",
-        paths=((keys("look_s"),),),
+        "vla_metrics_look_seconds",
+        "Time that reading all metrics took the last time.",
+        at("look_s"),
     ),
     _own(
-        name="vla_metrics_left_out",
-        help="Series left out because their metric has more than may be.",
-        paths=((keys("left_out"),),),
+        "vla_metrics_left_out",
+        "Series left out because their metric has more than may be.",
+        at("left_out"),
     ),
-    _own(
-        name="vla_dashboard_clients",
-        help="Pages that follow the robot live.",
-        paths=((keys("clients"),),),
-        kept=True,
-    ),
+    _own("vla_dashboard_clients", "Pages that follow the robot live.", at("clients"), kept=True),
 )
 
 METRICS: Final[tuple[Metric, ...]] = (
