@@ -1,7 +1,7 @@
 """Declare the alert conditions: one table for Prometheus' alerts and for ROS 2 diagnostics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import IntEnum
 from typing import Final
 
@@ -16,7 +16,7 @@ class AlertSeverity(IntEnum):
     CRITICAL = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class AlertCondition:
     """Declare that a metric beyond a limit for `for_s` is an alert.
 
@@ -29,7 +29,8 @@ class AlertCondition:
     metric: str
     summary: str
     remedy: str
-    above: float | None = None
+    _: KW_ONLY
+    above: float | None = 0.0
     below: float | None = None
     for_s: int = 0
     where: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -37,7 +38,7 @@ class AlertCondition:
     of: str = ""
 
     def holds(self, point: Point) -> bool:
-        """Return whether a value is beyond the limit; False for a rate, which one value has not."""
+        """Return whether a value is beyond the limit; never for a rate, as one value has none."""
         if self.per_s or not isinstance(point.value, float):
             return False
         labels = dict(zip(self.declared.labels, point.labels, strict=True))
@@ -57,166 +58,129 @@ _WARNING: Final = AlertSeverity.WARNING
 _CRITICAL: Final = AlertSeverity.CRITICAL
 
 
-def _gauge(
-    name: str,
-    severity: AlertSeverity,
-    metric: str,
-    summary: str,
-    remedy: str,
-    *,
-    above: float = 0.0,
-    states: tuple[str, ...] = (),
-    for_s: int = 0,
-) -> AlertCondition:
-    """Declare that too much of a gauge is wrong, or some states of a metric."""
-    return AlertCondition(
-        name=name,
-        severity=severity,
-        metric=metric,
-        where={METRICS_BY_NAME[metric].state_label: states} if states else {},
-        above=above,
-        for_s=for_s,
-        summary=summary,
-        remedy=remedy,
-    )
-
-
 CONDITIONS: Final[tuple[AlertCondition, ...]] = (
-    _gauge(
+    AlertCondition(
         *("VlaEstopLatched", _WARNING, "vla_estop_latched"),
         *("The emergency stop is latched.", "See why, then: vla-deploy reset, vla-deploy arm"),
     ),
-    _gauge(
+    AlertCondition(
         *("VlaSafetyStop", _WARNING, "vla_safety_reaction"),
         *("A safety rule has stopped the robot.", "vla-deploy status names cause and limit"),
-        states=("protective_stop", "hold", "base_off", "group_stop"),
-        for_s=10,
-    ),
-    _gauge(
-        *("VlaControlFault", _CRITICAL, "vla_control_state"),
-        *("Control cannot be armed.", "vla-deploy status names the cause"),
-        states=("fault",),
+        where={"reaction": ("protective_stop", "hold", "base_off", "group_stop")},
         for_s=10,
     ),
     AlertCondition(
-        name="VlaLateTicks",
-        severity=_WARNING,
-        metric="vla_control_late_ticks_total",
+        *("VlaControlFault", _CRITICAL, "vla_control_state"),
+        *("Control cannot be armed.", "vla-deploy status names the cause"),
+        where={"state": ("fault",)},
+        for_s=10,
+    ),
+    AlertCondition(
+        *("VlaLateTicks", _WARNING, "vla_control_late_ticks_total"),
+        "More than 1 % of control's ticks come late.",
+        "vla-deploy doctor says what keeps control from its priority",
         of="vla_control_ticks_total",
         per_s=60,
         above=0.01,
         for_s=60,
-        summary="More than 1 % of control's ticks come late.",
-        remedy="vla-deploy doctor says what keeps control from its priority",
-    ),
-    _gauge(
-        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state"),
-        *("A process has failed too often and is given up.", "vla-deploy logs, vla-deploy crashes"),
-        states=("given up",),
     ),
     AlertCondition(
-        name="VlaProcessRestarts",
-        severity=_WARNING,
-        metric="vla_process_restarts_total",
+        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state"),
+        *("A process has failed too often and is given up.", "vla-deploy logs, vla-deploy crashes"),
+        where={"state": ("given up",)},
+    ),
+    AlertCondition(
+        *("VlaProcessRestarts", _WARNING, "vla_process_restarts_total"),
+        *("A process is started again and again.", "vla-deploy crashes"),
         per_s=600,
         above=0.003,
-        summary="A process is started again and again.",
-        remedy="vla-deploy crashes",
     ),
-    _gauge(
+    AlertCondition(
         *("VlaTopicsLate", _WARNING, "vla_process_alarms"),
         *("A process' topics are too old, too slow or not valid.", "vla-deploy status"),
         for_s=10,
     ),
     AlertCondition(
-        name="VlaCommandsRefused",
-        severity=_CRITICAL,
-        metric="vla_commands_taken",
+        *("VlaCommandsRefused", _CRITICAL, "vla_commands_taken"),
+        *("The robot takes no commands.", "vla-deploy status says why"),
+        above=None,
         below=1.0,
         for_s=5,
-        summary="The robot takes no commands.",
-        remedy="vla-deploy status says why",
     ),
-    _gauge(
+    AlertCondition(
         *("VlaBudgetBroken", _WARNING, "vla_budget_over"),
         *("A budget is broken.", "vla-deploy budget shows the line and what is done about it"),
         for_s=30,
     ),
-    _gauge(
+    AlertCondition(
         *("VlaBudgetStop", _CRITICAL, "vla_budget_stop"),
         *("A budget has stopped the robot.", "vla-deploy budget says which"),
     ),
-    _gauge(
+    AlertCondition(
         *("VlaBusDegraded", _WARNING, "vla_bus_state"),
         *("A servo bus loses answers.", "Look at cable, connectors and supply"),
-        states=("degraded",),
+        where={"state": ("degraded",)},
         for_s=30,
     ),
-    _gauge(
+    AlertCondition(
         *("VlaBusLost", _CRITICAL, "vla_bus_state"),
         *("A servo bus has used up its error budget.", "Look at cable, connectors and supply"),
-        states=("lost",),
+        where={"state": ("lost",)},
     ),
     AlertCondition(
-        name="VlaBusFaults",
-        severity=_WARNING,
-        metric="vla_bus_faults_total",
+        *("VlaBusFaults", _WARNING, "vla_bus_faults_total"),
+        "Something goes wrong on a bus more than once a second.",
+        "vla-deploy status --json has the counters; look at the wiring",
         per_s=60,
         above=1.0,
         for_s=60,
-        summary="Something goes wrong on a bus more than once a second.",
-        remedy="vla-deploy status --json has the counters; look at the wiring",
     ),
-    _gauge(
+    AlertCondition(
         *("VlaJointWarm", _WARNING, "vla_joint_temperature_celsius"),
         *("A joint's servo is warm.", "Let it rest, or give it less to hold"),
         above=65.0,
         for_s=60,
     ),
-    _gauge(
+    AlertCondition(
         *("VlaJointError", _CRITICAL, "vla_joint_hardware_error"),
         *("A joint's servo reports a hardware error.", "vla-deploy servo monitor; then reset"),
     ),
-    _gauge(
+    AlertCondition(
         *("VlaComputerHot", _WARNING, "vla_temperature_celsius"),
         *("The computer is hot.", "Look at fan and airflow; vla-deploy budget"),
         above=85.0,
         for_s=60,
     ),
     AlertCondition(
-        name="VlaPowerFault",
-        severity=_CRITICAL,
-        metric="vla_throttle_events_total",
+        *("VlaPowerFault", _CRITICAL, "vla_throttle_events_total"),
+        "The supply of the computer fails: under-voltage or average over-current.",
+        "Look at battery, cable and power mode",
         where={"kind": ("oc1", "oc2")},
         per_s=60,
-        above=0.0,
-        summary="The supply of the computer fails: under-voltage or average over-current.",
-        remedy="Look at battery, cable and power mode",
     ),
     AlertCondition(
-        name="VlaDiskNearlyFull",
-        severity=_WARNING,
-        metric="vla_disk_free_ratio",
+        *("VlaDiskNearlyFull", _WARNING, "vla_disk_free_ratio"),
+        "A disk that the robot writes to is nearly full.",
+        "Make room; the robot's own logs and recordings are bounded",
+        above=None,
         below=0.05,
         for_s=60,
-        summary="A disk that the robot writes to is nearly full.",
-        remedy="Make room; the robot's own logs and recordings are bounded",
     ),
-    _gauge(
+    AlertCondition(
         *("VlaPlaceLost", _WARNING, "vla_place_state"),
         *("The robot does not know where it is.", "vla-deploy status says why"),
-        states=("lost",),
+        where={"state": ("lost",)},
         for_s=10,
     ),
-    _gauge(
+    AlertCondition(
         *("VlaSensorAway", _WARNING, "vla_perception_sensors_away"),
         *("A sensor gives nothing.", "vla-deploy doctor"),
         for_s=10,
     ),
-    _gauge(
+    AlertCondition(
         *("VlaSightByForm", _WARNING, "vla_perception_sight"),
         *("The robot names things without its network.", "vla-deploy status says why"),
-        states=("form",),
+        where={"mode": ("form",)},
         for_s=60,
     ),
 )
