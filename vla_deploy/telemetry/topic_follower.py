@@ -1,12 +1,13 @@
-"""Follow the cells and rings of a run: what is new in them since the last read."""
+"""Follow the cells, rings and images of a run: what is new in them since the last read."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Final
 
 import cv2
 
-from vla_deploy.ipc import TOPICS, CellReader, Frame, Kind, RingReader, SharedSpace
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import TOPICS, CellReader, Frame, FrameReader, Kind, RingReader, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.telemetry.channels import ChannelValue, TopicValue
 
@@ -43,6 +44,36 @@ class TopicFollower:
             for event in ring.drain():
                 text = json.dumps(event.payload, separators=(",", ":")).encode()
                 yield name, _value(event.stamp_ns, event.sequence, text)
+
+
+class FrameFollower:
+    """Read the newest image of some frame topics, at most once per period."""
+
+    def __init__(
+        self,
+        space: SharedSpace,
+        period_s: float,
+        wanted: Callable[[str], bool] = lambda _: True,
+    ) -> None:
+        self._frames: dict[str, FrameReader] = {
+            topic.name: space.frame_reader(topic.name)
+            for topic in TOPICS
+            if topic.kind is Kind.FRAME and wanted(topic.name)
+        }
+        self._period_ns = round(period_s * NS_PER_S)
+        self._sequences: dict[str, int] = {}
+        self._due_ns = 0
+
+    def new_frames(self, now_ns: int) -> Iterator[tuple[str, Frame]]:
+        """Yield the images that are new, with the names of their topics."""
+        if now_ns < self._due_ns:
+            return
+        self._due_ns = now_ns + self._period_ns
+        for name, reader in self._frames.items():
+            frame = reader.latest()
+            if frame is not None and self._sequences.get(name) != frame.sequence:
+                self._sequences[name] = frame.sequence
+                yield name, frame
 
 
 def image_values(topic: str, frame: Frame) -> Iterator[ChannelValue]:

@@ -1,13 +1,11 @@
 """Remember the newest values of every topic, bounded by age and by bytes."""
 
 from collections import deque
-from collections.abc import Iterator
 from typing import Final
 
-from drivers.clock import NS_PER_S
-from vla_deploy.ipc import TOPICS, FrameReader, Kind, Record, SharedSpace
+from vla_deploy.ipc import Record, SharedSpace
 from vla_deploy.telemetry.channels import TICKS, ChannelValue, TopicValue
-from vla_deploy.telemetry.topic_follower import TopicFollower, image_values
+from vla_deploy.telemetry.topic_follower import FrameFollower, TopicFollower, image_values
 from vla_deploy.telemetry.triggers import KEPT_NS
 
 LIMIT_BYTES: Final = 48 * 2**20
@@ -24,19 +22,13 @@ class TopicHistory:
         self._values = BoundedValues(KEPT_NS, LIMIT_BYTES)
         self._ticks = space.record_reader(TICKS)
         self._follower = TopicFollower(space)
-        self._frames: dict[str, FrameReader] = {
-            topic.name: space.frame_reader(topic.name)
-            for topic in TOPICS
-            if topic.kind is Kind.FRAME
-        }
-        self._frames_due_ns = 0
+        self._frames = FrameFollower(space, FRAME_PERIOD_S)
 
     def refresh(self, now_ns: int) -> list[ChannelValue]:
         """Remember and return what is new; images are read only every `FRAME_PERIOD_S`."""
         new = list(self._follower.new_values())
-        if now_ns >= self._frames_due_ns:
-            self._frames_due_ns = now_ns + round(FRAME_PERIOD_S * NS_PER_S)
-            new += self._new_images()
+        for name, frame in self._frames.new_frames(now_ns):
+            new += image_values(name, frame)
         for channel, value in new:
             self._values.add(channel, value)
         self._values.drop_old(now_ns)
@@ -55,12 +47,6 @@ class TopicHistory:
     def held_bytes(self) -> int:
         """Return how many bytes are remembered, without the ticks."""
         return self._values.size_bytes
-
-    def _new_images(self) -> Iterator[ChannelValue]:
-        for name, frames in self._frames.items():
-            frame, known = frames.latest(), self._values.newest(f"{name}/colour")
-            if frame is not None and (known is None or known.sequence != frame.sequence):
-                yield from image_values(name, frame)
 
 
 class BoundedValues:

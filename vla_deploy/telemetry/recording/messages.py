@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import BY_NAME, TOPICS, Frame, FrameReader, Kind, Record, SharedSpace
+from vla_deploy.ipc import BY_NAME, Frame, Kind, Record, SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.runtime.node import NodeContext
@@ -22,7 +22,7 @@ from vla_deploy.telemetry.channels import (
 from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.schemas.foxglove_json import LOG_LEVELS, time_json
 from vla_deploy.telemetry.schemas.views import LOG, ViewDrawer
-from vla_deploy.telemetry.topic_follower import TopicFollower, image_values
+from vla_deploy.telemetry.topic_follower import FrameFollower, TopicFollower, image_values
 
 _LINE_BYTES: Final = 300
 _LOG_PERIOD_NS: Final = NS_PER_S // 2
@@ -103,16 +103,10 @@ class Collector:
         self, space: SharedSpace, run_dir: Path, selection: ChannelSelection, image_period_s: float
     ) -> None:
         self._takes = selection.takes
-        self._image_period_ns = round(image_period_s * NS_PER_S)
         self._ticks = space.record_reader(TICKS)
-        self._frames: dict[str, FrameReader] = {
-            topic.name: space.frame_reader(topic.name)
-            for topic in TOPICS
-            if topic.kind is Kind.FRAME and selection.takes_any_of(topic.name)
-        }
-        self._sequences: dict[str, int] = {}
+        self._frames = FrameFollower(space, image_period_s, selection.takes_any_of)
         self._logs = RunLogs(run_dir / LOGS_DIR)
-        self._images_due_ns = self._logs_due_ns = 0
+        self._logs_due_ns = 0
         for _ in self._logs.new_lines():  # skip what was logged before
             pass
 
@@ -120,22 +114,10 @@ class Collector:
         """Return what is new, with `values` of cells and rings from a `TopicFollower`."""
         return TopicBatch(
             values=tuple((name, value) for name, value in values if "/" not in name),
-            frames=tuple(self._new_frames(now_ns)),
+            frames=tuple(self._frames.new_frames(now_ns)),
             ticks=tuple(self._ticks.fresh()) if self._takes(TICKS) else (),
             lines=tuple(self._new_lines(now_ns)),
         )
-
-    def _new_frames(self, now_ns: int) -> list[tuple[str, Frame]]:
-        if now_ns < self._images_due_ns:
-            return []
-        self._images_due_ns = now_ns + self._image_period_ns
-        new = []
-        for name, reader in self._frames.items():
-            frame = reader.latest()
-            if frame is not None and self._sequences.get(name) != frame.sequence:
-                self._sequences[name] = frame.sequence
-                new.append((name, frame))
-        return new
 
     def _new_lines(self, now_ns: int) -> list[LoggedLine]:
         if now_ns < self._logs_due_ns or not self._takes(LOG):
