@@ -18,7 +18,8 @@ from vla_deploy.telemetry.triggers import KEPT_NS
 _EXPECTED: Final[Mapping[tuple[str, ...], tuple[str, str]]] = {
     (FLIGHT,): ("flight", "the flight recorder, see: vla-deploy flight list"),
     (RECORDING, FLIGHT): (
-        *("recording", "this project, see: vla-deploy record list, vla-deploy flight list"),
+        "recording",
+        "this project, see: vla-deploy record list, vla-deploy flight list",
     ),
 }
 

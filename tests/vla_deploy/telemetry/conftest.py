@@ -51,7 +51,7 @@ class Rig(LockstepControl):
         self.run(0.1)  # what was so before its first look would call for no flight
 
     def settle(self) -> None:
-        """Wait until whatever arming called for has been over for a second."""
+        """Wait until the robot has been armed without any cause for a second."""
         clear_ns = self.lockstep.clock.now_ns()
         for _ in range(100):
             self.run(0.1)
@@ -122,7 +122,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stopped]:
-    """Drive for four seconds, stop, and let whoever only reads look at the one flight."""
+    """Drive for four seconds and stop; the tests that only read share the flight."""
     rig = Rig(tmp_path_factory.mktemp("stopped"))
     ticks_before = rig.status()["tick"]
     rig.drive(4.0)

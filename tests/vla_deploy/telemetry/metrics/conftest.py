@@ -149,7 +149,7 @@ DOCUMENTS: dict[str, dict[str, Any]] = {
 
 
 class Robot:
-    """Tell documents and packed cells, and look at them."""
+    """Write documents and packed cells, and read the metrics."""
 
     documents = DOCUMENTS
 
@@ -159,12 +159,12 @@ class Robot:
         self.sampler = TopicSampler(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
         self._writers = {name: self.space.cell_writer(name) for name in READ_TOPICS}
 
-    def tell(self, **documents: dict[str, Any]) -> None:
+    def write(self, **documents: dict[str, Any]) -> None:
         for name, document in documents.items():
             self._writers[name].put_document(document)
 
-    def tell_all(self) -> None:
-        self.tell(**DOCUMENTS)
+    def write_all(self) -> None:
+        self.write(**DOCUMENTS)
         zeros = dict.fromkeys(("position", "velocity", "setpoint", "age_s"), ())
         self._writers["joint_state"].put(
             **zeros, joint_count=2, effort_ratio=(0.1, -0.2), error=(0, 4), torque_enabled=(1, 1)
@@ -193,9 +193,9 @@ def robot(tmp_path: Path, clock: Any) -> Iterator[Robot]:
 
 @pytest.fixture
 def whole(robot: Robot) -> Robot:
-    """Return a robot whose every process has told, twice within a second."""
-    robot.tell_all()
+    """Return a robot whose processes have all written twice within a second."""
+    robot.write_all()
     robot.look()
     robot.later(1.0)
-    robot.tell_all()
+    robot.write_all()
     return robot

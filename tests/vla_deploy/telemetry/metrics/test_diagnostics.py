@@ -39,7 +39,7 @@ def test_a_condition_that_holds_gives_its_part_level_and_words(whole: "Robot") -
 
 def test_a_part_whose_process_is_silent_is_stale_and_says_which_topic(whole: "Robot") -> None:
     whole.later(5.0)
-    whole.tell(process_table=whole.documents["process_table"])
+    whole.write(process_table=whole.documents["process_table"])
     safety = told(whole)["/butler/Safety"]
     assert safety["level"] == DiagnosticLevel.STALE
     assert safety["message"] == "control_status has been silent for 5.0 s"

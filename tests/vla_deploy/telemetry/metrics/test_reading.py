@@ -55,7 +55,7 @@ def test_a_state_is_one_and_the_others_are_zero(whole: "Robot") -> None:
 
 def test_a_process_that_falls_silent_takes_its_metrics_with_it(whole: "Robot") -> None:
     whole.later(3.5)
-    whole.tell(process_table=whole.documents["process_table"])
+    whole.write(process_table=whole.documents["process_table"])
     readings = whole.read()
     assert why(readings, "vla_control_state") == (
         MissingReason.SILENT,
@@ -87,7 +87,7 @@ def test_a_metric_with_too_many_series_loses_the_last_and_that_is_counted(whole:
     table = whole.documents["process_table"]
     (row, *_) = table["processes"]
     rows = [row | {"name": f"p{number}" + "x" * 100} for number in range(MAX_SERIES + 5)]
-    whole.tell(process_table=table | {"processes": rows})
+    whole.write(process_table=table | {"processes": rows})
     readings = whole.read()
     points = readings.points["vla_process_memory_bytes"]
     assert len(points) == MAX_SERIES
@@ -98,7 +98,7 @@ def test_a_metric_with_too_many_series_loses_the_last_and_that_is_counted(whole:
 def test_the_rate_of_a_topic_is_what_was_put_within_the_window(robot: "Robot") -> None:
     robot.look()
     for _ in range(20):
-        robot.tell(twin_status=robot.documents["twin_status"])
+        robot.write(twin_status=robot.documents["twin_status"])
         robot.later(0.5)
         robot.look()
     readings = robot.read()

@@ -1,4 +1,4 @@
-"""Give the tests a run whose topics they write, and a rolling recorder that writes at once."""
+"""Provide a run whose topics the tests write, and a rolling recorder that writes at once."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -72,7 +72,7 @@ class Rig:
     def ask(self, **request: Any) -> None:
         self.requests.publish({"act": "start", "source": "test", **request})
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         sample = self.status.latest()
         assert sample is not None
         return sample.document()

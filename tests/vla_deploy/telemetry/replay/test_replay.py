@@ -26,7 +26,7 @@ FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
 
 class Shown:
-    """Hold a replay and somebody who looks at it."""
+    """Hold a replay and a reader of its topics."""
 
     def __init__(self, run_dir: Path, file: Path, clock: Any, **options: Any) -> None:
         self.clock = clock
@@ -41,7 +41,7 @@ class Shown:
             self.clock.time_ns += 20_000_000
             self.node.step()
 
-    def told(self) -> Any:
+    def status(self) -> Any:
         self.run(0.3)
         return self.link.document("replay_status")
 
@@ -97,7 +97,7 @@ def test_what_stands_still_stays_fresh(shown: Shown) -> None:
         assert shown.link.fresh(topic, 0.5) is not None, topic
     shown.requests.publish({"act": "resume"})
     shown.run(20.0)
-    assert shown.told()["state"] == "ended"
+    assert shown.status()["state"] == "ended"
     assert shown.link.fresh("control_status", 0.5) is not None
 
 
@@ -138,25 +138,25 @@ def test_what_was_so_before_is_shown_from_any_moment_on(shown: Shown) -> None:
 
 
 def test_a_replay_pauses_goes_on_and_changes_its_speed(shown: Shown) -> None:
-    first = shown.told()["position_s"]
+    first = shown.status()["position_s"]
     shown.requests.publish({"act": "pause"})
-    paused = shown.told()
+    paused = shown.status()
     shown.run(2.0)
-    assert paused["state"] == shown.told()["state"] == "paused"
-    assert shown.told()["position_s"] == paused["position_s"] >= first
+    assert paused["state"] == shown.status()["state"] == "paused"
+    assert shown.status()["position_s"] == paused["position_s"] >= first
     shown.requests.publish({"act": "speed", "value": 0.5})
     shown.requests.publish({"act": "resume"})
     shown.run(0.5)
-    assert shown.told()["position_s"] == pytest.approx(paused["position_s"] + 0.4, abs=0.15)
+    assert shown.status()["position_s"] == pytest.approx(paused["position_s"] + 0.4, abs=0.15)
 
 
 def test_a_replay_begins_again_at_its_end_where_that_is_wanted(tmp_path: Path, clock: Any) -> None:
     shown = Shown(tmp_path / "run", FLIGHT, clock, loop=True)
-    length_s = shown.told()["duration_s"]
+    length_s = shown.status()["duration_s"]
     shown.requests.publish({"act": "seek", "value": length_s - 0.2})
     shown.run(1.0)
-    assert shown.told()["position_s"] < 2.0
-    assert shown.told()["state"] == "playing"
+    assert shown.status()["position_s"] < 2.0
+    assert shown.status()["state"] == "playing"
     shown.close()
 
 
@@ -177,7 +177,7 @@ def test_what_a_replay_cannot_do_is_refused_and_it_goes_on(
     shown: Shown, request_: dict[str, Any]
 ) -> None:
     shown.requests.publish(request_)
-    told = shown.told()
+    told = shown.status()
     assert told["refused"]
     assert told["state"] == "playing"
 
@@ -230,7 +230,7 @@ def test_images_logs_and_events_come_back_as_they_were(
     assert document["stamp_ns"] == pytest.approx(sample.stamp_ns, abs=1e8)
     (line,) = (tmp_path / "run" / "logs" / "planner.log").read_text().splitlines()
     assert json.loads(line)["message"] == "slow"
-    assert shown.told()["unfit"] == 0
+    assert shown.status()["unfit"] == 0
     shown.close()
 
 

@@ -1,4 +1,4 @@
-"""Give the tests a run that they write, a recording of it, and a list that takes entities."""
+"""Provide a run that the tests write, a recording of it, and a list that takes entities."""
 
 import json
 from collections import Counter
