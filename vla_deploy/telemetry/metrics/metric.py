@@ -96,7 +96,7 @@ class Metric:
 
     @property
     def kind(self) -> MetricKind:
-        """Return the kind: of counters and infos their name says it."""
+        """Return the kind; counters and infos are known by their names."""
         if self.states:
             return MetricKind.STATES
         if self.take in (counts_between, counts_below):

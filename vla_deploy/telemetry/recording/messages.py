@@ -213,9 +213,12 @@ class RunMessages:
         self._follower = TopicFollower(space, from_start=False)
         self._collector = Collector(space, context.run_dir, selection, image_period_s)
         self._drafter = MessageDrafter(context.robot, wanted)
-        self.constant_views = self._drafter.constant_views
 
     def new(self, now_ns: int, wall_offset_ns: int) -> Iterator[DraftMessage]:
         """Yield what is new; `wall_offset_ns` turns stamps into wall clock."""
         batch = self._collector.batch(now_ns, self._follower.new_values())
         return self._drafter.messages(batch, wall_offset_ns)
+
+    def constant_views(self, now_ns: int, wall_offset_ns: int) -> Iterator[DraftMessage]:
+        """Yield the views that do not change while the robot runs."""
+        return self._drafter.constant_views(now_ns, wall_offset_ns)

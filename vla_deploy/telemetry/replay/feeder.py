@@ -22,7 +22,7 @@ from vla_deploy.telemetry.schemas.foxglove_json import LOG_LEVELS
 from vla_deploy.telemetry.schemas.views import LOG
 
 _OWN: Final = frozenset({"replay_request", "replay_status"})
-_LOOK_NS: Final = NS_PER_S // 10  # at most this between two reads of a recorder
+_READ_PERIOD_NS: Final = NS_PER_S // 10  # of a recorder, at most
 _STAMP_SUFFIX: Final = "_ns"
 _IMAGE_PARTS: Final = ("colour", "depth")
 LASTING: Final = (Kind.CELL, Kind.FRAME)
@@ -57,7 +57,7 @@ class TopicFeeder:
         """Write again what was fresh at a moment of the file, while the replay stands there."""
         for message in tuple(self._lasting.values()):
             deadline_s = self._topics[message.channel.partition("/")[0]].deadline_s
-            allowed_ns = deadline_s * NS_PER_S + _LOOK_NS
+            allowed_ns = deadline_s * NS_PER_S + _READ_PERIOD_NS
             if not deadline_s or at_ns - message.at_ns <= allowed_ns:
                 self.feed(message)
 

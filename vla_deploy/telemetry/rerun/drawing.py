@@ -193,7 +193,7 @@ def _drawn(name: str, entities: Iterable[Json], *, static: bool) -> Iterator[Ent
             shapes.extend((entity["id"], shape) for shape in entity[kind])
     for kind, (place, archetype, values) in _KINDS.items():
         if static and not found[kind]:
-            continue  # in a scene that changes, an empty list removes the shapes
+            continue  # while in a scene that changes, an empty list removes shapes
         yield Entity(
             path=f"{root}/{name}/{place}",
             archetype=archetype,

@@ -8,6 +8,7 @@ leaves rows of the future behind, which count as not there until they are overwr
 import json
 import mmap
 import os
+import secrets
 import struct
 import zlib
 from collections.abc import Callable
@@ -118,11 +119,11 @@ class SeriesColumns:
     Names and rows belong together by `generation`: without the names, the rows are void.
     """
 
-    def __init__(self, folder: Path, new_generation: Callable[[], int]) -> None:
+    def __init__(self, folder: Path) -> None:
         self._file = folder / _COLUMNS_FILE
         self.generation, self._column_of = _read_columns(self._file)
         if not self.generation:
-            self.generation = new_generation()
+            self.generation = secrets.randbits(63) | 1
             self._write()
         self._seen: dict[str, float] = dict.fromkeys(self._column_of, 0.0)
 

@@ -1,6 +1,5 @@
 """Keep the history of every series in four levels of rings, each made from the finer one."""
 
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +79,7 @@ class TrendStore:
 
     def __init__(self, disk: Path, memory: Path) -> None:
         try:
-            self._columns = SeriesColumns(disk, lambda: secrets.randbits(63) | 1)
+            self._columns = SeriesColumns(disk)
         except OSError as error:
             raise TrendsUnavailable(
                 f"{disk}: cannot keep the history: {error.strerror}; make room, or mend the folder"
