@@ -108,7 +108,7 @@ def _recorder(stack: LockstepStack, seconds: float, folder: Path) -> dict[str, f
     step.run_for(seconds)
     looks, look_ns = spans.steps, spans.cpu_ns[REST]
     stack.space.ring_writer("flight_request").publish({"source": "bench", "reason": ""})
-    if not step.run_until(lambda: bool(flights.flights()), _WRITE_TIMEOUT_S):
+    if not step.run_until(lambda: bool(flights.files()), _WRITE_TIMEOUT_S):
         raise SystemExit("no flight was written")
     steps, step_ns = spans.steps - looks, spans.cpu_ns[REST] - look_ns
     period_ns = node.period_s * NS_PER_S

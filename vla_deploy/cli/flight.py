@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,9 @@ from vla_deploy.cli.session import attach
 from vla_deploy.supervisor.runs.runtime import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
-from vla_deploy.telemetry.flight import Flight, read_flight
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
-from vla_deploy.telemetry.judge import Judgement, judge_again, rules_digest
+from vla_deploy.telemetry.judge import FlightJudgement, judge_again, rules_digest
+from vla_deploy.telemetry.recorded_file import RecordedFile, read_flight
 from vla_deploy.telemetry.timeline import time_line
 
 SAVE_TIMEOUT_S = 60.0
@@ -57,7 +58,7 @@ def _add(
 def run_list(arguments: argparse.Namespace) -> int:
     """Print one line per flight."""
     folder = _folder(arguments)
-    flights = [_summary_or_why_not(path) for path in folder.flights()]
+    flights = [_summary_or_why_not(path) for path in folder.files()]
     if arguments.json:
         print(json.dumps(flights, indent=2))
     elif not flights:
@@ -98,7 +99,7 @@ def run_judge(arguments: argparse.Namespace) -> int:
         judgement = judge_again(tick_bytes(message.text) for message in flight.messages(TICKS))
         agreed &= judgement.difference is None
         same = flight.rules == rules_digest()
-        results.append({"file": path.name, "same_rules": same, **judgement.document})
+        results.append({"file": path.name, "same_rules": same, **asdict(judgement)})
         if not arguments.json:
             print(f"{path.name}: {_verdict(judgement)}")
         if not arguments.json and judgement.difference and not same:
@@ -136,7 +137,7 @@ def _summary_or_why_not(path: Path) -> Mapping[str, Any]:
         return {"file": path.name, "unreadable": str(error)}
 
 
-def _summary(flight: Flight) -> Mapping[str, Any]:
+def _summary(flight: RecordedFile) -> Mapping[str, Any]:
     return {
         "file": flight.path.name,
         "bytes": flight.path.stat().st_size,
@@ -151,12 +152,12 @@ def _summary(flight: Flight) -> Mapping[str, Any]:
     }
 
 
-def _wall(flight: Flight, stamp_ns: int) -> str:
+def _wall(flight: RecordedFile, stamp_ns: int) -> str:
     at_s = (stamp_ns + flight.wall_offset_ns) / NS_PER_S
     return f"{datetime.fromtimestamp(at_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _verdict(judgement: Judgement) -> str:
+def _verdict(judgement: FlightJudgement) -> str:
     unread = f"; {judgement.unread} before the first complete one" if judgement.unread else ""
     difference = judgement.difference
     if difference is None:

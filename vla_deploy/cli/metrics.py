@@ -9,8 +9,8 @@ import yaml
 
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.telemetry.metrics import METRICS
-from vla_deploy.telemetry.metrics.alert_rules import alert_rules
 from vla_deploy.telemetry.metrics.grafana import grafana_dashboard
+from vla_deploy.telemetry.metrics.prometheus import alert_rules
 
 _EXAMPLES: Final = "  vla-deploy metrics\n  vla-deploy metrics rules > vla-deploy-rules.yml\n"
 

@@ -14,13 +14,14 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.watched_run import watched_run
 from vla_deploy.supervisor.runs.runtime import default_base
+from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
-from vla_deploy.telemetry.recording.request import STOP, RecordingWish, checked
+from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
+from vla_deploy.telemetry.recording.request import STOP, RecordingRequest, checked
 from vla_deploy.telemetry.recording.settings import read_settings
-from vla_deploy.telemetry.recording.summary import summary_of
 
 ANSWER_WITHIN_S = 5.0
 _STATUS_AGE_S = 3.0
@@ -72,10 +73,10 @@ def run_start(arguments: argparse.Namespace) -> int:
     Raises:
         CommandFailed: it does not.
     """
-    wish = _wish(arguments, label=arguments.label)
+    request = _request(arguments, label=arguments.label)
     session = attach(arguments.runtime_base)
-    session.publish("recording_request", wish.document())
-    told = _wait(session, lambda status: status.get("source") == wish.source)
+    session.publish("recording_request", request.document())
+    told = _wait(session, lambda status: status.get("source") == request.source)
     _print(told, arguments)
     return 0
 
@@ -109,7 +110,7 @@ def run_list(arguments: argparse.Namespace) -> int:
     """Print one line per recording."""
     base = arguments.runtime_base or default_base()
     folder = RecordingFolder(arguments.folder or recordings_dir_of(base))
-    found = [summary_of(path).document() for path in folder.files()]
+    found = [read_file(path).document() for path in folder.files()]
     if arguments.json:
         print(json.dumps(found, indent=2))
         return 0
@@ -137,22 +138,14 @@ def run_topics(arguments: argparse.Namespace) -> int:
 
 def run_once(arguments: argparse.Namespace) -> int:
     """Record into one file until the time is over, or Ctrl-C."""
-    wish = _wish(arguments)
+    request = _request(arguments)
     session = attach(arguments.runtime_base)
-    table = session.document("process_table") or {}
-    run = RecordedRun(
-        run_id=session.run_dir.resolve().name,
-        robot=str(table.get("robot", "")),
-        profile=str(table.get("profile", "")),
-    )
     settings = read_settings(session.base).recording
     one = OneRecording(
-        session.run_dir,
-        run,
-        wish,
+        watched_run(session),
+        request,
         arguments.output,
         image_period_s=settings.image_period_s,
-        clock=session.clock,
         wall_ns=time.time_ns,
     )
     stops: list[int] = []
@@ -164,15 +157,15 @@ def run_once(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _wish(arguments: argparse.Namespace, label: str = "recording") -> RecordingWish:
-    wish = RecordingWish(
-        topics=tuple(arguments.topic or RecordingWish().topics),
+def _request(arguments: argparse.Namespace, label: str = "recording") -> RecordingRequest:
+    request = RecordingRequest(
+        topics=tuple(arguments.topic or RecordingRequest().topics),
         without=tuple(arguments.without),
         duration_s=arguments.duration,
         label=label,
         source=f"cli-{os.getpid()}",
     )
-    return checked(wish, [channel.topic for channel in ALL_CHANNELS])
+    return checked(request, [channel.topic for channel in ALL_CHANNELS])
 
 
 def _wait(session: Session, reached: Callable[[Mapping[str, Any]], bool]) -> dict[str, Any]:

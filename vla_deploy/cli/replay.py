@@ -16,8 +16,8 @@ from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE
 from vla_deploy.runtime.node import run_node
 from vla_deploy.supervisor.processes.process import ChildProcess
 from vla_deploy.supervisor.runs.runtime import Runtime, default_base
+from vla_deploy.telemetry.recorded_file import RecordedFile, read_file
 from vla_deploy.telemetry.replay.node import ReplayNode
-from vla_deploy.telemetry.replay.source import Source
 
 ANSWER_WITHIN_S: Final = 5.0
 _STATUS_AGE_S: Final = 3.0
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace) -> int:
     base = arguments.runtime_base or default_base()
-    source = Source(find_recorded(base, arguments.file))
+    file = read_file(find_recorded(base, arguments.file))
     runtime = Runtime(base)
     stops: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -73,14 +73,14 @@ def _show(arguments: argparse.Namespace) -> int:
     page: ChildProcess | None = None
     clock = MonotonicClock()
     try:
-        node = ReplayNode(runtime.run_dir, source, clock, loop=arguments.loop)
+        node = ReplayNode(runtime.run_dir, file, clock, loop=arguments.loop)
         _begin(node, arguments, clock.now_ns())
         print(
-            f"{source.summary.path.name}: {source.summary.duration_s:.1f} s of what was recorded, "
+            f"{file.path.name}: {file.duration_s:.1f} s of what was recorded, "
             "no robot: no act reaches any; Ctrl-C ends it",
             flush=True,
         )
-        page = _page(runtime, source) if arguments.dashboard else None
+        page = _page(runtime, file) if arguments.dashboard else None
         address = _Address(Session(runtime.run_dir), wanted=page is not None)
         run_node(node, clock, lambda: address.tell() or bool(stops))
     finally:
@@ -110,18 +110,18 @@ class _Address:
 
 def _begin(node: ReplayNode, arguments: argparse.Namespace, now_ns: int) -> None:
     if arguments.speed is not None:
-        node.pace.go_at(now_ns, arguments.speed)
+        node.playback.set_speed(now_ns, arguments.speed)
     if arguments.at_s is not None:
-        node.pace.seek(now_ns, arguments.at_s)
+        node.playback.seek(now_ns, arguments.at_s)
     if arguments.pause:
-        node.pace.pause(now_ns, paused=True)
+        node.playback.pause(now_ns, paused=True)
 
 
-def _page(runtime: Runtime, source: Source) -> ChildProcess:
+def _page(runtime: Runtime, file: RecordedFile) -> ChildProcess:
     """Start the dashboard as a run's; it takes the next free port."""
     run_dir = runtime.run_dir
     command = ["-m", "vla_deploy.dashboard", "--run-dir", str(run_dir)]
-    command += ["--robot", source.summary.robot, "--profile", _PROFILE]
+    command += ["--robot", file.robot, "--profile", _PROFILE]
     command += ["--devices-dir", str(run_dir / "dev")]
     environment = {**os.environ, RUN_ID_VARIABLE: runtime.run_id}
     return ChildProcess(command, environment, run_dir / LOGS_DIR / "dashboard.out")

@@ -1,7 +1,6 @@
 """`vla-deploy rerun`: look at a recording, a flight or the run of this machine in Rerun."""
 
 import argparse
-import contextlib
 import signal
 import time
 from pathlib import Path
@@ -15,13 +14,12 @@ from vla_deploy.cli.session import attach
 from vla_deploy.cli.watched_run import watched_run
 from vla_deploy.runtime.node import run_node
 from vla_deploy.supervisor.runs.runtime import default_base
+from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
-from vla_deploy.telemetry.recording.request import RecordingWish, checked
-from vla_deploy.telemetry.recording.selection import Selection
-from vla_deploy.telemetry.replay.source import Source
+from vla_deploy.telemetry.recording.request import ChannelSelection, RecordingRequest, checked
 from vla_deploy.telemetry.rerun.conversion import convert
+from vla_deploy.telemetry.rerun.entity_logger import EntityLogger
 from vla_deploy.telemetry.rerun.live import RerunNode
-from vla_deploy.telemetry.rerun.showing import Showing
 from vla_deploy.telemetry.rerun.stream import RerunStream
 from vla_deploy.telemetry.rerun.viewer import PORT, open_viewer, url_of
 
@@ -62,38 +60,38 @@ def run(arguments: argparse.Namespace) -> int:
     """
     if arguments.save is not None and arguments.save.suffix != SUFFIX:
         raise UsageError(f"rerun: --save {arguments.save}: expected a name that ends in {SUFFIX}")
-    wish = RecordingWish(
-        topics=tuple(arguments.topic or RecordingWish().topics), without=tuple(arguments.without)
+    request = RecordingRequest(
+        topics=tuple(arguments.topic or RecordingRequest().topics), without=tuple(arguments.without)
     )
-    selection = checked(wish, [channel.topic for channel in ALL_CHANNELS]).selection
+    selection = checked(request, [channel.topic for channel in ALL_CHANNELS]).selection
     if arguments.file is None:
         return _follow(arguments, selection)
     return _convert(arguments, selection)
 
 
-def _convert(arguments: argparse.Namespace, selection: Selection) -> int:
+def _convert(arguments: argparse.Namespace, selection: ChannelSelection) -> int:
     base = arguments.runtime_base or default_base()
-    with contextlib.closing(Source(find_recorded(base, arguments.file))) as source:
-        stream = RerunStream(source.summary.path.stem)
-        where = _open(stream, arguments, MonotonicClock())
-        showing = Showing(stream)
-        messages = convert(source, showing, selection)
-    _finish(stream, showing, f"{source.summary.path.name}: {messages} messages", where)
+    file = read_file(find_recorded(base, arguments.file))
+    stream = RerunStream(file.path.stem)
+    where = _open(stream, arguments, MonotonicClock())
+    logger = EntityLogger(stream)
+    messages = convert(file, logger, selection)
+    _finish(stream, logger, f"{file.path.name}: {messages} messages", where)
     return 0
 
 
-def _follow(arguments: argparse.Namespace, selection: Selection) -> int:
+def _follow(arguments: argparse.Namespace, selection: ChannelSelection) -> int:
     session = attach(arguments.runtime_base)
     stream = RerunStream(session.run_dir.resolve().name)
     where = _open(stream, arguments, session.clock)
-    showing = Showing(stream)
-    node = RerunNode(watched_run(session), selection, showing, time.time_ns)
+    logger = EntityLogger(stream)
+    node = RerunNode(watched_run(session), selection, logger, time.time_ns)
     stops: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _frame: stops.append(got))
     print(f"live, {where}; Ctrl-C ends it", flush=True)
     run_node(node, session.clock, lambda: bool(stops))
-    _finish(stream, showing, "live", where)
+    _finish(stream, logger, "live", where)
     return 0
 
 
@@ -109,9 +107,9 @@ def _open(stream: RerunStream, arguments: argparse.Namespace, clock: Clock) -> s
     return f"to the viewer at {url}"
 
 
-def _finish(stream: RerunStream, showing: Showing, what: str, where: str) -> None:
+def _finish(stream: RerunStream, logger: EntityLogger, what: str, where: str) -> None:
     stream.flush()
     stream.close()
-    print(f"{what}: {showing.shown.total()} values of {len(showing.shown)} entities {where}")
-    for channel, count in showing.unfit.most_common():
+    print(f"{what}: {logger.shown.total()} values of {len(logger.shown)} entities {where}")
+    for channel, count in logger.unfit.most_common():
         print(f"left out, as they do not fit: {count} of {channel}")

@@ -1,1 +1,1 @@
-"""Keep the last half minute of everything, write it down when the robot stops, judge it again."""
+"""Flights, recordings, replays, live viewers and metrics of the robot's processes."""

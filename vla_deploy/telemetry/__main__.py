@@ -7,16 +7,16 @@ from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.process_main import main
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.node import RecorderNode
-from vla_deploy.telemetry.recording.building import rolling_recorder
+from vla_deploy.telemetry.recording.recorder import RollingRecorder
 
 
 def build(context: NodeContext) -> RecorderNode:
-    """Build the node from what the process was started with."""
+    """Build the node."""
     return RecorderNode(
         context,
         FlightFolder(folder_of(context.run_dir.parent)),
         time.time_ns,
-        rolling=lambda space: rolling_recorder(context, space, time.time_ns),
+        rolling=lambda space: RollingRecorder(context, space, time.time_ns),
     )
 
 

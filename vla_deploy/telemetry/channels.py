@@ -1,4 +1,4 @@
-"""Derive the recording's channels, JSON schema and JSON text, from the one schema table."""
+"""Derive channels, their JSON schemas and JSON texts, from the one table of topics."""
 
 import base64
 import json
@@ -11,9 +11,7 @@ import numpy as np
 
 from vla_deploy.ipc import BY_NAME, TOPICS, PackedField, Topic, TopicKind
 from vla_deploy.ipc.memory.layout import is_document, record_dtype
-from vla_deploy.telemetry.history import Kept
-from vla_deploy.telemetry.schemas.geometry import CAMERA, time_json
-from vla_deploy.telemetry.schemas.well_known import well_known
+from vla_deploy.telemetry.schemas.foxglove_json import CAMERA, foxglove_schema, time_json
 
 TICKS: Final = "tick_record"
 IMAGE_SCHEMA: Final = "foxglove.CompressedImage"
@@ -30,7 +28,7 @@ _TICK = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """Describe one channel of the file."""
+    """Describe one channel of a file."""
 
     topic: str
     schema_name: str
@@ -42,8 +40,21 @@ class Channel:
         return json.dumps(self.schema).encode()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicValue:
+    """Carry one value: the JSON or the packed bytes of its topic, or a compressed image."""
+
+    stamp_ns: int
+    sequence: int
+    payload: bytes
+
+
+ChannelValue = tuple[str, TopicValue]
+"""The name of a channel, and a value of it."""
+
+
 def channels_of(topic: Topic) -> tuple[Channel, ...]:
-    """Return what a topic becomes in the file: one channel, two for images, none if private."""
+    """Return the channels of a topic: one, two for images, none for a private topic."""
     if topic.private:
         return ()
     if topic.kind is TopicKind.FRAME:
@@ -51,7 +62,7 @@ def channels_of(topic: Topic) -> tuple[Channel, ...]:
             Channel(
                 topic=f"{topic.name}/{part}",
                 schema_name=IMAGE_SCHEMA,
-                schema=well_known(IMAGE_SCHEMA),
+                schema=foxglove_schema(IMAGE_SCHEMA),
             )
             for part in _IMAGE_FORMS
         )
@@ -59,17 +70,17 @@ def channels_of(topic: Topic) -> tuple[Channel, ...]:
     return (Channel(topic=topic.name, schema_name=f"vla_deploy.{topic.name}", schema=schema),)
 
 
-def value_text(channel: str, kept: Kept, wall_offset_ns: int) -> bytes:
-    """Return a value of any topic as JSON; an image comes compressed, on the channel of a part."""
+def value_text(channel: str, value: TopicValue, wall_offset_ns: int) -> bytes:
+    """Return a value of any topic as JSON; an image is compressed, on the channel of its part."""
     topic, _, part = channel.partition("/")
     if part:
-        return image_text(kept.stamp_ns + wall_offset_ns, kept.payload, _IMAGE_FORMS[part])
+        return image_text(value.stamp_ns + wall_offset_ns, value.payload, _IMAGE_FORMS[part])
     is_cell = BY_NAME[topic].kind is TopicKind.CELL
-    return cell_text(BY_NAME[topic], kept.payload) if is_cell else kept.payload
+    return cell_text(BY_NAME[topic], value.payload) if is_cell else value.payload
 
 
 def cell_text(topic: Topic, payload: bytes) -> bytes:
-    """Return a cell's value as JSON; what is no number becomes null."""
+    """Return a cell's value as JSON; NaN and infinities become null."""
     if is_document(topic):
         return payload
     record = np.frombuffer(payload, record_dtype(topic))[0]
@@ -77,7 +88,7 @@ def cell_text(topic: Topic, payload: bytes) -> bytes:
 
 
 def image_text(stamp_ns: int, data: bytes, form: str) -> bytes:
-    """Return a compressed image of the camera as the JSON that viewers know."""
+    """Return a compressed image of the camera as `foxglove.CompressedImage`."""
     return json.dumps(
         {
             "timestamp": time_json(stamp_ns),
@@ -89,7 +100,7 @@ def image_text(stamp_ns: int, data: bytes, form: str) -> bytes:
 
 
 def tick_text(row: Mapping[str, Any] | None, record: bytes, writer_pid: int) -> bytes:
-    """Return a tick's record with what a person wants to see of it."""
+    """Return a tick's record as JSON, with number, cause and reaction for people."""
     shown = {}
     if row is not None:
         verdict = row["verdict"]
@@ -108,7 +119,7 @@ def tick_bytes(text: bytes) -> bytes:
 
 
 def _content(topic: Topic) -> dict[str, Any]:
-    """Return what a message holds; documents and events are told in docs/architecture.md."""
+    """Return the schema of a message; documents are described in docs/architecture.md."""
     if topic.kind is TopicKind.RECORD:
         return {"properties": _TICK, "required": ["record"]}
     if topic.kind is TopicKind.CELL and not is_document(topic):

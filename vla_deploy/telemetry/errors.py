@@ -1,47 +1,57 @@
-"""Group the errors of flights and recordings by what the caller can do about them.
+"""Group the errors of flights, recordings and the history by what the caller can do.
 
 TelemetryError
-├── FlightMissing      there is no such file: list what there is
-├── FlightUnreadable   the file is cut off, spoiled, or not ours: take another one
-├── FlightForeign      it was recorded by a version with other rules: judge it with that one
-├── ReplayRefused      a replay cannot do what is asked: ask for something else
-├── ExtraMissing       an optional part is not installed, or cannot be served: the text says how
-├── RecordingRefused   a recording cannot be made as it was asked for: ask for another
-└── SettingsInvalid    recording.toml has faults, all of them are listed: mend the file
+├── FlightMissing             there is no such file: list what there is
+├── FlightUnreadable          the file is cut off, spoiled, or not ours: take another one
+├── FlightForeign             a version with other rules recorded it: judge it with that one
+├── ReplayRefused             a replay cannot do what is requested: request something else
+├── ExtraMissing              an optional part is missing: the text says how to get it
+├── RecordingRefused          a recording cannot be made as requested: request another
+├── RecordingSettingsInvalid  recording.toml has faults, all of them are listed: mend the file
+├── TrendsUnavailable         the files of the history cannot be made: make room, or mend the folder
+└── SeriesUnknown             the history has no such series: list those it has
 """
 
 
 class TelemetryError(Exception):
-    """Base of everything that flights and recordings raise."""
+    """Base of everything that flights, recordings and the history raise."""
 
 
 class FlightMissing(TelemetryError):
-    """Say that no such file is in the folder."""
+    """No such file is in the folder."""
 
 
 class FlightUnreadable(TelemetryError):
-    """Say that a file is no whole flight, or no recording of this project."""
+    """A file is no whole flight, or no recording of this project."""
 
 
 class FlightForeign(TelemetryError):
-    """Say that a flight's ticks do not fit the judge of this version."""
+    """A flight's ticks do not fit the safety rules of this version."""
 
 
 class RecordingRefused(TelemetryError):
-    """Say why nothing is recorded as it was asked for."""
+    """A recording cannot be made as requested."""
 
 
 class ExtraMissing(TelemetryError):
-    """Say which optional part is missing, and how to get it."""
+    """An optional part is missing; the text says how to get it."""
 
 
 class ReplayRefused(TelemetryError):
-    """Say what a replay cannot do."""
+    """A replay cannot do what was requested."""
 
 
-class SettingsInvalid(TelemetryError):
-    """Say everything that is wrong with the settings of recording."""
+class RecordingSettingsInvalid(TelemetryError):
+    """The settings have faults; all of them are listed."""
 
     def __init__(self, faults: tuple[str, ...]) -> None:
         self.faults = faults
         super().__init__("; ".join(faults))
+
+
+class TrendsUnavailable(TelemetryError):
+    """The files of the history cannot be made or opened."""
+
+
+class SeriesUnknown(TelemetryError):
+    """The history has no such series."""

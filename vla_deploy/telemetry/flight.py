@@ -1,117 +1,82 @@
-"""Read a recorded flight: who, why, and every message in order."""
+"""Write one flight as an MCAP file, a few messages at a time."""
 
+import heapq
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mcap.reader import McapReader, make_reader
-
-from vla_deploy.telemetry.errors import FlightUnreadable
-from vla_deploy.telemetry.history import KEPT_NS
-from vla_deploy.telemetry.mcap_file import SPOILED
-from vla_deploy.telemetry.writing import METADATA
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Message:
-    """Carry one message; `stamp_ns` is monotonic, in the run's clock."""
-
-    topic: str
-    stamp_ns: int
-    text: bytes
-
-    def document(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        document: dict[str, Any] = json.loads(self.text)
-        return document
+from vla_deploy.ipc import BadPayload, Record
+from vla_deploy.ipc.memory.delta import DeltaReader
+from vla_deploy.runtime.node import NodeContext
+from vla_deploy.telemetry.channels import (
+    TICKS,
+    TOPIC_CHANNELS,
+    ChannelValue,
+    TopicValue,
+    tick_text,
+    value_text,
+)
+from vla_deploy.telemetry.judge import JUDGED_TYPES, rules_digest
+from vla_deploy.telemetry.mcap_file import FLIGHT, McapFile, run_metadata
+from vla_deploy.telemetry.triggers import FlightTrigger
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Flight:
-    """Describe one file; `counts` is the number of messages per topic.
+def write_flight(
+    path: Path,
+    context: NodeContext,
+    triggers: Sequence[FlightTrigger],
+    values: Sequence[ChannelValue],
+    ticks: Sequence[Record],
+    *,
+    wall_offset_ns: int,
+    at_once: int,
+) -> Iterator[None]:
+    """Write a flight to `path`, and yield after every `at_once` messages.
 
-    It starts where everything is remembered from; a topic that seldom changes has an older value.
-    """
-
-    path: Path
-    run_id: str
-    robot: str
-    profile: str
-    version: str
-    rules: str
-    wall_offset_ns: int
-    causes: tuple[dict[str, Any], ...]
-    counts: dict[str, int]
-    start_ns: int
-    end_ns: int
-
-    def messages(self, *topics: str) -> Iterator[Message]:
-        """Return the messages of some topics by time, or of all.
-
-        Raises:
-            FlightUnreadable: the file is cut off or spoiled.
-        """
-        with self.path.open("rb") as file:
-            try:
-                for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(
-                    topics=topics or None
-                ):
-                    yield Message(
-                        topic=channel.topic,
-                        stamp_ns=message.log_time - self.wall_offset_ns,
-                        text=message.data,
-                    )
-            except SPOILED as error:
-                raise _unreadable(self.path, error) from error
-
-
-def read_flight(path: Path) -> Flight:
-    """Read what a flight says of itself.
+    Adding `wall_offset_ns` to stamps gives wall clock.
 
     Raises:
-        FlightUnreadable: the file cannot be opened, is cut off, spoiled, or no flight.
+        OSError: the disk refuses it.
     """
-    try:
-        with path.open("rb") as file:
-            return _describe(path, make_reader(file, validate_crcs=True))
-    except OSError as error:
-        raise FlightUnreadable(f"{path}: {error.strerror}") from error
-    except SPOILED as error:
-        raise _unreadable(path, error) from error
-
-
-def _describe(path: Path, reader: McapReader) -> Flight:
-    metadata = {record.name: record.metadata for record in reader.iter_metadata()}[METADATA]
-    summary = reader.get_summary()
-    if summary is None or summary.statistics is None:
-        raise ValueError("it has no summary")
-    statistics = summary.statistics
-    counts = {
-        summary.channels[channel].topic: count
-        for channel, count in statistics.channel_message_counts.items()
+    metadata = {
+        **run_metadata(context),
+        "rules": rules_digest(),
+        "wall_offset_ns": str(wall_offset_ns),
+        "causes": json.dumps([{**asdict(one), "kind": one.kind.value} for one in triggers]),
     }
-    offset_ns = int(metadata["wall_offset_ns"])
-    end_ns = statistics.message_end_time - offset_ns
-    return Flight(
-        path=path,
-        run_id=metadata["run_id"],
-        robot=metadata["robot"],
-        profile=metadata["profile"],
-        version=metadata["vla_deploy"],
-        rules=metadata.get("rules", ""),
-        wall_offset_ns=offset_ns,
-        causes=tuple(json.loads(metadata["causes"])),
-        counts=counts,
-        start_ns=max(statistics.message_start_time - offset_ns, end_ns - KEPT_NS),
-        end_ns=end_ns,
-    )
+    with path.open("wb") as file:
+        mcap = McapFile(file, TOPIC_CHANNELS, FLIGHT, metadata)
+        messages = _messages(values, ticks, wall_offset_ns)
+        for count, (channel, value, text) in enumerate(messages, start=1):
+            mcap.add(channel, value.stamp_ns + wall_offset_ns, text, value.sequence)
+            if count % at_once == 0:
+                yield
+        mcap.finish()
 
 
-def _unreadable(path: Path, error: Exception) -> FlightUnreadable:
-    reason = str(error) or type(error).__name__
-    return FlightUnreadable(
-        f"{path}: no whole flight: {reason}; expected an MCAP file of the flight recorder, see: "
-        "vla-deploy flight list"
+def _messages(
+    values: Sequence[ChannelValue], ticks: Sequence[Record], wall_offset_ns: int
+) -> Iterator[tuple[str, TopicValue, bytes]]:
+    texts = (
+        (channel, value, value_text(channel, value, wall_offset_ns)) for channel, value in values
     )
+    yield from heapq.merge(texts, _ticks(ticks), key=lambda message: message[1].stamp_ns)
+
+
+def _ticks(ticks: Sequence[Record]) -> Iterator[tuple[str, TopicValue, bytes]]:
+    reader = DeltaReader(JUDGED_TYPES)
+    for record in ticks:
+        value = TopicValue(
+            stamp_ns=record.stamp_ns, sequence=record.sequence, payload=record.payload
+        )
+        yield TICKS, value, tick_text(_row(reader, record), record.payload, record.writer_pid)
+
+
+def _row(reader: DeltaReader, record: Record) -> dict[str, Any] | None:
+    """Return a tick's values for people, or None; the record is written in any case."""
+    try:
+        return reader.row(record.payload)
+    except BadPayload:
+        return None

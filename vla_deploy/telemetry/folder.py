@@ -1,13 +1,15 @@
-"""Keep files in a bounded folder by number; a half-written one never has a final name."""
+"""Keep numbered files in a bounded folder; an unfinished one never has its final name."""
 
 import logging
 import os
 import re
 import shutil
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import ClassVar
 
+from drivers.clock import NS_PER_S
 from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.telemetry.errors import FlightMissing
 
@@ -18,8 +20,8 @@ _NAME = re.compile(r"(\d{6,})-.+\.mcap")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """Bound the folder; `spare_bytes` of the disk are never used."""
+class FolderBounds:
+    """Bound a folder; `spare_bytes` of the disk are never used."""
 
     files: int = 40
     total_bytes: int = 512 * 2**20
@@ -38,9 +40,9 @@ class NumberedFolder:
     verb: ClassVar[str]
     """The command that lists them."""
 
-    def __init__(self, path: Path, bounds: Bounds | None = None) -> None:
+    def __init__(self, path: Path, bounds: FolderBounds | None = None) -> None:
         self.path = path
-        self._bounds = bounds or Bounds()
+        self._bounds = bounds or FolderBounds()
 
     def files(self) -> list[Path]:
         """Return every whole file, the oldest first."""
@@ -51,7 +53,7 @@ class NumberedFolder:
         )
 
     def find(self, name: str) -> Path:
-        """Return a file by path, by its number, or the `latest`.
+        """Return a file by its path, name or number, or the `latest`.
 
         Raises:
             FlightMissing: there is none.
@@ -83,12 +85,12 @@ class NumberedFolder:
         return self.path / f".{number:06d}-{label}.mcap.part"
 
     def publish(self, part: Path) -> Path:
-        """Give a whole file its final name, once its bytes are on the disk.
+        """Give a finished file its final name.
 
         Raises:
             OSError: the disk refuses it.
         """
-        final = part.with_name(part.name.removeprefix(".").removesuffix(".part"))
+        final = part.with_name(final_name(part))
         part.rename(final)
         directory = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -99,9 +101,13 @@ class NumberedFolder:
         return final
 
     def sweep(self) -> None:
-        """Deal with what a killed process left half-written: delete it."""
-        for part in self.path.glob(".*.mcap.part"):
+        """Delete the unfinished files of a killed process."""
+        for part in self.unfinished_files():
             part.unlink(missing_ok=True)
+
+    def unfinished_files(self) -> list[Path]:
+        """Return the files that are being written, or that a killed process was writing."""
+        return sorted(self.path.glob(".*.mcap.part"))
 
     def prune(self, files: int) -> None:
         """Delete the oldest files until the bounds hold; the newest one always stays."""
@@ -112,11 +118,11 @@ class NumberedFolder:
             _log.info("deleted %s %s to keep the folder's bounds", self.noun, oldest.name)
 
     def is_disk_full(self) -> bool:
-        """Tell whether less of the disk is free than is to be spared."""
+        """Return whether less of the disk is free than is to be spared."""
         return shutil.disk_usage(self.path).free < self._bounds.spare_bytes
 
     def prune_for(self, coming_bytes: int) -> None:
-        """Delete the oldest files while one of `coming_bytes` is being written beside them."""
+        """Delete the oldest files while another one, of `coming_bytes`, is being written."""
         kept = self.files()
         while kept and self._is_over(kept, self._bounds.files - 1, coming_bytes):
             kept.pop(0).unlink(missing_ok=True)
@@ -132,9 +138,15 @@ class FlightFolder(NumberedFolder):
     noun = "flight"
     verb = "flight"
 
-    def flights(self) -> list[Path]:
-        """Return every whole flight, the oldest first."""
-        return self.files()
+
+def dated(wall_ns: int, label: str) -> str:
+    """Return the label of a file that begins at a time."""
+    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}-{label}"
+
+
+def final_name(part: Path) -> str:
+    """Return the name of a file that is being written, once it is finished."""
+    return part.name.removeprefix(".").removesuffix(".part")
 
 
 def _number(path: Path) -> int:

@@ -1,33 +1,29 @@
 """Serve viewers live, over Foxglove's WebSocket protocol.
 
-Whoever connects sees the channels of a recording; nobody can publish, call or set anything. The
-library serves from threads of its own and drops the oldest for a client that is slow.
+A viewer gets the channels of a recording; it cannot publish, call or set anything. The library
+serves from threads of its own and drops the oldest messages of a slow viewer.
 """
 
 import logging
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import ExtraMissing
-from vla_deploy.telemetry.following import Following
-from vla_deploy.telemetry.recording.batch import Drafter
-from vla_deploy.telemetry.recording.collecting import Collector
+from vla_deploy.telemetry.recording.messages import DraftMessage, RunMessages
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
-from vla_deploy.telemetry.recording.selection import Selection
+from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.recording.settings import FoxgloveSettings
 
 _IMAGE_PERIOD_S: Final = 0.2
-_STILL_EVERY_NS: Final = 5_000_000_000
+_CONSTANT_PERIOD_NS: Final = 5_000_000_000
 _BACKLOG_MESSAGES: Final = 256
 _log = logging.getLogger(__name__)
 
 
 class FoxgloveNode:
-    """Log to each channel that somebody has subscribed to; the others are not even drawn."""
+    """Serve the channels of a run; only those that a viewer has subscribed to are drawn."""
 
     period_s = 0.05
 
@@ -39,12 +35,14 @@ class FoxgloveNode:
         self._settings = settings
         self._clock = context.clock
         self._wall_ns = wall_ns
-        self._selection = Selection(topics=tuple(settings.topics), without=tuple(settings.without))
+        self._selection = ChannelSelection(
+            topics=tuple(settings.topics), without=tuple(settings.without)
+        )
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._channels: dict[str, Any] = {}
         self._scope: Any = None
         self._server: Any = None
-        self._still_due_ns = 0
+        self._constant_due_ns = 0
 
     def start(self) -> None:
         """Open the topics and listen.
@@ -78,30 +76,34 @@ class FoxgloveNode:
                 "recording.toml, [foxglove]"
             ) from error
         self.port = self._server.port
-        self._following = Following(self._space, from_start=False)
-        logs: Path = self._context.run_dir / LOGS_DIR
-        self._collector = Collector(self._space, logs, self._selection, _IMAGE_PERIOD_S)
-        self._drafter = Drafter(self._context.robot, self._is_watched)
+        self._messages = RunMessages(
+            self._space,
+            self._context,
+            self._selection,
+            image_period_s=_IMAGE_PERIOD_S,
+            wanted=self._is_watched,
+        )
         _log.info("viewers: ws://%s:%d", self._settings.host, self.port)
 
     def step(self) -> None:
-        """Hand on what is new to whoever watches."""
+        """Send what is new to the viewers."""
         now_ns = self._clock.now_ns()
         offset_ns = self._wall_ns() - now_ns
-        batch = self._collector.batch(now_ns, self._following.fresh())
-        for message in self._drafter.messages(batch, offset_ns):
-            stamp_ns = message.stamp_ns + offset_ns
-            self._channels[message.channel].log(message.text, log_time=stamp_ns)
-        if now_ns >= self._still_due_ns:  # for whoever has come since
-            self._still_due_ns = now_ns + _STILL_EVERY_NS
-            for message in self._drafter.still(now_ns, offset_ns):
-                self._channels[message.channel].log(message.text, log_time=now_ns + offset_ns)
+        self._log(self._messages.new(now_ns, offset_ns), offset_ns)
+        if now_ns >= self._constant_due_ns:  # for viewers that have connected since
+            self._constant_due_ns = now_ns + _CONSTANT_PERIOD_NS
+            self._log(self._messages.constant_views(now_ns, offset_ns), offset_ns)
 
     def stop(self) -> None:
-        """Let the viewers go."""
+        """Disconnect the viewers and close the topics."""
         if self._server is not None:
             self._server.stop()
         self._space.close()
+
+    def _log(self, messages: Iterable[DraftMessage], offset_ns: int) -> None:
+        for message in messages:
+            stamp_ns = message.stamp_ns + offset_ns
+            self._channels[message.channel].log(message.text, log_time=stamp_ns)
 
     def _is_watched(self, channel: str) -> bool:
         known = self._channels.get(channel)

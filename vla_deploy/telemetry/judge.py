@@ -1,7 +1,7 @@
-"""Judge recorded ticks again: the rules of this version must come to the recorded verdicts."""
+"""Judge recorded ticks again by the safety rules of this version, and compare the verdicts."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -20,7 +20,7 @@ _INPUT = "inputs."
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedTick:
-    """Carry one tick as it was judged, and what was sent; None where it did not come that far."""
+    """Carry one tick as it was judged, and what was sent, if anything."""
 
     tick: int
     now_ns: int
@@ -33,7 +33,7 @@ class RecordedTick:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """Say where this version judges otherwise than recorded."""
+    """Describe where this version judges otherwise than recorded."""
 
     tick: int
     field: str
@@ -42,8 +42,8 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
-    """Say how many ticks were judged again, how many could not be read, and the first difference.
+class FlightJudgement:
+    """Count the ticks judged again and those unreadable, with the first difference if any.
 
     Ticks before the first complete one, at most a second's worth, cannot be read.
     """
@@ -52,15 +52,10 @@ class Judgement:
     unread: int
     difference: Difference | None
 
-    @property
-    def document(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
-
 
 @cache
 def rules_digest() -> str:
-    """Return what is the same as long as the sources of the safety rules are."""
+    """Return a digest of the sources of the safety rules."""
     sources = {
         one.name: one.read_bytes()
         for one in files("vla_deploy.safety").iterdir()
@@ -69,7 +64,7 @@ def rules_digest() -> str:
     return sha256(repr(sorted(sources.items())).encode()).hexdigest()
 
 
-def judge_again(records: Iterable[bytes]) -> Judgement:
+def judge_again(records: Iterable[bytes]) -> FlightJudgement:
     """Judge the ticks of one flight again, up to the first difference.
 
     Raises:
@@ -90,9 +85,9 @@ def judge_again(records: Iterable[bytes]) -> Judgement:
             _first_difference(tick.tick, tick.state, before[1]) if chained and before else None
         )
         if difference is not None:
-            return Judgement(ticks=ticks, unread=unread, difference=difference)
+            return FlightJudgement(ticks=ticks, unread=unread, difference=difference)
         before = (tick.tick, state)
-    return Judgement(ticks=ticks, unread=unread, difference=None)
+    return FlightJudgement(ticks=ticks, unread=unread, difference=None)
 
 
 def read_tick(reader: DeltaReader, record: bytes) -> RecordedTick | None:

@@ -1,17 +1,19 @@
-"""Write an MCAP file of JSON messages in zstd chunks, and know what a spoiled one raises."""
+"""Write MCAP files of JSON messages in zstd chunks; list what a spoiled file raises."""
 
 import os
 import struct
 from collections.abc import Iterable, Mapping
+from importlib.metadata import version
 from typing import BinaryIO, Final
 
 from mcap.exceptions import McapError
 from mcap.writer import CompressionType, Writer
 from zstandard import ZstdError
 
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.channels import Channel
 
-# What the library and what it unpacks with raise on bytes that are no MCAP; lz4: RuntimeError.
+# Raised by the library and its decompressors on bytes that are no MCAP; lz4: RuntimeError.
 SPOILED: Final = (
     McapError,
     struct.error,
@@ -21,17 +23,29 @@ SPOILED: Final = (
     KeyError,
     EOFError,
 )
+FLIGHT: Final = "flight"
+RECORDING: Final = "recording"
 _SEQUENCE_MASK: Final = 0xFFFF_FFFF
 _CHUNK_BYTES: Final = 256 * 1024
 
 
+def run_metadata(context: NodeContext) -> dict[str, str]:
+    """Return what every file says of the run that it is of."""
+    return {
+        "run_id": context.run_dir.resolve().name,
+        "robot": context.robot,
+        "profile": context.profile,
+        "vla_deploy": version("vla-deploy"),
+    }
+
+
 class McapFile:
-    """Write messages to an open file, each on a channel that was declared for it."""
+    """Write messages to an open file, each on a channel declared before."""
 
     def __init__(
         self, file: BinaryIO, channels: Iterable[Channel], name: str, metadata: Mapping[str, str]
     ) -> None:
-        """Begin the file with what it says of itself.
+        """Begin the file with its metadata.
 
         Raises:
             OSError: the disk refuses it.
@@ -69,17 +83,17 @@ class McapFile:
         )
 
     def flush(self) -> None:
-        """Hand what there is to the kernel, as a whole chunk: a killed process leaves it.
+        """Write a whole chunk to the kernel, so that it outlives a killed process.
 
         Raises:
             OSError: the disk refuses it.
         """
-        # The library ends a chunk by size only; one of few messages would wait for minutes.
+        # The library ends a chunk by size only: with few messages that takes minutes.
         self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
         self._file.flush()
 
     def finish(self) -> None:
-        """Write the index and everything to the disk.
+        """Write the index, and sync the file to the disk.
 
         Raises:
             OSError: the disk refuses it.

@@ -1,4 +1,4 @@
-"""Run the flight recorder: remember everything, and write it down after a stop or a crash."""
+"""Run the flight recorder: keep all topics in memory, write them after a stop or a crash."""
 
 import json
 import logging
@@ -7,18 +7,17 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.runtime.node import NodeContext
-from vla_deploy.telemetry.folder import FlightFolder
-from vla_deploy.telemetry.memory import Memory
+from vla_deploy.telemetry.flight import write_flight
+from vla_deploy.telemetry.folder import FlightFolder, dated
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
-from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
-from vla_deploy.telemetry.writing import FlightHead, write_flight
+from vla_deploy.telemetry.topic_history import TopicHistory
+from vla_deploy.telemetry.triggers import Debounce, FlightTrigger, TriggerDetector, TriggerKind
 
 MESSAGES_AT_ONCE: Final = 150
 _SHOWN_CAUSES = 20
@@ -30,14 +29,14 @@ class _Writing:
     """Hold the flight that is being written."""
 
     part: Path
-    causes: list[Trigger]
+    causes: list[FlightTrigger]
     progress: Iterator[None]
 
 
 class RecorderNode:
-    """Keep the last half minute of every topic, and never hold anybody up.
+    """Keep the last half minute of every topic, and write it as a flight when triggered.
 
-    A flight is written a few messages per step, so that what goes on meanwhile is not missed.
+    A flight is written a few messages per step, so that no new values are missed meanwhile.
     """
 
     period_s = 0.04
@@ -55,10 +54,10 @@ class RecorderNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._folder = folder
         self._wall_ns = wall_ns
-        self._watcher = Watcher()
+        self._detector = TriggerDetector()
         self._debounce = debounce or Debounce()
         self._writing: _Writing | None = None
-        self._memory: Memory
+        self._history: TopicHistory
         self._events: RingWriter
         self._status: CellWriter
         self._status_due_ns = 0
@@ -67,32 +66,32 @@ class RecorderNode:
         self._rolling = None if rolling is None else rolling(self._space)
 
     def start(self) -> None:
-        """Open every topic of the schema table; what is still in the rings counts."""
+        """Open every topic; what is still in the rings is read as well."""
         self._started_ns = self._clock.now_ns()
-        self._memory = Memory(self._space)
+        self._history = TopicHistory(self._space)
         self._events = self._space.ring_writer("flight_event")
         self._status = self._space.cell_writer("recorder_status")
         if self._rolling is not None:
             self._rolling.start()
 
     def step(self) -> None:
-        """Remember what is new, look for a reason to write, and write a bit."""
+        """Read what is new, look for triggers, and write some messages."""
         now_ns = self._clock.now_ns()
-        self._look(now_ns)
+        self._detect(now_ns)
         if self._writing is None:
             self._begin(now_ns)
         else:
-            self._go_on(self._writing)
-        self._tell_status(now_ns)
+            self._continue(self._writing)
+        self._report_status(now_ns)
 
     def stop(self) -> None:
         """Write what waits to be written, and close the topics.
 
-        A supervisor that was killed tells nobody: this process then has another parent.
+        A killed supervisor is recognised by the changed parent of this process.
         """
         if os.getppid() != self._parent_pid:
             now_ns = self._clock.now_ns()
-            self._notice(Trigger(kind=Kind.CRASH, what="supervisor", at_ns=now_ns))
+            self._notice(FlightTrigger(kind=TriggerKind.CRASH, what="supervisor", at_ns=now_ns))
         self._finish()
         self._begin(math.inf)
         self._finish()
@@ -100,61 +99,63 @@ class RecorderNode:
             self._rolling.stop()
         self._space.close()
 
-    # --- look ---------------------------------------------------------------------------------
+    # --- detect -------------------------------------------------------------------------------
 
-    def _look(self, now_ns: int) -> None:
-        find: dict[str, Callable[[dict[str, Any], int], list[Trigger]]] = {
-            "control_status": self._watcher.status,
-            "process_table": self._watcher.table,
+    def _detect(self, now_ns: int) -> None:
+        find: dict[str, Callable[[dict[str, Any], int], list[FlightTrigger]]] = {
+            "control_status": self._detector.status,
+            "process_table": self._detector.table,
             "flight_request": self._request,
         }
-        new = self._memory.refresh(now_ns)
+        new = self._history.refresh(now_ns)
         if self._rolling is not None:
-            self._rolling.step(now_ns, new, self._memory.newest)
+            self._rolling.step(now_ns, new, self._history.newest)
         for channel, kept in new:
             if channel in find:
                 for trigger in find[channel](json.loads(kept.payload), kept.stamp_ns):
                     self._notice(trigger)
 
-    def _request(self, request: dict[str, Any], at_ns: int) -> list[Trigger]:
+    def _request(self, request: dict[str, Any], at_ns: int) -> list[FlightTrigger]:
         if at_ns < self._started_ns:
             return []
         reason = str(request.get("reason", ""))
-        return [Trigger(kind=Kind.REQUEST, what="request", at_ns=at_ns, detail=reason)]
+        return [FlightTrigger(kind=TriggerKind.REQUEST, what="request", at_ns=at_ns, detail=reason)]
 
-    def _notice(self, trigger: Trigger) -> None:
+    def _notice(self, trigger: FlightTrigger) -> None:
         _log.info("%s: %s %s", trigger.kind.value, trigger.what, trigger.detail)
         self._debounce.add(trigger)
 
     # --- write --------------------------------------------------------------------------------
 
     def _begin(self, now_ns: float) -> None:
-        """Begin a flight when one is due; `inf` takes whatever waits."""
+        """Begin a flight when one is due; `inf` takes all triggers that wait."""
         causes = self._debounce.take(now_ns)
         if not causes:
             return
         wall_ns, run_ns = self._wall_ns(), self._clock.now_ns()
         try:
-            part = self._folder.unfinished(_label(wall_ns, causes[0]))
+            what = re.sub(r"[^a-z0-9_]+", "_", causes[0].what.lower())[:40]
+            part = self._folder.unfinished(dated(wall_ns, what))
         except OSError as error:
             self._failed(causes, error)
             return
-        head = FlightHead(
-            run_id=self._context.run_dir.resolve().name,
-            robot=self._context.robot,
-            profile=self._context.profile,
+        values, ticks = self._history.snapshot(run_ns)
+        progress = write_flight(
+            part,
+            self._context,
+            causes,
+            values,
+            ticks,
             wall_offset_ns=wall_ns - run_ns,
-            triggers=tuple(causes),
+            at_once=MESSAGES_AT_ONCE,
         )
-        values, ticks = self._memory.snapshot(run_ns)
-        progress = write_flight(part, head, values, ticks, at_once=MESSAGES_AT_ONCE)
         self._writing = _Writing(part, causes, progress)
 
     def _finish(self) -> None:
         while self._writing is not None:
-            self._go_on(self._writing)
+            self._continue(self._writing)
 
-    def _go_on(self, writing: _Writing) -> None:
+    def _continue(self, writing: _Writing) -> None:
         try:
             for _ in writing.progress:
                 return
@@ -164,27 +165,22 @@ class RecorderNode:
             self._failed(writing.causes, error)
         else:
             _log.info("saved %s", final)
-            self._tell("saved", writing.causes, file=str(final))
+            self._publish("saved", writing.causes, file=str(final))
         self._writing = None
 
-    def _failed(self, causes: list[Trigger], error: OSError) -> None:
+    def _failed(self, causes: list[FlightTrigger], error: OSError) -> None:
         reason = f"{self._folder.path}: {error.strerror or error}"
         _log.error("no flight saved of %s: %s; make room on that disk", causes[0].what, reason)
-        self._tell("failed", causes, reason=reason)
+        self._publish("failed", causes, reason=reason)
 
-    def _tell_status(self, now_ns: int) -> None:
+    def _report_status(self, now_ns: int) -> None:
         if now_ns < self._status_due_ns:
             return
         self._status_due_ns = now_ns + NS_PER_S // 2
         self._status.put_document(
-            {"writing": self._writing is not None, "held_bytes": self._memory.held_bytes}
+            {"writing": self._writing is not None, "held_bytes": self._history.held_bytes}
         )
 
-    def _tell(self, event: str, causes: list[Trigger], **details: str) -> None:
+    def _publish(self, event: str, causes: list[FlightTrigger], **details: str) -> None:
         whats = [cause.what for cause in causes[:_SHOWN_CAUSES]]
         self._events.publish({"event": event, "causes": whats, **details})
-
-
-def _label(wall_ns: int, cause: Trigger) -> str:
-    what = re.sub(r"[^a-z0-9_]+", "_", cause.what.lower())[:40]
-    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}-{what}"

@@ -1,4 +1,4 @@
-"""Tell a flight's story: what control, the judge, the processes and the operators did, and when."""
+"""List what control, safety rules, processes and operators did in a flight, and when."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -6,13 +6,13 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.telemetry.channels import TICKS
-from vla_deploy.telemetry.flight import Flight, Message
+from vla_deploy.telemetry.recorded_file import RecordedFile, RecordedMessage
 
 Document = Mapping[str, Any]
 Line = dict[str, Any]
 
 
-def time_line(flight: Flight) -> list[Line]:
+def time_line(flight: RecordedFile) -> list[Line]:
     """Return the lines by time; 0 s is the first cause.
 
     Raises:
@@ -21,8 +21,8 @@ def time_line(flight: Flight) -> list[Line]:
     zero_ns = flight.causes[0]["at_ns"] if flight.causes else flight.end_ns
     lines = [_line(zero_ns, one["at_ns"], "recorder", _cause(one)) for one in flight.causes]
     before: dict[str, list[str]] = {}
-    for message in flight.messages(*_TELLERS):
-        for who, text in _told(message, before):
+    for message in flight.messages(*_SOURCES):
+        for who, text in _new_texts(message, before):
             lines.append(_line(zero_ns, message.stamp_ns, who, text))
     return sorted(lines, key=lambda line: line["at_s"])
 
@@ -37,12 +37,12 @@ def _cause(cause: Document) -> str:
     )
 
 
-def _told(message: Message, before: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
-    """Return what a message says that the one before it in its topic did not say."""
-    who, tell, is_state = _TELLERS[message.topic]
-    texts = [text for text in tell(message.document()) if text]
-    known = before.get(message.topic, []) if is_state else []
-    before[message.topic] = texts
+def _new_texts(message: RecordedMessage, before: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
+    """Yield what a message says that the one before it in its topic did not say."""
+    who, texts_of, is_state = _SOURCES[message.channel]
+    texts = [text for text in texts_of(message.document()) if text]
+    known = before.get(message.channel, []) if is_state else []
+    before[message.channel] = texts
     yield from ((who, text) for text in texts if text not in known)
 
 
@@ -74,8 +74,8 @@ def _task(event: Document) -> list[str]:
     return [json.dumps(shown)]
 
 
-# Who speaks, how, and whether only what is new of it counts.
-_TELLERS: Mapping[str, tuple[str, Callable[[Document], list[str]], bool]] = {
+# By topic: the source's name, its texts, and whether only texts that are new are listed.
+_SOURCES: Mapping[str, tuple[str, Callable[[Document], list[str]], bool]] = {
     "control_status": ("control", _control, True),
     "process_table": ("supervisor", _processes, True),
     TICKS: ("judge", _judge, True),

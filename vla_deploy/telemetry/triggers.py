@@ -1,10 +1,10 @@
-"""Decide what calls for a flight to be written, and when: pure, on documents and time stamps."""
+"""Decide what triggers the writing of a flight, and when: pure, on documents and stamps."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 
@@ -14,38 +14,44 @@ _MAX_CAUSES = 50
 _SELF = "recorder"
 
 
-class Kind(Enum):
-    """Name what calls for a flight."""
+class TriggerKind(Enum):
+    """Name the kinds of triggers."""
 
     STOP = "stop"
     CRASH = "crash"
     REQUEST = "request"
 
 
-# How long after it the flight goes on.
-AFTER_S: Mapping[Kind, float] = {Kind.STOP: 3.0, Kind.CRASH: 3.0, Kind.REQUEST: 0.0}
+# Kept in memory: 30 s before a trigger, a few after it, and the time until they are written.
+KEPT_NS: Final = 36 * NS_PER_S
+# How long after its trigger a flight goes on.
+AFTER_S: Mapping[TriggerKind, float] = {
+    TriggerKind.STOP: 3.0,
+    TriggerKind.CRASH: 3.0,
+    TriggerKind.REQUEST: 0.0,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trigger:
-    """Say what happened, and when."""
+class FlightTrigger:
+    """Describe what happened, and when."""
 
-    kind: Kind
+    kind: TriggerKind
     what: str
     at_ns: int
     detail: str = ""
 
 
 @dataclass(slots=True)
-class Watcher:
-    """Compare control's status and the process table with what they were."""
+class TriggerDetector:
+    """Compare control's status and the process table with those before."""
 
     _stopped_by: str | None = None
     _rows: dict[str, tuple[str, int]] = field(default_factory=dict)
     _has_status: bool = False
 
-    def status(self, document: Mapping[str, Any], at_ns: int) -> list[Trigger]:
-        """Return a trigger when the robot comes to a stop, or when its cause changes."""
+    def status(self, document: Mapping[str, Any], at_ns: int) -> list[FlightTrigger]:
+        """Return a trigger when the robot stops, or when the cause of its stop changes."""
         state, cause = str(document["state"]), str(document["cause"])
         stopped_by = None if state in _IN_SERVICE or not cause else cause  # a disarm has no cause
         before, self._stopped_by = self._stopped_by, stopped_by
@@ -53,23 +59,25 @@ class Watcher:
         if not known or stopped_by is None or stopped_by == before:
             return []
         detail = str(document.get("detail", ""))
-        return [Trigger(kind=Kind.STOP, what=stopped_by, at_ns=at_ns, detail=detail)]
+        return [FlightTrigger(kind=TriggerKind.STOP, what=stopped_by, at_ns=at_ns, detail=detail)]
 
-    def table(self, document: Mapping[str, Any], at_ns: int) -> list[Trigger]:
-        """Return a trigger for each process that has ended by itself, the recorder included."""
+    def table(self, document: Mapping[str, Any], at_ns: int) -> list[FlightTrigger]:
+        """Return a trigger for each process that has crashed, the recorder included."""
         triggers = []
         for row in document["processes"]:
             state, restarts = str(row["state"]), int(row["restarts"])
             before = self._rows.get(row["name"])
             self._rows[row["name"]] = (state, restarts)
             if before is None and row["name"] == _SELF:
-                before = ("", 0)  # what it was about to write is lost with it: write it now
+                before = ("", 0)  # the flight that it was about to write is lost: write it now
             if before is None or before[0] in _TROUBLE:
                 continue
             if state in _TROUBLE or restarts > before[1]:
                 detail = str(row["reason"] or f"exit code {row['exit_code']}")
                 triggers.append(
-                    Trigger(kind=Kind.CRASH, what=str(row["name"]), at_ns=at_ns, detail=detail)
+                    FlightTrigger(
+                        kind=TriggerKind.CRASH, what=str(row["name"]), at_ns=at_ns, detail=detail
+                    )
                 )
         return triggers
 
@@ -78,20 +86,20 @@ class Watcher:
 class Debounce:
     """Put triggers that come close together into one flight.
 
-    After a flight the next waits until `gap_s` have gone by, which loses nothing as long as that is
-    less than what is remembered; a request waits for nothing.
+    The next flight waits until `gap_s` after the last one, which loses nothing while that is less
+    than the time kept in memory; a request does not wait.
     """
 
     gap_s: float = 20.0
     longest_s: float = 10.0
-    _waiting: list[Trigger] = field(default_factory=list)
+    _waiting: list[FlightTrigger] = field(default_factory=list)
     _due_ns: float = math.inf
     _written_ns: float = -math.inf
 
-    def add(self, trigger: Trigger) -> None:
-        """Take one trigger in."""
+    def add(self, trigger: FlightTrigger) -> None:
+        """Add one trigger."""
         wanted_ns = trigger.at_ns + AFTER_S[trigger.kind] * NS_PER_S
-        if trigger.kind is Kind.REQUEST:
+        if trigger.kind is TriggerKind.REQUEST:
             self._due_ns = wanted_ns
         elif not self._waiting:
             self._due_ns = max(wanted_ns, self._written_ns + self.gap_s * NS_PER_S)
@@ -101,8 +109,8 @@ class Debounce:
         if len(self._waiting) < _MAX_CAUSES:
             self._waiting.append(trigger)
 
-    def take(self, now_ns: float) -> list[Trigger]:
-        """Return what a flight is due for, once; `inf` asks for everything that waits."""
+    def take(self, now_ns: float) -> list[FlightTrigger]:
+        """Return, once, the triggers of the flight that is due; with `inf`, all that wait."""
         if not self._waiting or now_ns < self._due_ns:
             return []
         due, self._waiting = self._waiting, []

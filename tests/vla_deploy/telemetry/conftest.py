@@ -1,17 +1,37 @@
-"""Give the tests a robot in the twin with a flight recorder on board, in lock-step."""
+"""Provide a clock, a run, and a robot in the twin with a flight recorder, in lock-step."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from drivers.clock import NS_PER_S
 from sim_twin.harness.stack import LockstepControl
-from vla_deploy.telemetry.flight import Flight, read_flight
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
+from vla_deploy.telemetry.recorded_file import RecordedFile, read_flight
 
 WALL_NS = 1_800_000_000_000_000_000
+
+
+class StepClock:
+    """Stand still until a test moves it; `each` runs after every wait."""
+
+    def __init__(self) -> None:
+        self.time_ns = 100 * NS_PER_S
+        self.each: Callable[[], None] = lambda: None
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def wall_ns(self) -> int:
+        return WALL_NS + self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+        self.each()
 
 
 class Rig(LockstepControl):
@@ -31,7 +51,7 @@ class Rig(LockstepControl):
         self.run(0.1)  # what was so before its first look would call for no flight
 
     def settle(self) -> None:
-        """Wait until whatever arming called for has been over for a second."""
+        """Wait until the robot has been armed without any cause for a second."""
         clear_ns = self.lockstep.clock.now_ns()
         for _ in range(100):
             self.run(0.1)
@@ -59,12 +79,12 @@ class Rig(LockstepControl):
             self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
             self.run(0.02)
 
-    def flights(self) -> list[Flight]:
-        return [read_flight(path) for path in self.folder.flights()]
+    def flights(self) -> list[RecordedFile]:
+        return [read_flight(path) for path in self.folder.files()]
 
-    def wait_for_flight(self) -> Flight:
-        before = len(self.folder.flights())
-        assert self.lockstep.run_until(lambda: len(self.folder.flights()) > before, 60.0)
+    def wait_for_flight(self) -> RecordedFile:
+        before = len(self.folder.files())
+        assert self.lockstep.run_until(lambda: len(self.folder.files()) > before, 60.0)
         return self.flights()[-1]
 
 
@@ -72,10 +92,25 @@ class Rig(LockstepControl):
 class Stopped:
     """Hold the flight of a drive that an operator stopped at `stopped_ns`."""
 
-    flight: Flight
+    flight: RecordedFile
     stopped_ns: int
     now_ns: int
     ticks_before: int
+
+
+@pytest.fixture
+def clock() -> StepClock:
+    return StepClock()
+
+
+@pytest.fixture
+def context(tmp_path: Path, clock: StepClock) -> NodeContext:
+    """Return the context of a run whose topics the test writes."""
+    run_dir = tmp_path / "base" / "run"
+    (run_dir / "logs").mkdir(parents=True)
+    return NodeContext(
+        run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
+    )
 
 
 @pytest.fixture
@@ -87,7 +122,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stopped]:
-    """Drive for four seconds, stop, and let whoever only reads look at the one flight."""
+    """Drive for four seconds and stop; the tests that only read share the flight."""
     rig = Rig(tmp_path_factory.mktemp("stopped"))
     ticks_before = rig.status()["tick"]
     rig.drive(4.0)

@@ -61,7 +61,7 @@ def wheel_blocked(stack: LockstepControl) -> None:
 
 
 def zone_entered_and_left(stack: LockstepControl) -> None:
-    """Let a box be held before the base, where the lidar sees it, and be taken away again."""
+    """Hold a box before the base, where the lidar sees it, then take it away."""
     stack.add_senses()
     drive(stack, 0.8, w_rad_s=0.0)
     engine = stack.lockstep.twin.engine
@@ -72,7 +72,7 @@ def zone_entered_and_left(stack: LockstepControl) -> None:
 
 
 def arm_blocked(stack: LockstepControl) -> None:
-    """Let an arm meet a stop that gives no way; reset and arm once it has eased off."""
+    """Block an arm by a hard stop; reset and arm once it has eased off."""
     reach(stack, 0.8, left_shoulder_pitch=1.5, left_elbow=0.6)
     model, data = stack.lockstep.twin.engine.model, stack.lockstep.twin.engine.data
     joint = model.joint("left_shoulder_pitch")
@@ -115,7 +115,7 @@ def record(name: str, to: Path) -> None:
         stack.arm()
         SCENES[name](stack)
         stack.space.ring_writer("flight_request").publish({"source": "example", "reason": name})
-        if not stack.lockstep.run_until(lambda: bool(folder.flights()), 30.0):
+        if not stack.lockstep.run_until(lambda: bool(folder.files()), 30.0):
             sys.exit(f"{name}: no flight was written")
         shutil.copyfile(folder.find("latest"), to)
         stack.close()

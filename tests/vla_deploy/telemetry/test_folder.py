@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.telemetry.errors import FlightMissing
-from vla_deploy.telemetry.folder import Bounds, FlightFolder, folder_of
+from vla_deploy.telemetry.folder import FlightFolder, FolderBounds, folder_of
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -17,7 +17,7 @@ def saved(folder, label="x", size=10):
 
 
 def names(folder):
-    return [path.name for path in folder.flights()]
+    return [path.name for path in folder.files()]
 
 
 def test_flights_are_numbered_whatever_the_clock_says(tmp_path):
@@ -27,18 +27,18 @@ def test_flights_are_numbered_whatever_the_clock_says(tmp_path):
     assert names(folder) == ["000001-20990101-b.mcap", "000002-19700101-a.mcap"]
 
 
-def test_the_oldest_goes_when_there_are_too_many(tmp_path):
-    folder = FlightFolder(tmp_path, Bounds(files=3, spare_bytes=0))
-    for _ in range(5):
-        saved(folder)
-    assert names(folder) == [f"00000{number}-x.mcap" for number in (3, 4, 5)]
-
-
-def test_the_oldest_goes_when_they_are_too_large(tmp_path):
-    folder = FlightFolder(tmp_path, Bounds(total_bytes=250, spare_bytes=0))
+@pytest.mark.parametrize(
+    ("bounds", "left"),
+    [
+        (FolderBounds(files=3, spare_bytes=0), (3, 4, 5)),
+        (FolderBounds(total_bytes=250, spare_bytes=0), (4, 5)),
+    ],
+)
+def test_the_oldest_go_when_there_are_too_many_or_they_are_too_large(tmp_path, bounds, left):
+    folder = FlightFolder(tmp_path, bounds)
     for _ in range(5):
         saved(folder, size=100)
-    assert names(folder) == ["000004-x.mcap", "000005-x.mcap"]
+    assert names(folder) == [f"00000{number}-x.mcap" for number in left]
 
 
 def test_the_newest_stays_however_full_the_disk_is(tmp_path, monkeypatch):

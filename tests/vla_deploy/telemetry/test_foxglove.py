@@ -3,7 +3,6 @@
 import json
 import struct
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import jsonschema_rs
@@ -21,33 +20,12 @@ MESSAGE_DATA = 1
 HEAD = struct.Struct("<BIQ")
 
 
-class HandClock:
-    def __init__(self) -> None:
-        self.time_ns = 50 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-
-
 class Watched:
-    def __init__(self, run_dir: Path) -> None:
-        (run_dir / "logs").mkdir(parents=True)
-        self.clock = HandClock()
-        context = NodeContext(
-            run_dir=run_dir,
-            robot="butler",
-            profile="desktop",
-            devices_dir=None,
-            clock=self.clock,
-        )
-        self.space = SharedSpace(run_dir / "ipc", self.clock)
+    def __init__(self, context: NodeContext, clock: Any) -> None:
+        self.clock = clock
+        self.space = SharedSpace(context.run_dir / "ipc", clock)
         self.base = self.space.cell_writer("base_state")
-        self.node = FoxgloveNode(
-            context, FoxgloveSettings(port=0), lambda: self.clock.time_ns + 10**18
-        )
+        self.node = FoxgloveNode(context, FoxgloveSettings(port=0), clock.wall_ns)
         self.node.start()
 
     def step(self) -> None:
@@ -60,8 +38,8 @@ class Watched:
 
 
 @pytest.fixture
-def watched(tmp_path: Path) -> Iterator[Watched]:
-    watched = Watched(tmp_path / "run")
+def watched(context: NodeContext, clock: Any) -> Iterator[Watched]:
+    watched = Watched(context, clock)
     yield watched
     watched.node.stop()
     watched.space.close()

@@ -12,8 +12,8 @@ import pytest
 from vla_deploy.telemetry import node as recorder_node
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
-from vla_deploy.telemetry.flight import read_flight
 from vla_deploy.telemetry.judge import judge_again
+from vla_deploy.telemetry.recorded_file import read_flight
 from vla_deploy.telemetry.timeline import time_line
 
 

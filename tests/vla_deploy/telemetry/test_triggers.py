@@ -1,4 +1,6 @@
-from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
+import pytest
+
+from vla_deploy.telemetry.triggers import Debounce, FlightTrigger, TriggerDetector, TriggerKind
 
 S = 1_000_000_000
 
@@ -23,64 +25,64 @@ def table(**rows):
 
 
 def stop(at_s, what="estop"):
-    return Trigger(kind=Kind.STOP, what=what, at_ns=round(at_s * S))
+    return FlightTrigger(kind=TriggerKind.STOP, what=what, at_ns=round(at_s * S))
 
 
-def causes(watcher, *documents):
-    return [[t.what for t in watcher.status(document, 0)] for document in documents]
-
-
-def test_a_stop_calls_once_when_it_begins():
-    told = causes(
-        Watcher(),
-        status("armed"),
-        status("stopping", "estop"),
-        status("stopped", "estop"),
-        status("disarmed"),
-        status("armed"),
-        status("stopping", "estop"),
-    )
-    assert told == [[], ["estop"], [], [], [], ["estop"]]
-
-
-def test_a_graver_cause_during_a_stop_calls_again():
-    told = causes(
-        Watcher(),
-        status("armed"),
-        status("stopped", "following_error"),
-        status("stopped", "estop"),
-    )
-    assert told == [[], ["following_error"], ["estop"]]
-
-
-def test_a_fault_that_forbids_arming_calls():
-    assert causes(Watcher(), status("disarmed"), status("fault", "can_bus_lost")) == [
-        [],
-        ["can_bus_lost"],
-    ]
-
-
-def test_an_orderly_disarm_and_a_restricted_base_call_nobody():
-    told = causes(Watcher(), status("armed"), status("stopping"), status("armed", "stale_command"))
-    assert told == [[], [], []]
+@pytest.mark.parametrize(
+    ("statuses", "causes"),
+    [
+        pytest.param(
+            [
+                status("armed"),
+                status("stopping", "estop"),
+                status("stopped", "estop"),
+                status("disarmed"),
+                status("armed"),
+                status("stopping", "estop"),
+            ],
+            [[], ["estop"], [], [], [], ["estop"]],
+            id="a stop triggers once, when it begins",
+        ),
+        pytest.param(
+            [status("armed"), status("stopped", "following_error"), status("stopped", "estop")],
+            [[], ["following_error"], ["estop"]],
+            id="another cause during a stop triggers again",
+        ),
+        pytest.param(
+            [status("disarmed"), status("fault", "can_bus_lost")],
+            [[], ["can_bus_lost"]],
+            id="a fault that forbids arming triggers",
+        ),
+        pytest.param(
+            [status("armed"), status("stopping"), status("armed", "stale_command")],
+            [[], [], []],
+            id="an orderly disarm and a restricted base do not trigger",
+        ),
+    ],
+)
+def test_statuses_of_control_trigger(
+    statuses: list[dict[str, str]], causes: list[list[str]]
+) -> None:
+    detector = TriggerDetector()
+    assert [[one.what for one in detector.status(document, 0)] for document in statuses] == causes
 
 
 def test_what_was_so_before_the_recorder_came_calls_nobody():
-    watcher = Watcher()
-    assert watcher.status(status("stopped", "estop"), 0) == []
-    assert watcher.table(table(control=("back-off", 3)), 0) == []
+    detector = TriggerDetector()
+    assert detector.status(status("stopped", "estop"), 0) == []
+    assert detector.table(table(control=("back-off", 3)), 0) == []
 
 
 def test_a_recorder_that_comes_after_one_that_crashed_calls():
-    watcher = Watcher()
-    (trigger,) = watcher.table(table(control=("ready", 3), recorder=("starting", 1)), 5)
-    assert (trigger.kind, trigger.what, trigger.detail) == (Kind.CRASH, "recorder", "killed")
-    assert watcher.table(table(control=("ready", 3), recorder=("ready", 1)), 6) == []
-    assert Watcher().table(table(recorder=("starting", 0)), 5) == []
+    detector = TriggerDetector()
+    (trigger,) = detector.table(table(control=("ready", 3), recorder=("starting", 1)), 5)
+    assert (trigger.kind, trigger.what, trigger.detail) == (TriggerKind.CRASH, "recorder", "killed")
+    assert detector.table(table(control=("ready", 3), recorder=("ready", 1)), 6) == []
+    assert TriggerDetector().table(table(recorder=("starting", 0)), 5) == []
 
 
 def test_each_crash_of_a_process_calls_once():
-    watcher = Watcher()
+    detector = TriggerDetector()
     rows = (
         ("ready", 0),
         ("back-off", 0),
@@ -89,15 +91,15 @@ def test_each_crash_of_a_process_calls_once():
         ("ready", 2),  # the back-off in between was too short to be seen
         ("given up", 2),
     )
-    told = [[t.what for t in watcher.table(table(control=row), 0)] for row in rows]
+    told = [[t.what for t in detector.table(table(control=row), 0)] for row in rows]
     assert told == [[], ["control"], [], [], ["control"], ["control"]]
 
 
 def test_an_orderly_stop_of_a_process_is_no_crash():
-    watcher = Watcher()
-    watcher.table(table(planner=("ready", 0)), 0)
-    assert watcher.table(table(planner=("stopping", 0)), 0) == []
-    assert watcher.table(table(planner=("stopped", 0)), 0) == []
+    detector = TriggerDetector()
+    detector.table(table(planner=("ready", 0)), 0)
+    assert detector.table(table(planner=("stopping", 0)), 0) == []
+    assert detector.table(table(planner=("stopped", 0)), 0) == []
 
 
 def test_a_flight_goes_on_for_three_seconds_after_its_cause():
@@ -128,7 +130,7 @@ def test_a_request_waits_for_nothing():
     debounce = Debounce()
     debounce.add(stop(10))
     assert debounce.take(13 * S)
-    debounce.add(Trigger(kind=Kind.REQUEST, what="request", at_ns=14 * S))
+    debounce.add(FlightTrigger(kind=TriggerKind.REQUEST, what="request", at_ns=14 * S))
     assert debounce.take(14 * S)
 
 

@@ -57,4 +57,4 @@ def handed_out(name: str, known: Iterable[Path], where: str) -> FileResponse:
 
 
 def _flights(request: Request) -> list[Path]:
-    return FlightFolder(folder_of(request.app.state.link.base)).flights()
+    return FlightFolder(folder_of(request.app.state.link.base)).files()

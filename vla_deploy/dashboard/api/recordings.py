@@ -13,7 +13,7 @@ from vla_deploy.dashboard.errors import Refused
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
-from vla_deploy.telemetry.recording.request import LONGEST_S, STOP, RecordingWish, checked
+from vla_deploy.telemetry.recording.request import LONGEST_S, STOP, RecordingRequest, checked
 
 router = APIRouter(tags=["recordings"])
 
@@ -65,8 +65,8 @@ def start(request: Request, wanted: Wanted | None = None) -> Asked:
     link = request.app.state.link
     asked = wanted or Wanted()
     try:
-        wish = checked(
-            RecordingWish(
+        asked_for = checked(
+            RecordingRequest(
                 topics=tuple(asked.topics),
                 without=tuple(asked.without),
                 duration_s=asked.duration_s,
@@ -82,7 +82,7 @@ def start(request: Request, wanted: Wanted | None = None) -> Asked:
             str(refusal),
             "names as in vla-deploy record topics",
         ) from refusal
-    link.publish("recording_request", wish.document())
+    link.publish("recording_request", asked_for.document())
     return Asked()
 
 

@@ -14,8 +14,9 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.runtime.state_dir import state_dir_of
-from vla_deploy.telemetry.metrics import READ_TOPICS, Looker, Readings, read
-from vla_deploy.telemetry.trends import SeriesMaker, TrendStore, TrendsUnavailable
+from vla_deploy.telemetry.errors import TrendsUnavailable
+from vla_deploy.telemetry.metrics import READ_TOPICS, Readings, TopicSampler, read
+from vla_deploy.telemetry.trends import SeriesMaker, TrendStore
 
 PERIOD_NS: Final = NS_PER_S
 TRENDS_DIR: Final = "trends"
@@ -33,7 +34,7 @@ class Metering:
         self._link = link
         self._clients = clients
         self._wall_ns = wall_ns
-        self._looker = Looker(link.space, link.clock, READ_TOPICS, joint_names)
+        self._sampler = TopicSampler(link.space, link.clock, READ_TOPICS, joint_names)
         self._series = SeriesMaker()
         self._due_ns = 0
         self._look_s = 0.0
@@ -54,7 +55,7 @@ class Metering:
             "left_out": self._left_out,
             "clients": self._clients(),
         }
-        readings = read(self._looker.look(own))
+        readings = read(self._sampler.snapshot(own))
         self._look_s = (self._link.clock.now_ns() - begun_ns) / NS_PER_S
         self._left_out = readings.left_out
         return readings

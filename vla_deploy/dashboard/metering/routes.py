@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from vla_deploy.dashboard.access import Role, require
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.telemetry.diagnostics import diagnostics
 from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, Readings, expose
+from vla_deploy.telemetry.metrics.diagnostics import diagnostics
 from vla_deploy.telemetry.trends import KEPT, LEVELS, Trends, TrendStore, level_for, unit_of
 
 _Viewer: Final = Depends(require(Role.VIEWER))

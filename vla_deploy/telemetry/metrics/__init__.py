@@ -1,36 +1,34 @@
 """What is measured of the robot: one table, and how it is read out of the topics."""
 
-from vla_deploy.telemetry.metrics.exposition import expose
-from vla_deploy.telemetry.metrics.kinds import (
-    MOST_SERIES,
+from vla_deploy.telemetry.metrics.metric import (
+    MAX_SERIES,
     PREFIX,
     Histogram,
-    Kind,
     Metric,
-    Missing,
+    MetricKind,
+    MissingMetric,
+    MissingReason,
     Point,
-    Why,
 )
-from vla_deploy.telemetry.metrics.look import Look, Looker, Told
-from vla_deploy.telemetry.metrics.reading import Readings, read
+from vla_deploy.telemetry.metrics.prometheus import expose
+from vla_deploy.telemetry.metrics.reading import Readings, TopicSampler, TopicSnapshot, read
 from vla_deploy.telemetry.metrics.table import METRICS, METRICS_BY_NAME, READ_TOPICS
 
 __all__ = [
+    "MAX_SERIES",
     "METRICS",
     "METRICS_BY_NAME",
-    "MOST_SERIES",
     "PREFIX",
     "READ_TOPICS",
     "Histogram",
-    "Kind",
-    "Look",
-    "Looker",
     "Metric",
-    "Missing",
+    "MetricKind",
+    "MissingMetric",
+    "MissingReason",
     "Point",
     "Readings",
-    "Told",
-    "Why",
+    "TopicSampler",
+    "TopicSnapshot",
     "expose",
     "read",
 ]

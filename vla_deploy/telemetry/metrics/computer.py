@@ -1,101 +1,69 @@
 """Declare what is measured of the computer: each metric is a reading of the probes."""
 
-from collections.abc import Iterator
 from typing import Final
 
-from vla_deploy.telemetry.metrics.kinds import Kind, Metric
-from vla_deploy.telemetry.metrics.paths import Among, At, Each, keys
+from vla_deploy.telemetry.metrics.metric import Metric
+from vla_deploy.telemetry.metrics.paths import PathStep, among, at, each, keys, path
 
 TOPIC: Final = "board"
-
-# name, reading, unit, goes to the history, help
-_ROWS: Final[tuple[tuple[str, str, str, bool, str], ...]] = (
-    ("cpu_used_ratio", "cpu_ratio", "ratio", True, "Share of all cores that is busy."),
-    ("cpu_frequency_hertz", "cpu_frequency_hz", "hertz", False, "Clock of the fastest cores."),
-    ("memory_total_bytes", "memory_total_bytes", "bytes", False, "Memory of the computer."),
-    (
-        *("memory_available_bytes", "memory_available_bytes", "bytes", True),
-        "Memory that programs can still get.",
-    ),
-    ("swap_used_bytes", "swap_used_bytes", "bytes", False, "Swap in use."),
-    (
-        *("gpu_memory_used_bytes", "gpu_memory_used_bytes", "bytes", True),
-        "Memory that the GPU holds; on a Jetson it is part of the same memory.",
-    ),
-    ("gpu_load_ratio", "gpu_load_ratio", "ratio", True, "Share of time that the GPU is busy."),
-    ("gpu_frequency_hertz", "gpu_frequency_hz", "hertz", False, "Clock of the GPU."),
-    ("emc_load_ratio", "emc_load_ratio", "ratio", False, "Use of the memory bus."),
-    ("power_watts", "power_w", "watts", True, "Power that the board takes."),
-    (
-        *("temperature_celsius", "temperature_c", "celsius", True),
-        "Temperature of the hottest zone that can be read.",
-    ),
-    ("fan_rpm", "fan_rpm", "rpm", False, "Revolutions of the fan per minute."),
-    ("fan_drive_ratio", "fan_drive_ratio", "ratio", False, "How hard the fan is driven."),
-    ("power_mode", "power_mode_id", "", False, "Id of the power mode, as nvpmodel names it."),
-    (
-        *("disk_free_bytes", "disk_free_bytes", "bytes", True),
-        "Room on the tightest of the disks that the robot writes to.",
-    ),
-    (
-        *("disk_free_ratio", "disk_free_ratio", "ratio", False),
-        "Share that is free of the tightest of the disks that the robot writes to.",
-    ),
-)
-
-# name, what the names of the readings begin with, unit, label, help
-_FAMILIES: Final[tuple[tuple[str, str, str, str, str], ...]] = (
-    ("power_rail_watts", "power_w.", "watts", "rail", "Power of one rail of the board."),
-    (
-        *("zone_temperature_celsius", "temperature_c.", "celsius", "zone"),
-        "Temperature of one thermal zone.",
-    ),
-    (
-        *("throttle_events_total", "throttle_count.", "", "kind"),
-        "Under-voltage (oc1), average (oc2) and instantaneous (oc3) over-current since boot.",
-    ),
-)
+_PRESSURES: Final = {name: f"psi_{name}_ratio" for name in ("cpu", "memory", "io")}
 
 
-def _singles() -> Iterator[Metric]:
-    for name, reading, unit, kept, text in _ROWS:
-        yield Metric(
-            name=f"vla_{name}",
-            kind=Kind.GAUGE,
-            unit=unit,
-            help=text,
-            topic=TOPIC,
-            paths=((At(("readings", reading)),),),
-            kept=kept,
-        )
+def _gauge(name: str, text: str, *, reading: str = "", kept: bool = False) -> Metric:
+    """Declare one reading; its own name is given where the metric has another one."""
+    return Metric(f"vla_{name}", text, at(f"readings.{reading or name}"), topic=TOPIC, kept=kept)
 
 
-def _families() -> Iterator[Metric]:
-    for name, prefix, unit, label, text in _FAMILIES:
-        yield Metric(
-            name=f"vla_{name}",
-            kind=Kind.COUNTER if name.endswith("_total") else Kind.GAUGE,
-            unit=unit,
-            help=text,
-            topic=TOPIC,
-            paths=((keys("readings"), Each(label, prefix)),),
-        )
+def _family(name: str, text: str, step: PathStep) -> Metric:
+    """Declare readings that differ in a label."""
+    return Metric(f"vla_{name}", text, path(keys("readings"), step), topic=TOPIC)
 
 
 METRICS: Final[tuple[Metric, ...]] = (
-    *_singles(),
-    *_families(),
-    Metric(
-        name="vla_pressure_ratio",
-        kind=Kind.GAUGE,
-        unit="ratio",
-        help="Share of the last 10 s in which something waited for CPU, memory or disk.",
-        topic=TOPIC,
-        paths=(
-            (
-                keys("readings"),
-                Among("resource", {name: f"psi_{name}_ratio" for name in ("cpu", "memory", "io")}),
-            ),
-        ),
+    _gauge("cpu_used_ratio", "Share of all cores that is busy.", reading="cpu_ratio", kept=True),
+    _gauge("cpu_frequency_hertz", "Clock of the fastest cores.", reading="cpu_frequency_hz"),
+    _gauge("memory_total_bytes", "Memory of the computer."),
+    _gauge("memory_available_bytes", "Memory that programs can still get.", kept=True),
+    _gauge("swap_used_bytes", "Swap in use."),
+    _gauge(
+        "gpu_memory_used_bytes",
+        "Memory that the GPU holds; on a Jetson it is part of the same memory.",
+        kept=True,
+    ),
+    _gauge("gpu_load_ratio", "Share of time that the GPU is busy.", kept=True),
+    _gauge("gpu_frequency_hertz", "Clock of the GPU.", reading="gpu_frequency_hz"),
+    _gauge("emc_load_ratio", "Use of the memory bus."),
+    _gauge("power_watts", "Power that the board takes.", reading="power_w", kept=True),
+    _gauge(
+        "temperature_celsius",
+        "Temperature of the hottest zone that can be read.",
+        reading="temperature_c",
+        kept=True,
+    ),
+    _gauge("fan_rpm", "Revolutions of the fan per minute."),
+    _gauge("fan_drive_ratio", "How hard the fan is driven."),
+    _gauge("power_mode", "Id of the power mode, as nvpmodel names it.", reading="power_mode_id"),
+    _gauge(
+        "disk_free_bytes", "Room on the tightest of the disks that the robot writes to.", kept=True
+    ),
+    _gauge(
+        "disk_free_ratio",
+        "Share that is free of the tightest of the disks that the robot writes to.",
+    ),
+    _family("power_rail_watts", "Power of one rail of the board.", each("rail", "power_w.")),
+    _family(
+        "zone_temperature_celsius",
+        "Temperature of one thermal zone.",
+        each("zone", "temperature_c."),
+    ),
+    _family(
+        "throttle_events_total",
+        "Under-voltage (oc1), average (oc2) and instantaneous (oc3) over-current since boot.",
+        each("kind", "throttle_count."),
+    ),
+    _family(
+        "pressure_ratio",
+        "Share of the last 10 s in which something waited for CPU, memory or disk.",
+        among("resource", _PRESSURES),
     ),
 )

@@ -1,37 +1,36 @@
-"""Declare what is wrong when: one table for Prometheus' alerts and for ROS 2 diagnostics."""
+"""Declare the alert conditions: one table for Prometheus' alerts and for ROS 2 diagnostics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from vla_deploy.telemetry.metrics.kinds import Metric, Point
+from vla_deploy.telemetry.metrics.metric import Metric, Point
 from vla_deploy.telemetry.metrics.table import METRICS_BY_NAME
 
-_STATES: Final = "state"
 
-
-class Severity(IntEnum):
-    """Order how bad something is; the numbers are the levels of diagnostic_msgs."""
+class AlertSeverity(IntEnum):
+    """Order the severities; the numbers are the levels of diagnostic_msgs."""
 
     WARNING = 1
     CRITICAL = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
-    """Call it wrong when a metric is beyond a limit for `for_s`.
+@dataclass(frozen=True, slots=True)
+class AlertCondition:
+    """Declare that a metric beyond a limit for `for_s` is an alert.
 
-    `where` names label values, one of which each label must have. With `per_s` it is about what a
-    counter gains per second over that time, or, with `of`, for each that the counter `of` gains.
+    `where` lists for a label the values that count. With `per_s` the condition is about the rate
+    of a counter over that time or, with `of`, about its rate relative to that of the counter `of`.
     """
 
     name: str
-    severity: Severity
+    severity: AlertSeverity
     metric: str
     summary: str
     remedy: str
-    above: float | None = None
+    _: KW_ONLY
+    above: float | None = 0.0
     below: float | None = None
     for_s: int = 0
     where: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -39,7 +38,7 @@ class Condition:
     of: str = ""
 
     def holds(self, point: Point) -> bool:
-        """Tell whether a value is beyond the limit; one look knows no counter's gain."""
+        """Return whether a value is beyond the limit; never for a rate, as one value has none."""
         if self.per_s or not isinstance(point.value, float):
             return False
         labels = dict(zip(self.declared.labels, point.labels, strict=True))
@@ -55,172 +54,133 @@ class Condition:
         return METRICS_BY_NAME[self.metric]
 
 
-_WARNING: Final = Severity.WARNING
-_CRITICAL: Final = Severity.CRITICAL
+_WARNING: Final = AlertSeverity.WARNING
+_CRITICAL: Final = AlertSeverity.CRITICAL
 
 
-def _state(
-    name: str, severity: Severity, metric: str, states: tuple[str, ...], *texts: str, for_s: int = 0
-) -> Condition:
-    """Declare that some states of a metric are wrong."""
-    summary, remedy = texts
-    label = METRICS_BY_NAME[metric].state_label
-    return Condition(
-        name=name,
-        severity=severity,
-        metric=metric,
-        where={label: states},
-        above=0.0,
-        for_s=for_s,
-        summary=summary,
-        remedy=remedy,
-    )
-
-
-def _above(
-    name: str, severity: Severity, metric: str, limit: float, *texts: str, for_s: int = 0
-) -> Condition:
-    """Declare that too much of a gauge is wrong."""
-    summary, remedy = texts
-    return Condition(
-        name=name,
-        severity=severity,
-        metric=metric,
-        above=limit,
-        for_s=for_s,
-        summary=summary,
-        remedy=remedy,
-    )
-
-
-CONDITIONS: Final[tuple[Condition, ...]] = (
-    _above(
-        *("VlaEstopLatched", _WARNING, "vla_estop_latched", 0.0),
+CONDITIONS: Final[tuple[AlertCondition, ...]] = (
+    AlertCondition(
+        *("VlaEstopLatched", _WARNING, "vla_estop_latched"),
         *("The emergency stop is latched.", "See why, then: vla-deploy reset, vla-deploy arm"),
     ),
-    _state(
+    AlertCondition(
         *("VlaSafetyStop", _WARNING, "vla_safety_reaction"),
-        ("protective_stop", "hold", "base_off", "group_stop"),
         *("A safety rule has stopped the robot.", "vla-deploy status names cause and limit"),
+        where={"reaction": ("protective_stop", "hold", "base_off", "group_stop")},
         for_s=10,
     ),
-    _state(
-        *("VlaControlFault", _CRITICAL, "vla_control_state", ("fault",)),
+    AlertCondition(
+        *("VlaControlFault", _CRITICAL, "vla_control_state"),
         *("Control cannot be armed.", "vla-deploy status names the cause"),
+        where={"state": ("fault",)},
         for_s=10,
     ),
-    Condition(
-        name="VlaLateTicks",
-        severity=_WARNING,
-        metric="vla_control_late_ticks_total",
+    AlertCondition(
+        *("VlaLateTicks", _WARNING, "vla_control_late_ticks_total"),
+        "More than 1 % of control's ticks come late.",
+        "vla-deploy doctor says what keeps control from its priority",
         of="vla_control_ticks_total",
         per_s=60,
         above=0.01,
         for_s=60,
-        summary="More than 1 % of control's ticks come late.",
-        remedy="vla-deploy doctor says what keeps control from its priority",
     ),
-    _state(
-        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state", ("given up",)),
+    AlertCondition(
+        *("VlaProcessGivenUp", _CRITICAL, "vla_process_state"),
         *("A process has failed too often and is given up.", "vla-deploy logs, vla-deploy crashes"),
+        where={"state": ("given up",)},
     ),
-    Condition(
-        name="VlaProcessRestarts",
-        severity=_WARNING,
-        metric="vla_process_restarts_total",
+    AlertCondition(
+        *("VlaProcessRestarts", _WARNING, "vla_process_restarts_total"),
+        *("A process is started again and again.", "vla-deploy crashes"),
         per_s=600,
         above=0.003,
-        summary="A process is started again and again.",
-        remedy="vla-deploy crashes",
     ),
-    _above(
-        *("VlaTopicsLate", _WARNING, "vla_process_alarms", 0.0),
+    AlertCondition(
+        *("VlaTopicsLate", _WARNING, "vla_process_alarms"),
         *("A process' topics are too old, too slow or not valid.", "vla-deploy status"),
         for_s=10,
     ),
-    Condition(
-        name="VlaCommandsRefused",
-        severity=_CRITICAL,
-        metric="vla_commands_taken",
+    AlertCondition(
+        *("VlaCommandsRefused", _CRITICAL, "vla_commands_taken"),
+        *("The robot takes no commands.", "vla-deploy status says why"),
+        above=None,
         below=1.0,
         for_s=5,
-        summary="The robot takes no commands.",
-        remedy="vla-deploy status says why",
     ),
-    _above(
-        *("VlaBudgetBroken", _WARNING, "vla_budget_over", 0.0),
+    AlertCondition(
+        *("VlaBudgetBroken", _WARNING, "vla_budget_over"),
         *("A budget is broken.", "vla-deploy budget shows the line and what is done about it"),
         for_s=30,
     ),
-    _above(
-        *("VlaBudgetStop", _CRITICAL, "vla_budget_stop", 0.0),
+    AlertCondition(
+        *("VlaBudgetStop", _CRITICAL, "vla_budget_stop"),
         *("A budget has stopped the robot.", "vla-deploy budget says which"),
     ),
-    _state(
-        *("VlaBusDegraded", _WARNING, "vla_bus_state", ("degraded",)),
+    AlertCondition(
+        *("VlaBusDegraded", _WARNING, "vla_bus_state"),
         *("A servo bus loses answers.", "Look at cable, connectors and supply"),
+        where={"state": ("degraded",)},
         for_s=30,
     ),
-    _state(
-        *("VlaBusLost", _CRITICAL, "vla_bus_state", ("lost",)),
+    AlertCondition(
+        *("VlaBusLost", _CRITICAL, "vla_bus_state"),
         *("A servo bus has used up its error budget.", "Look at cable, connectors and supply"),
+        where={"state": ("lost",)},
     ),
-    Condition(
-        name="VlaBusFaults",
-        severity=_WARNING,
-        metric="vla_bus_faults_total",
+    AlertCondition(
+        *("VlaBusFaults", _WARNING, "vla_bus_faults_total"),
+        "Something goes wrong on a bus more than once a second.",
+        "vla-deploy status --json has the counters; look at the wiring",
         per_s=60,
         above=1.0,
         for_s=60,
-        summary="Something goes wrong on a bus more than once a second.",
-        remedy="vla-deploy status --json has the counters; look at the wiring",
     ),
-    _above(
-        *("VlaJointWarm", _WARNING, "vla_joint_temperature_celsius", 65.0),
+    AlertCondition(
+        *("VlaJointWarm", _WARNING, "vla_joint_temperature_celsius"),
         *("A joint's servo is warm.", "Let it rest, or give it less to hold"),
+        above=65.0,
         for_s=60,
     ),
-    _above(
-        *("VlaJointError", _CRITICAL, "vla_joint_hardware_error", 0.0),
+    AlertCondition(
+        *("VlaJointError", _CRITICAL, "vla_joint_hardware_error"),
         *("A joint's servo reports a hardware error.", "vla-deploy servo monitor; then reset"),
     ),
-    _above(
-        *("VlaComputerHot", _WARNING, "vla_temperature_celsius", 85.0),
+    AlertCondition(
+        *("VlaComputerHot", _WARNING, "vla_temperature_celsius"),
         *("The computer is hot.", "Look at fan and airflow; vla-deploy budget"),
+        above=85.0,
         for_s=60,
     ),
-    Condition(
-        name="VlaPowerFault",
-        severity=_CRITICAL,
-        metric="vla_throttle_events_total",
+    AlertCondition(
+        *("VlaPowerFault", _CRITICAL, "vla_throttle_events_total"),
+        "The supply of the computer fails: under-voltage or average over-current.",
+        "Look at battery, cable and power mode",
         where={"kind": ("oc1", "oc2")},
         per_s=60,
-        above=0.0,
-        summary="The supply of the computer fails: under-voltage or average over-current.",
-        remedy="Look at battery, cable and power mode",
     ),
-    Condition(
-        name="VlaDiskNearlyFull",
-        severity=_WARNING,
-        metric="vla_disk_free_ratio",
+    AlertCondition(
+        *("VlaDiskNearlyFull", _WARNING, "vla_disk_free_ratio"),
+        "A disk that the robot writes to is nearly full.",
+        "Make room; the robot's own logs and recordings are bounded",
+        above=None,
         below=0.05,
         for_s=60,
-        summary="A disk that the robot writes to is nearly full.",
-        remedy="Make room; the robot's own logs and recordings are bounded",
     ),
-    _state(
-        *("VlaPlaceLost", _WARNING, "vla_place_state", ("lost",)),
+    AlertCondition(
+        *("VlaPlaceLost", _WARNING, "vla_place_state"),
         *("The robot does not know where it is.", "vla-deploy status says why"),
+        where={"state": ("lost",)},
         for_s=10,
     ),
-    _above(
-        *("VlaSensorAway", _WARNING, "vla_perception_sensors_away", 0.0),
+    AlertCondition(
+        *("VlaSensorAway", _WARNING, "vla_perception_sensors_away"),
         *("A sensor gives nothing.", "vla-deploy doctor"),
         for_s=10,
     ),
-    _state(
-        *("VlaSightByForm", _WARNING, "vla_perception_sight", ("form",)),
+    AlertCondition(
+        *("VlaSightByForm", _WARNING, "vla_perception_sight"),
         *("The robot names things without its network.", "vla-deploy status says why"),
+        where={"mode": ("form",)},
         for_s=60,
     ),
 )

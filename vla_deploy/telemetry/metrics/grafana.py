@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from itertools import count
 from typing import Any, Final
 
-from vla_deploy.telemetry.metrics import computer, control, flow, minds, processes
-from vla_deploy.telemetry.metrics.kinds import Kind, Metric
+from vla_deploy.telemetry.metrics import computer, control, model_metrics, processes
+from vla_deploy.telemetry.metrics.metric import Metric, MetricKind
+from vla_deploy.telemetry.metrics.table import FLOW
 
 _WIDTH: Final = 24
 _COLUMNS: Final = 3
@@ -30,11 +31,11 @@ _ROWS: Final[tuple[tuple[str, tuple[Metric, ...]], ...]] = (
     ("Computer", computer.METRICS),
     ("Buses", control.BUSES),
     ("Joints and base", control.JOINTS),
-    ("Planning", minds.PLANNING),
-    ("Hearing", minds.HEARING),
-    ("Seeing", minds.SEEING),
-    ("Recorder and twin", minds.KEEPING),
-    ("Topics", flow.METRICS),
+    ("Planning", model_metrics.PLANNING),
+    ("Hearing", model_metrics.HEARING),
+    ("Seeing", model_metrics.SEEING),
+    ("Recorder and twin", model_metrics.KEEPING),
+    ("Topics", FLOW),
 )
 
 
@@ -59,7 +60,7 @@ def _panels() -> Iterator[dict[str, Any]]:
         place = {"h": 1, "w": _WIDTH, "x": 0, "y": y}
         yield {"id": next(numbers), "type": "row", "title": title, "gridPos": place, "panels": []}
         y += 1
-        shown = [metric for metric in metrics if metric.kind is not Kind.INFO]
+        shown = [metric for metric in metrics if metric.kind is not MetricKind.INFO]
         for place_number, metric in enumerate(shown):
             line, column = divmod(place_number, _COLUMNS)
             width = _WIDTH // _COLUMNS
@@ -69,7 +70,7 @@ def _panels() -> Iterator[dict[str, Any]]:
 
 
 def _panel(number: int, metric: Metric, place: dict[str, int]) -> dict[str, Any]:
-    kind = "state-timeline" if metric.kind is Kind.STATES else "timeseries"
+    kind = "state-timeline" if metric.kind is MetricKind.STATES else "timeseries"
     return {
         "id": number,
         "type": kind,
@@ -93,13 +94,13 @@ def query(metric: Metric) -> str:
     """Return what a panel asks for: counters by the second, histograms by their 99 %."""
     chosen = f'{metric.name}{{instance=~"$robot"}}'
     match metric.kind:
-        case Kind.COUNTER:
+        case MetricKind.COUNTER:
             return f"rate({chosen}[$__rate_interval])"
-        case Kind.HISTOGRAM:
+        case MetricKind.HISTOGRAM:
             by = ", ".join(("le", *metric.labels))
             buckets = f'{metric.name}_bucket{{instance=~"$robot"}}'
             return f"histogram_quantile(0.99, sum by ({by}) (rate({buckets}[$__rate_interval])))"
-        case Kind.STATES:
+        case MetricKind.STATES:
             return f"{chosen} == 1"
         case _:
             return chosen
@@ -110,7 +111,7 @@ def _legend(metric: Metric) -> str:
 
 
 def _unit(metric: Metric) -> str:
-    if metric.kind is Kind.COUNTER:
+    if metric.kind is MetricKind.COUNTER:
         return "percentunit" if metric.unit == "seconds" else "cps"
     return _UNITS.get(metric.unit, "short")
 

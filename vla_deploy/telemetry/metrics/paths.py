@@ -1,177 +1,125 @@
-"""Lead through a told document to the values of a metric, and name their labels on the way."""
+"""Follow a path through a topic's document to the values of a metric, and collect their labels."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 LONGEST_LABEL: Final = 64
+Found = tuple[Any, tuple[object, ...]]
+"""A value, and the values of the labels that its step adds."""
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Stand somewhere in a document: what is told there, and the label values up to it."""
+class PathStep:
+    """Lead from a value to values inside it, to none where they are missing.
 
-    told: Any
-    labels: tuple[str, ...] = ()
-
-    def at(self, told: Any, *labels: object) -> "Place":
-        """Return a place further inside."""
-        return Place(told, (*self.labels, *(str(label)[:LONGEST_LABEL] for label in labels)))
-
-
-class Step(Protocol):
-    """Go on from one place to others; to none, where the document does not tell."""
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Return the names of the labels that this step adds."""
-        ...
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield the places that this step leads to."""
-        ...
-
-
-Path = tuple[Step, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class At:
-    """Follow keys."""
-
-    keys: tuple[str, ...]
-    labels: tuple[str, ...] = ()
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield what the last key has."""
-        told = place.told
-        for key in self.keys:
-            if not isinstance(told, Mapping) or key not in told:
-                return
-            told = told[key]
-        yield place.at(told)
-
-
-@dataclass(frozen=True, slots=True)
-class Named:
-    """Follow one key, and label what is there by a name of our own."""
-
-    key: str
-    label: str
-    name: str
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Return the one label."""
-        return (self.label,)
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield what the key has."""
-        if isinstance(place.told, Mapping) and self.key in place.told:
-            yield place.at(place.told[self.key], self.name)
-
-
-@dataclass(frozen=True, slots=True)
-class Each:
-    """Follow every key of an object; the key, less a prefix that all must have, is the label."""
-
-    label: str
-    prefix: str = ""
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Return the one label."""
-        return (self.label,)
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield every member."""
-        if not isinstance(place.told, Mapping):
-            return
-        for key, told in place.told.items():
-            if key.startswith(self.prefix):
-                yield place.at(told, key.removeprefix(self.prefix))
-
-
-@dataclass(frozen=True, slots=True)
-class Among:
-    """Follow keys that are known beforehand, each by its label value; those not told are left."""
-
-    label: str
-    keys: Mapping[str, str]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Return the one label."""
-        return (self.label,)
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield every member that is told."""
-        if not isinstance(place.told, Mapping):
-            return
-        for name, key in self.keys.items():
-            if key in place.told:
-                yield place.at(place.told[key], name)
-
-
-@dataclass(frozen=True, slots=True)
-class Rows:
-    """Follow every row of a list that has what `where` asks; columns of it are the labels.
-
-    A null column is the whole robot's: its label is "total".
+    `labels` names the labels that the step adds, `key` the last key that `keys` looks up.
     """
 
-    columns: Mapping[str, str]
-    where: tuple[tuple[str, object], ...] = ()
+    follow: Callable[[Any], Iterator[Found]]
+    labels: tuple[str, ...] = ()
+    key: str = ""
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Return a label for each column."""
-        return tuple(self.columns)
 
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield the rows."""
-        if not isinstance(place.told, Sequence):
-            return
-        for row in place.told:
-            if all(row.get(key) == wanted for key, wanted in self.where):
-                names = (row.get(column) for column in self.columns.values())
-                yield place.at(row, *("total" if name is None else name for name in names))
+Path = tuple[PathStep, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
-    """Take facts of an object as the labels of one value that is always 1."""
+class PathMatch:
+    """Carry a value found in a document, and the values of its labels."""
 
-    labels: tuple[str, ...]
-
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield the one place, where every fact is told."""
-        if isinstance(place.told, Mapping) and all(label in place.told for label in self.labels):
-            yield place.at(1, *(place.told[label] for label in self.labels))
+    value: Any
+    labels: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Joints:
-    """Follow an array in joint order; the joints' names come with the document."""
+def keys(dotted: str) -> PathStep:
+    """Return the step that looks up keys, written with dots between them."""
+    names = dotted.split(".")
 
-    key: str
-    labels: tuple[str, ...] = ("joint",)
+    def follow(value: Any) -> Iterator[Found]:
+        for name in names:
+            if not isinstance(value, Mapping) or name not in value:
+                return
+            value = value[name]
+        yield value, ()
 
-    def go(self, place: Place) -> Iterator[Place]:
-        """Yield the value of every joint."""
-        names, told = place.told.get("joint_names", ()), place.told.get(self.key, ())
-        for name, value in zip(names, told, strict=False):
-            yield place.at(value, name)
-
-
-def keys(dotted: str) -> At:
-    """Return the step that follows keys, written with dots between them."""
-    return At(tuple(dotted.split(".")))
+    return PathStep(follow, key=names[-1])
 
 
-def same(label: str, *names: str) -> Among:
-    """Return the step that follows keys which are the label values, too."""
-    return Among(label, {name: name for name in names})
+def path(*steps: PathStep) -> tuple[Path, ...]:
+    """Return the paths of a metric that has one."""
+    return (steps,)
+
+
+def at(dotted: str) -> tuple[Path, ...]:
+    """Return the paths of a metric whose value is found by keys alone."""
+    return path(keys(dotted))
+
+
+def each(label: str, prefix: str = "") -> PathStep:
+    """Return the step to every member of an object whose key has a prefix.
+
+    The rest of the key is the label.
+    """
+
+    def follow(value: Any) -> Iterator[Found]:
+        if isinstance(value, Mapping):
+            for key, member in value.items():
+                if key.startswith(prefix):
+                    yield member, (key.removeprefix(prefix),)
+
+    return PathStep(follow, (label,))
+
+
+def among(label: str, key_of: Mapping[str, str]) -> PathStep:
+    """Return the step to known keys, each under its own value of the label."""
+
+    def follow(value: Any) -> Iterator[Found]:
+        if isinstance(value, Mapping):
+            yield from ((value[key], (name,)) for name, key in key_of.items() if key in value)
+
+    return PathStep(follow, (label,))
+
+
+def same(label: str, *names: str) -> PathStep:
+    """Return the step to known keys, which are the label's values as well."""
+    return among(label, {name: name for name in names})
+
+
+def rows(columns: Mapping[str, str], **where: object) -> PathStep:
+    """Return the step to the rows of a list that have all values of `where`.
+
+    `columns` maps labels to columns. Null in a column stands for the whole robot: label "total".
+    """
+
+    def follow(value: Any) -> Iterator[Found]:
+        if isinstance(value, Sequence):
+            for row in value:
+                if all(row.get(key) == wanted for key, wanted in where.items()):
+                    names = (row.get(column) for column in columns.values())
+                    yield row, tuple("total" if name is None else name for name in names)
+
+    return PathStep(follow, tuple(columns))
+
+
+def facts(*labels: str) -> PathStep:
+    """Return the step that makes members of an object the labels of one value, always 1."""
+
+    def follow(value: Any) -> Iterator[Found]:
+        if isinstance(value, Mapping) and all(label in value for label in labels):
+            yield 1, tuple(value[label] for label in labels)
+
+    return PathStep(follow, labels)
+
+
+def joints(key: str) -> PathStep:
+    """Return the step to every item of an array in joint order, labelled by `joint_names`."""
+
+    def follow(value: Any) -> Iterator[Found]:
+        names, values = value.get("joint_names", ()), value.get(key, ())
+        yield from ((one, (name,)) for name, one in zip(names, values, strict=False))
+
+    return PathStep(follow, ("joint",))
 
 
 def labels_of(path: Path) -> tuple[str, ...]:
@@ -179,9 +127,13 @@ def labels_of(path: Path) -> tuple[str, ...]:
     return tuple(label for step in path for label in step.labels)
 
 
-def walk(path: Path, document: Any) -> list[Place]:
-    """Return every place that a path leads to."""
-    places = [Place(document)]
+def walk(path: Path, document: Any) -> list[PathMatch]:
+    """Return everything that a path leads to."""
+    matches = [PathMatch(document)]
     for step in path:
-        places = [found for place in places for found in step.go(place)]
-    return places
+        matches = [
+            PathMatch(value, (*match.labels, *(str(label)[:LONGEST_LABEL] for label in labels)))
+            for match in matches
+            for value, labels in step.follow(match.value)
+        ]
+    return matches

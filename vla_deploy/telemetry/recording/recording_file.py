@@ -1,39 +1,33 @@
-"""Write one recording: what it is of, what was so when it began, then what comes."""
+"""Write one file of a recording."""
 
 import contextlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from importlib.metadata import version
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.channels import TOPIC_CHANNELS, Channel
-from vla_deploy.telemetry.mcap_file import McapFile
-from vla_deploy.telemetry.recording.batch import Message
-from vla_deploy.telemetry.recording.selection import Selection
+from vla_deploy.telemetry.mcap_file import RECORDING, McapFile, run_metadata
+from vla_deploy.telemetry.recording.messages import DraftMessage
+from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.schemas.views import CHANNELS
 
-METADATA: Final = "recording"
 ALL_CHANNELS: Final[tuple[Channel, ...]] = (*TOPIC_CHANNELS, *CHANNELS)
 """The channels of every topic and every view."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordedRun:
-    """Say whose values are recorded."""
-
-    run_id: str
-    robot: str
-    profile: str
-
-
 class RecordingFile:
-    """Hold one open file; stamps that precede its beginning are taken for its beginning."""
+    """Hold one open file; messages older than it are placed at its beginning."""
 
     def __init__(
-        self, path: Path, run: RecordedRun, selection: Selection, began_ns: int, offset_ns: int
+        self,
+        path: Path,
+        context: NodeContext,
+        selection: ChannelSelection,
+        began_ns: int,
+        offset_ns: int,
     ) -> None:
-        """Begin a file at a moment of the run's clock; `offset_ns` makes wall clock of that.
+        """Begin a file at a moment of the run's clock; adding `offset_ns` gives wall clock.
 
         Raises:
             OSError: the disk refuses it.
@@ -45,12 +39,13 @@ class RecordingFile:
         self._stream = path.open("wb")
         try:
             channels = [one for one in ALL_CHANNELS if selection.takes(one.topic)]
-            self._mcap = McapFile(self._stream, channels, METADATA, self._metadata(run))
+            metadata = {**run_metadata(context), "wall_offset_ns": str(offset_ns)}
+            self._mcap = McapFile(self._stream, channels, RECORDING, metadata)
         except OSError:
             self._stream.close()
             raise
 
-    def add(self, messages: Iterable[Message]) -> None:
+    def add(self, messages: Iterable[DraftMessage]) -> None:
         """Add messages.
 
         Raises:
@@ -63,7 +58,7 @@ class RecordingFile:
             self.messages += 1
 
     def flush(self) -> int:
-        """Hand everything to the kernel and return how many bytes the file has.
+        """Flush everything to the kernel and return the file's size in bytes.
 
         Raises:
             OSError: the disk refuses it.
@@ -72,7 +67,7 @@ class RecordingFile:
         return self._stream.tell()
 
     def finish(self) -> None:
-        """Make it a whole file.
+        """Write the index and close the file.
 
         Raises:
             OSError: the disk refuses it.
@@ -83,15 +78,6 @@ class RecordingFile:
             self._stream.close()
 
     def abandon(self) -> None:
-        """Let go of a file that the disk refuses; what is whole of it can be recovered."""
+        """Close a file that the disk refuses; its whole messages can be recovered."""
         with contextlib.suppress(OSError):  # it closes the file all the same
             self._stream.close()
-
-    def _metadata(self, run: RecordedRun) -> Mapping[str, str]:
-        return {
-            "run_id": run.run_id,
-            "robot": run.robot,
-            "profile": run.profile,
-            "vla_deploy": version("vla-deploy"),
-            "wall_offset_ns": str(self.offset_ns),
-        }

@@ -1,14 +1,15 @@
-"""Check what is asked of the recorder: to begin a recording, or to end it."""
+"""Describe a requested recording: which channels, for how long; check requests."""
 
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from fnmatch import fnmatchcase
 from typing import Any, Final
 
 from vla_deploy.telemetry.errors import RecordingRefused
-from vla_deploy.telemetry.recording.selection import EVERYTHING, Selection
 
+EVERYTHING: Final = ("*",)
 START: Final = "start"
 STOP: Final = "stop"
 LONGEST_S: Final = 7 * 24 * 3600.0
@@ -18,8 +19,54 @@ _PATTERN_LETTERS: Final = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingWish:
-    """Say what is to be recorded; without `duration_s` it goes on until it is ended."""
+class ChannelSelection:
+    """Choose what one of `topics` matches and none of `without`; `*`, `?`, `[...]` are wildcards.
+
+    The name of a topic stands for all its channels: `rgbd` for `rgbd/colour` and `rgbd/depth`.
+    """
+
+    topics: tuple[str, ...] = EVERYTHING
+    without: tuple[str, ...] = ()
+    _known: dict[str, bool] = field(default_factory=dict, repr=False, compare=False)
+
+    def takes(self, channel: str) -> bool:
+        """Return whether a channel is chosen."""
+        known = self._known.get(channel)
+        if known is None:
+            known = _matches(channel, self.topics) and not _matches(channel, self.without)
+            self._known[channel] = known
+        return known
+
+    def takes_any_of(self, topic: str) -> bool:
+        """Return whether a topic or one of an image's two channels is chosen."""
+        return self.takes(topic) or any(
+            self.takes(f"{topic}/{part}") for part in ("colour", "depth")
+        )
+
+    def among(self, channels: Iterable[str]) -> tuple[str, ...]:
+        """Return the chosen channels.
+
+        Raises:
+            RecordingRefused: a pattern matches none of them, or nothing is left.
+        """
+        names = tuple(channels)
+        for pattern in (*self.topics, *self.without):
+            if not any(_matches(name, (pattern,)) for name in names):
+                raise RecordingRefused(
+                    f"no topic matches {pattern!r}; there are, for instance, "
+                    f"{', '.join(names[:3])}; see: vla-deploy record topics"
+                )
+        chosen = tuple(name for name in names if self.takes(name))
+        if not chosen:
+            raise RecordingRefused(
+                f"topics {', '.join(self.topics)} without {', '.join(self.without)} leaves nothing"
+            )
+        return chosen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingRequest:
+    """Describe a recording to be made; without `duration_s` it goes on until stopped."""
 
     topics: tuple[str, ...] = EVERYTHING
     without: tuple[str, ...] = ()
@@ -28,20 +75,20 @@ class RecordingWish:
     source: str = ""
 
     @property
-    def selection(self) -> Selection:
+    def selection(self) -> ChannelSelection:
         """Return the choice of channels."""
-        return Selection(topics=self.topics, without=self.without)
+        return ChannelSelection(topics=self.topics, without=self.without)
 
     def document(self) -> dict[str, Any]:
-        """Return the request as `recording_request` carries it."""
+        """Return the document for the topic `recording_request`."""
         return {"act": START, **asdict(self)}
 
 
-def wish_of(document: Mapping[str, Any]) -> RecordingWish:
-    """Return what a request wants recorded.
+def parse_request(document: Mapping[str, Any]) -> RecordingRequest:
+    """Return the recording that a document on `recording_request` asks for.
 
     Raises:
-        RecordingRefused: a value is of another type, or out of range; all of them are told.
+        RecordingRefused: values are of another type, or out of range; the text has all of them.
     """
     known = {name: document[name] for name in _CHECKS if document.get(name) is not None}
     faults = [
@@ -55,7 +102,7 @@ def wish_of(document: Mapping[str, Any]) -> RecordingWish:
         name: tuple(value) if name in ("topics", "without") else value
         for name, value in known.items()
     }
-    return RecordingWish(**values)
+    return RecordingRequest(**values)
 
 
 def _are_patterns(value: object) -> bool:
@@ -84,12 +131,17 @@ _CHECKS: Final[Mapping[str, tuple[Any, str]]] = {
 }
 
 
-def checked(wish: RecordingWish, channels: Iterable[str]) -> RecordingWish:
-    """Return a wish whose patterns all match something.
+def checked(request: RecordingRequest, channels: Iterable[str]) -> RecordingRequest:
+    """Return a request after checking its values and that each pattern matches a channel.
 
     Raises:
-        RecordingRefused: one of its values cannot be, or a pattern matches no channel.
+        RecordingRefused: a value is out of range, or a pattern matches no channel.
     """
-    wish_of(wish.document())
-    wish.selection.among(channels)
-    return wish
+    parse_request(request.document())
+    request.selection.among(channels)
+    return request
+
+
+def _matches(channel: str, patterns: Iterable[str]) -> bool:
+    topic = channel.partition("/")[0]
+    return any(fnmatchcase(channel, pattern) or fnmatchcase(topic, pattern) for pattern in patterns)

@@ -9,17 +9,16 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from vla_deploy.runtime.state_dir import config_dir_of
-from vla_deploy.telemetry.errors import SettingsInvalid
-from vla_deploy.telemetry.folder import Bounds
-from vla_deploy.telemetry.recording.request import RecordingWish
-from vla_deploy.telemetry.recording.selection import EVERYTHING
+from vla_deploy.telemetry.errors import RecordingSettingsInvalid
+from vla_deploy.telemetry.folder import FolderBounds
+from vla_deploy.telemetry.recording.request import EVERYTHING, RecordingRequest
 
 SETTINGS_FILE: Final = "recording.toml"
 _STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class RecordingSettings(BaseModel):
-    """Say what is recorded without being asked, and how much of the disk recordings may take."""
+    """Configure what is always recorded, and the bounds of files and folder."""
 
     model_config = _STRICT
 
@@ -34,18 +33,18 @@ class RecordingSettings(BaseModel):
     image_period_s: float = Field(default=0.5, ge=0.05, le=3600.0)
 
     @property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> FolderBounds:
         """Return the bounds of the folder."""
-        return Bounds(
+        return FolderBounds(
             files=self.files,
             total_bytes=round(self.total_mb * 1e6),
             spare_bytes=round(self.spare_mb * 1e6),
         )
 
     @property
-    def wish(self) -> RecordingWish:
-        """Return what is recorded always."""
-        return RecordingWish(
+    def request(self) -> RecordingRequest:
+        """Return the recording that is always made."""
+        return RecordingRequest(
             topics=tuple(self.topics),
             without=tuple(self.without),
             label="always",
@@ -54,7 +53,7 @@ class RecordingSettings(BaseModel):
 
 
 class FoxgloveSettings(BaseModel):
-    """Say where viewers are served live, and what they see."""
+    """Configure where viewers are served live, and which topics they get."""
 
     model_config = _STRICT
 
@@ -91,7 +90,7 @@ def read_settings(base: Path) -> TelemetrySettings:
     """Return the settings of the runs of a runtime directory; the defaults where there is no file.
 
     Raises:
-        SettingsInvalid: it is no TOML, or has faults; all of them are listed.
+        RecordingSettingsInvalid: it is no TOML, or has faults; all of them are listed.
     """
     file = config_dir_of(base) / SETTINGS_FILE
     try:
@@ -99,11 +98,11 @@ def read_settings(base: Path) -> TelemetrySettings:
     except FileNotFoundError:
         return TelemetrySettings()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsInvalid((f"{file}: expected a TOML document: {error}",)) from error
+        raise RecordingSettingsInvalid((f"{file}: expected a TOML document: {error}",)) from error
     try:
         return TelemetrySettings.model_validate(document)
     except ValidationError as error:
-        raise SettingsInvalid(tuple(_faults(file, error))) from error
+        raise RecordingSettingsInvalid(tuple(_faults(file, error))) from error
 
 
 def _faults(file: Path, error: ValidationError) -> Iterator[str]:

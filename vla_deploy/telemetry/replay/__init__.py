@@ -1,1 +1,1 @@
-"""Show what was recorded as if it were happening: the topics of a run, and nobody to command."""
+"""Replay a recording or a flight: the topics of a run are fed from the file."""

@@ -3,36 +3,43 @@
 import base64
 import json
 import logging
+import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+import cv2
+import numpy as np
+
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import BY_NAME, BadPayload, SharedSpace, Topic, TopicKind
+from vla_deploy.ipc import (
+    BY_NAME,
+    BadPayload,
+    FrameWriter,
+    PackedField,
+    SharedSpace,
+    Topic,
+    TopicKind,
+)
 from vla_deploy.ipc.memory.layout import is_document
 from vla_deploy.ipc.replay_mark import LIVE_OWNERS
 from vla_deploy.telemetry.channels import tick_bytes
-from vla_deploy.telemetry.recording.batch import LOG_CHANNEL
-from vla_deploy.telemetry.replay.decoding import (
-    document_of,
-    fields_of,
-    image_payload,
-    shifted,
-)
-from vla_deploy.telemetry.replay.source import Recorded
+from vla_deploy.telemetry.recorded_file import RecordedMessage
+from vla_deploy.telemetry.schemas.foxglove_json import LOG_LEVELS
+from vla_deploy.telemetry.schemas.views import LOG
 
 _OWN: Final = frozenset({"replay_request", "replay_status"})
-_LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
-_LOOK_NS: Final = NS_PER_S // 10  # a recorder looks that seldom, at the most
+_READ_PERIOD_NS: Final = NS_PER_S // 10  # of a recorder, at most
+_STAMP_SUFFIX: Final = "_ns"
 _IMAGE_PARTS: Final = ("colour", "depth")
 LASTING: Final = (TopicKind.CELL, TopicKind.FRAME)
-"""Topics whose value is so until the next one comes."""
+"""Topics whose value is valid until the next one."""
 _log = logging.getLogger(__name__)
 
 
 def fed_topics() -> tuple[Topic, ...]:
-    """Return the topics that a file may speak for: not those of processes that run now."""
+    """Return the topics to be fed from a file: not those of processes that run now."""
     return tuple(
         topic
         for topic in BY_NAME.values()
@@ -40,8 +47,8 @@ def fed_topics() -> tuple[Topic, ...]:
     )
 
 
-class Feeder:
-    """Write what was recorded, as fresh as it was then; `unfit` counts what does not fit."""
+class TopicFeeder:
+    """Write recorded messages as new values; `unfit` counts those that do not fit their topic."""
 
     def __init__(self, space: SharedSpace, logs: Path, clock: Clock) -> None:
         self.unfit = 0
@@ -49,91 +56,84 @@ class Feeder:
         self._logs = logs
         self._clock = clock
         self._topics = {topic.name: topic for topic in fed_topics()}
-        self._puts: dict[str, Callable[[Recorded], None]] = {}
+        self._writers: dict[str, Any] = {}
         self._images: dict[str, tuple[int, dict[str, bytes]]] = {}
-        self._lasting: dict[str, Recorded] = {}
+        self._lasting: dict[str, RecordedMessage] = {}
         logs.mkdir(parents=True, exist_ok=True)
 
     def hold(self, at_ns: int) -> None:
-        """Show what was in time at a moment of the file as in time again: the file stands there."""
+        """Write again what was fresh at a moment of the file, while the replay stands there."""
         for message in tuple(self._lasting.values()):
             deadline_s = self._topics[message.channel.partition("/")[0]].deadline_s
-            allowed_ns = deadline_s * NS_PER_S + _LOOK_NS
+            allowed_ns = deadline_s * NS_PER_S + _READ_PERIOD_NS
             if not deadline_s or at_ns - message.at_ns <= allowed_ns:
                 self.feed(message)
 
-    def feed(self, message: Recorded) -> None:
-        """Put one message into its topic; what no longer fits the topic is left out, counted."""
+    def feed(self, message: RecordedMessage) -> None:
+        """Put one message into its topic; one that does not fit is left out and counted."""
         topic, _, _ = message.channel.partition("/")
         if topic in self._topics and self._topics[topic].kind in LASTING:
             self._lasting[message.channel] = message
         try:
-            if message.channel == LOG_CHANNEL:
+            if message.channel == LOG:
                 self._log_line(message)
             elif topic in self._topics:
-                self._put_of(topic)(message)
+                self._put(self._topics[topic], message)
         except (BadPayload, ValueError, KeyError, TypeError) as error:
             if not self.unfit:
                 _log.warning("%s: left out: %s", message.channel, error)
             self.unfit += 1
 
-    def _put_of(self, name: str) -> Callable[[Recorded], None]:
-        if name not in self._puts:
-            topic = self._topics[name]
-            kind = topic.kind
-            is_packed = kind is TopicKind.CELL and not is_document(topic)
-            self._puts[name] = self._packed(topic) if is_packed else _OPENERS[kind](self, name)
-        return self._puts[name]
+    def _put(self, topic: Topic, message: RecordedMessage) -> None:
+        writer = self._writer(topic)
+        match topic.kind:
+            case TopicKind.CELL if is_document(topic):
+                writer.put_document(self._shifted(message))
+            case TopicKind.CELL:
+                writer.put(**fields_of(topic, message.document()))
+            case TopicKind.RING:
+                writer.publish(self._shifted(message))
+            case TopicKind.RECORD:
+                writer.append(tick_bytes(message.text))
+            case TopicKind.FRAME:
+                self._put_image(topic.name, writer, message)
 
-    def _packed(self, topic: Topic) -> Callable[[Recorded], None]:
-        writer = self._space.cell_writer(topic.name)
-        return lambda message: writer.put(**fields_of(topic, document_of(message.text)))
+    def _writer(self, topic: Topic) -> Any:
+        """Return the writer of a topic, opened when first needed."""
+        if topic.name not in self._writers:
+            openers: Mapping[TopicKind, Callable[[str], Any]] = {
+                TopicKind.CELL: self._space.cell_writer,
+                TopicKind.RING: self._space.ring_writer,
+                TopicKind.RECORD: self._space.record_writer,
+                TopicKind.FRAME: self._space.frame_writer,
+            }
+            self._writers[topic.name] = openers[topic.kind](topic.name)
+        return self._writers[topic.name]
 
-    def _document(self, name: str) -> Callable[[Recorded], None]:
-        writer = self._space.cell_writer(name)
-        return lambda message: writer.put_document(self._shifted(message))
+    def _put_image(self, name: str, writer: FrameWriter, message: RecordedMessage) -> None:
+        """Keep one part of an image, and put the image once it is complete."""
+        sequence, parts = self._images.get(name, (-1, {}))
+        parts = parts if sequence == message.sequence else {}
+        parts[message.channel.partition("/")[2]] = base64.b64decode(message.document()["data"])
+        self._images[name] = message.sequence, parts
+        if all(part in parts for part in _IMAGE_PARTS):
+            payload, width, height = image_payload(parts["colour"], parts["depth"])
+            now_ns = self._clock.now_ns()
+            writer.put(payload, width=width, height=height, stamp_ns=now_ns)
 
-    def _event(self, name: str) -> Callable[[Recorded], None]:
-        writer = self._space.ring_writer(name)
-
-        def publish(message: Recorded) -> None:
-            writer.publish(self._shifted(message))
-
-        return publish
-
-    def _record(self, name: str) -> Callable[[Recorded], None]:
-        writer = self._space.record_writer(name)
-        return lambda message: writer.append(tick_bytes(message.text))
-
-    def _frame(self, name: str) -> Callable[[Recorded], None]:
-        writer = self._space.frame_writer(name)
-
-        def put(message: Recorded) -> None:
-            sequence, parts = self._images.get(name, (-1, {}))
-            parts = parts if sequence == message.sequence else {}
-            data = base64.b64decode(document_of(message.text)["data"])
-            parts[message.channel.partition("/")[2]] = data
-            self._images[name] = message.sequence, parts
-            if all(part in parts for part in _IMAGE_PARTS):
-                payload, width, height = image_payload(parts["colour"], parts["depth"])
-                now_ns = self._clock.now_ns()
-                writer.put(payload, width=width, height=height, stamp_ns=now_ns)
-
-        return put
-
-    def _shifted(self, message: Recorded) -> dict[str, Any]:
+    def _shifted(self, message: RecordedMessage) -> dict[str, Any]:
         shift_ns = self._clock.now_ns() - message.stamp_ns
-        moved: dict[str, Any] = shifted(document_of(message.text), shift_ns)
+        moved: dict[str, Any] = shifted(message.document(), shift_ns)
         return moved
 
-    def _log_line(self, message: Recorded) -> None:
-        """Write a line where `vla-deploy logs` and the dashboard look for it."""
-        line = document_of(message.text)
+    def _log_line(self, message: RecordedMessage) -> None:
+        """Write a line to the log files that `vla-deploy logs` and the dashboard read."""
+        line = message.document()
         at_s = line["timestamp"]["sec"] + line["timestamp"]["nsec"] / NS_PER_S
         written = {
             "stamp_ns": self._clock.now_ns(),
             "time": datetime.fromtimestamp(at_s, UTC).isoformat(timespec="milliseconds"),
-            "level": _LEVELS[line["level"]],
+            "level": LOG_LEVELS[line["level"]],
             "process": line["name"],
             "message": line["message"],
             "file": line["file"],
@@ -145,9 +145,46 @@ class Feeder:
                 log.write(json.dumps(written) + "\n")
 
 
-_OPENERS: Final[Mapping[TopicKind, Callable[[Feeder, str], Callable[[Recorded], None]]]] = {
-    TopicKind.CELL: Feeder._document,
-    TopicKind.RING: Feeder._event,
-    TopicKind.RECORD: Feeder._record,
-    TopicKind.FRAME: Feeder._frame,
-}
+def fields_of(topic: Topic, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a packed cell; what another version did not record is zero."""
+    return {field.name: _value(field, document.get(field.name)) for field in topic.fields}
+
+
+def shifted(document: Any, shift_ns: int) -> Any:
+    """Return a document with its stamps moved from the recorded run's clock into this one's.
+
+    By the naming rule of all topics, a stamp is a whole number whose name ends in `_ns`.
+    """
+    if isinstance(document, dict):
+        return {
+            key: value + shift_ns
+            if key.endswith(_STAMP_SUFFIX) and type(value) is int and value > 0
+            else shifted(value, shift_ns)
+            for key, value in document.items()
+        }
+    if isinstance(document, list):
+        return [shifted(one, shift_ns) for one in document]
+    return document
+
+
+def image_payload(colour: bytes, depth: bytes) -> tuple[bytes, int, int]:
+    """Return an image's payload for the frame ring, its width and its height.
+
+    Raises:
+        ValueError: the parts are no JPEG and 16-bit PNG of one size.
+    """
+    pixels = cv2.imdecode(np.frombuffer(colour, np.uint8), cv2.IMREAD_COLOR)
+    depths = cv2.imdecode(np.frombuffer(depth, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or depths is None or depths.shape != pixels.shape[:2]:
+        raise ValueError("an image whose colour and depth do not belong together")
+    height, width = depths.shape
+    rgb = np.ascontiguousarray(pixels[..., ::-1])
+    return rgb.tobytes() + depths.astype("<u2").tobytes(), width, height
+
+
+def _value(field: PackedField, recorded: Any) -> Any:
+    nothing = math.nan if field.dtype.startswith("f") else 0
+    if field.shape == 1:
+        return nothing if recorded is None else recorded
+    values = recorded if isinstance(recorded, list) else []
+    return [nothing if value is None else value for value in values][: field.shape]

@@ -1,1 +1,1 @@
-"""Show recordings and runs in Rerun: what viewers are shown anyway, as its entities."""
+"""Recordings and runs in Rerun: the messages that viewers get, as its entities."""

@@ -1,11 +1,11 @@
-"""Describe what Rerun is given as plain data: where, which of its archetypes, of what values."""
+"""Describe entities for Rerun as plain data: path, archetype and values."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from vla_deploy.telemetry.schemas.geometry import BASE, CAMERA, MAP, ODOM
+from vla_deploy.telemetry.schemas.foxglove_json import BASE, CAMERA, MAP, ODOM
 
 WORLD: Final = "world"
 PLOTS: Final = "plots"
@@ -21,7 +21,7 @@ _FRAMES: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entity:
-    """Name an archetype and its arguments; what is `static` holds at every time."""
+    """Name an archetype and its arguments; a `static` entity holds at every time."""
 
     path: str
     archetype: str
@@ -30,8 +30,8 @@ class Entity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drawn:
-    """Carry what one message becomes; `tick` is that of control, where the message tells it."""
+class DrawnMessage:
+    """Carry the entities of one message, and its tick of control where it has one."""
 
     entities: tuple[Entity, ...]
     tick: int | None = None
@@ -54,9 +54,9 @@ def child_path(parent: str, child: str) -> str:
     Raises:
         ValueError: the parent is not known by name.
     """
-    return _FRAMES.get(child) or f"{frame_path(parent)}/{part(child)}"
+    return _FRAMES.get(child) or f"{frame_path(parent)}/{path_part(child)}"
 
 
-def part(name: str) -> str:
+def path_part(name: str) -> str:
     """Return a name as one part of a path."""
     return _ODD_LETTERS.sub("_", name) or "unknown"

@@ -1,4 +1,4 @@
-"""Hand entities to Rerun's library: into a file, or to a viewer."""
+"""Log entities by Rerun's library: into a file, or to a viewer."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -7,15 +7,22 @@ from typing import Any, Final
 
 import numpy as np
 
+from vla_deploy.telemetry.channels import TICKS
 from vla_deploy.telemetry.errors import ExtraMissing
-from vla_deploy.telemetry.rerun.entity import Entity
-from vla_deploy.telemetry.rerun.layout import layout
+from vla_deploy.telemetry.rerun.entity import LOGS, PLOTS, WORLD, Entity
+from vla_deploy.telemetry.rerun.plots import JOINT_TOPIC
 from vla_deploy.telemetry.rerun.viewer import PORT, url_of
 
 APPLICATION: Final = "vla_deploy"
 TIME: Final = "robot_time"
 TICK: Final = "tick"
 _FLUSH_S: Final = 10.0
+_CURVES: Final = (
+    f"{JOINT_TOPIC}/position",
+    f"{JOINT_TOPIC}/effort_ratio",
+    "base_state",
+    f"{TICKS}/period_s",
+)
 
 
 class RerunStream:
@@ -27,7 +34,7 @@ class RerunStream:
         Raises:
             ExtraMissing: rerun-sdk is not installed.
         """
-        self._rerun = rerun = library()
+        self._rerun = rerun = _library()
         rerun.set_strict_mode(True)  # else a bad value is a warning on stderr, and not counted
         self._stream = rerun.RecordingStream(APPLICATION)
         self._stream.set_log_time_enabled(False)
@@ -41,7 +48,7 @@ class RerunStream:
             ExtraMissing: it cannot be written.
         """
         try:
-            self._stream.save(path, default_blueprint=layout())
+            self._stream.save(path, default_blueprint=_layout())
         except (OSError, RuntimeError) as error:
             raise ExtraMissing(f"{path}: {error}; name another file with --save") from error
 
@@ -52,7 +59,7 @@ class RerunStream:
             ExtraMissing: it is no such address, or no viewer is there.
         """
         try:
-            self._stream.connect_grpc(url, default_blueprint=layout())
+            self._stream.connect_grpc(url, default_blueprint=_layout())
         except (ValueError, RuntimeError) as error:
             raise ExtraMissing(
                 f"rerun: {url}: {error}; expected an address such as {url_of(PORT)}"
@@ -60,10 +67,10 @@ class RerunStream:
         self.flush()
 
     def at(self, stamp_ns: int, tick: int | None) -> None:
-        """Set the moment of what is logged next; `stamp_ns` is wall clock.
+        """Set the time of what is logged next; `stamp_ns` is wall clock.
 
         Raises:
-            ValueError: there is no such moment.
+            ValueError: the time is out of range.
             OverflowError: as above.
         """
         self._stream.set_time(TIME, timestamp=np.datetime64(stamp_ns, "ns"))
@@ -79,7 +86,7 @@ class RerunStream:
             ValueError: the archetype does not take such values.
             TypeError: as above.
         """
-        values = _READY.get(entity.archetype, _as_it_is)(self._rerun, entity.values)
+        values = _CONVERTERS.get(entity.archetype, _unchanged)(self._rerun, entity.values)
         made = getattr(self._rerun, entity.archetype)(**values)
         self._stream.log(entity.path, made, static=entity.static)
 
@@ -99,13 +106,31 @@ class RerunStream:
         self._stream.disconnect()
 
 
-def library() -> Any:
+def _layout() -> Any:
+    """Return the arrangement of the viewer's window: world and logs, and the first curves."""
+    from rerun import blueprint
+
+    curves = [blueprint.TimeSeriesView(origin=f"{PLOTS}/{one}", name=one) for one in _CURVES]
+    return blueprint.Blueprint(
+        blueprint.Horizontal(
+            blueprint.Vertical(
+                blueprint.Spatial3DView(origin=WORLD, name=WORLD),
+                blueprint.TextLogView(origin=LOGS, name=LOGS),
+                row_shares=[3, 1],
+            ),
+            blueprint.Vertical(*curves),
+            column_shares=[3, 2],
+        )
+    )
+
+
+def _library() -> Any:
     """Return Rerun's library.
 
     Raises:
         ExtraMissing: it is not installed.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what it tells on stderr, it raises as well
+    os.environ.setdefault("RUST_LOG", "off")  # what it prints on stderr, it raises as well
     try:
         import rerun
     except ImportError as error:
@@ -115,7 +140,7 @@ def library() -> Any:
     return rerun
 
 
-def _as_it_is(_: Any, values: Mapping[str, Any]) -> Mapping[str, Any]:
+def _unchanged(_: Any, values: Mapping[str, Any]) -> Mapping[str, Any]:
     return values
 
 
@@ -123,7 +148,7 @@ def _grid_map(rerun: Any, values: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**values, "format": rerun.components.ImageFormat(**values["format"])}
 
 
-# Archetypes that want more than numbers and texts.
-_READY: Final[Mapping[str, Callable[[Any, Mapping[str, Any]], Mapping[str, Any]]]] = {
+# Archetypes that need more than numbers and texts.
+_CONVERTERS: Final[Mapping[str, Callable[[Any, Mapping[str, Any]], Mapping[str, Any]]]] = {
     "GridMap": _grid_map,
 }

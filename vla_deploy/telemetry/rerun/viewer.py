@@ -1,4 +1,4 @@
-"""Open Rerun's viewer on this computer, for this computer only."""
+"""Open Rerun's viewer on this computer, listening on loopback only."""
 
 import os
 import socket
@@ -14,17 +14,17 @@ PORT: Final = 9876
 _HOST: Final = "127.0.0.1"
 _WITHIN_NS: Final = 20 * NS_PER_S
 _STEADY_NS: Final = NS_PER_S  # it listens before it has a window, and may find no screen
-_LOOK_NS: Final = NS_PER_S // 10
-_TOLD: Final = 300
+_POLL_NS: Final = NS_PER_S // 10
+_MAX_TEXT: Final = 300
 
 
 def url_of(port: int) -> str:
-    """Return where a viewer on this computer takes entities."""
+    """Return the address of a viewer on this computer."""
     return f"rerun+http://{_HOST}:{port}/proxy"
 
 
 def open_viewer(port: int, clock: Clock) -> None:
-    """Start a viewer that stays when this process ends, and wait for it; one that is open is used.
+    """Start a viewer that outlives this process and wait for it, unless one is open already.
 
     Raises:
         ExtraMissing: it does not come up, as without a screen.
@@ -40,15 +40,15 @@ def open_viewer(port: int, clock: Clock) -> None:
                     f"rerun: no viewer comes up on this computer: {_last_words(errors)}; write a "
                     "file with --save out.rrd, and open it where there is a screen"
                 )
-            clock.sleep_until(clock.now_ns() + _LOOK_NS)
-            steady_ns = steady_ns + _LOOK_NS if _listens(port) else 0
+            clock.sleep_until(clock.now_ns() + _POLL_NS)
+            steady_ns = steady_ns + _POLL_NS if _listens(port) else 0
 
 
 def _start(port: int, errors: IO[bytes]) -> subprocess.Popen[bytes]:
-    """Start the viewer on loopback: by itself it listens on every network, to whoever comes."""
+    """Start the viewer on loopback; by default it listens on every network."""
     return subprocess.Popen(
         [sys.executable, "-m", "rerun", "--bind", _HOST, "--port", str(port)],
-        # It tells its maker how it is used, except where CI is set.
+        # It sends usage reports to its maker unless CI is set.
         env={**os.environ, "CI": "1", "RUST_LOG": "error", "NO_COLOR": "1"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
@@ -66,4 +66,4 @@ def _listens(port: int) -> bool:
 def _last_words(errors: IO[bytes]) -> str:
     errors.seek(0)
     words = errors.read().decode(errors="replace").split()
-    return " ".join(words)[-_TOLD:] or "it says nothing"
+    return " ".join(words)[-_MAX_TEXT:] or "it says nothing"

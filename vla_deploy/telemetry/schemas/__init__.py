@@ -1,1 +1,1 @@
-"""Show the robot to viewers: what its topics mean, in schemas that Foxglove and others know."""
+"""The robot's topics as messages that viewers know, in Foxglove's schemas."""

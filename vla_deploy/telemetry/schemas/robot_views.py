@@ -1,20 +1,19 @@
-"""Draw what the robot is and feels: joints, frames, wheels, lidar, near obstacles."""
+"""Draw the robot and its sensors: joints, frames, odometry, lidar, obstacles, camera."""
 
 import base64
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from vla_deploy.ipc.topics import SCAN_BEAMS
 from vla_deploy.robots import RobotDescription
-from vla_deploy.telemetry.schemas.geometry import (
+from vla_deploy.telemetry.schemas.foxglove_json import (
     BASE,
     CAMERA,
     MAP,
     ODOM,
     Json,
-    Matrix,
     floor_pose_json,
     matrix_json,
     point_json,
@@ -23,10 +22,12 @@ from vla_deploy.telemetry.schemas.geometry import (
 
 _FLOAT32: Final = 7  # foxglove.NumericType
 _FLOAT_BYTES: Final = 4
+# By whether there are more than five coefficients: the model's name, and its number of them.
+_DISTORTION: Final = (("plumb_bob", 5), ("rational_polynomial", 8))
 
 
 class RobotViews:
-    """Draw the topics of one robot; one instance per thread."""
+    """Draw what depends on the robot's kinematics; one instance per thread."""
 
     def __init__(self, robot: RobotDescription) -> None:
         """Build the robot's kinematics.
@@ -41,7 +42,7 @@ class RobotViews:
         self._lidar_m = self._model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
 
     def joints(self, state: np.void, stamp_ns: int) -> Json:
-        """Return every joint's position and velocity; what is no number is left out."""
+        """Return every joint's position and velocity, leaving out NaN."""
         joints = []
         for index, name in enumerate(self._names):
             numbers = {field: float(state[field][index]) for field in ("position", "velocity")}
@@ -50,15 +51,16 @@ class RobotViews:
         return {"timestamp": time_json(stamp_ns), "joints": joints}
 
     def frames(self, state: np.void, stamp_ns: int) -> Json:
-        """Return the frames of every joint and of the camera in the base; none while blind."""
+        """Return the frames of joints and camera in the base; none while a position is unknown."""
         positions = np.array(state["position"][: len(self._names)], dtype=np.float64)
         if not np.isfinite(positions).all():
             return {"transforms": []}
         poses = {**self._model.joint_poses(positions), CAMERA: self._model.camera_pose(positions)}
-        return {"transforms": [_frame(BASE, name, at, stamp_ns) for name, at in poses.items()]}
+        frames = [_frame(BASE, name, *matrix_json(at), stamp_ns) for name, at in poses.items()]
+        return {"transforms": frames}
 
     def scan(self, scan: np.void, stamp_ns: int) -> Json:
-        """Return a turn of the lidar, from where it sits on the base; 0 is no return."""
+        """Return a scan of the lidar from its place on the base; 0 is no return."""
         x_m, y_m, z_m = self._lidar_m
         return {
             "timestamp": time_json(stamp_ns),
@@ -72,26 +74,19 @@ class RobotViews:
 
 
 def base_frame(pose: np.void, stamp_ns: int) -> Json:
-    """Return where the base is in the map, as a frame."""
-    drawn = floor_pose_json(pose["x_m"], pose["y_m"], pose["yaw_rad"])
-    frame = {
-        "timestamp": time_json(stamp_ns),
-        "parent_frame_id": MAP,
-        "child_frame_id": BASE,
-        "translation": drawn["position"],
-        "rotation": drawn["orientation"],
-    }
-    return {"transforms": [frame]}
+    """Return the base's pose in the map as a frame."""
+    at = floor_pose_json(pose["x_m"], pose["y_m"], pose["yaw_rad"])
+    return {"transforms": [_frame(MAP, BASE, at["position"], at["orientation"], stamp_ns)]}
 
 
 def pose(pose: np.void, stamp_ns: int) -> Json:
-    """Return where the base is in the map."""
+    """Return the base's pose in the map."""
     at = floor_pose_json(pose["x_m"], pose["y_m"], pose["yaw_rad"])
     return {"timestamp": time_json(stamp_ns), "frame_id": MAP, "pose": at}
 
 
 def odometry(state: np.void, stamp_ns: int) -> Json:
-    """Return where the wheels have brought the base, and how fast they turn."""
+    """Return pose and velocity of the base by its wheels."""
     return {
         "timestamp": time_json(stamp_ns),
         "frame_id": ODOM,
@@ -103,7 +98,7 @@ def odometry(state: np.void, stamp_ns: int) -> Json:
 
 
 def obstacles(seen: np.void, stamp_ns: int) -> Json:
-    """Return what stands up from the floor as points in the base's frame."""
+    """Return the obstacles seen near the base as points in its frame."""
     count = int(seen["count"])
     points = np.stack([seen[axis][:count] for axis in ("x_m", "y_m", "z_m")], axis=1)
     fields = [
@@ -120,8 +115,24 @@ def obstacles(seen: np.void, stamp_ns: int) -> Json:
     }
 
 
-def _frame(parent: str, child: str, pose: Matrix, stamp_ns: int) -> dict[str, Any]:
-    translation, rotation = matrix_json(pose)
+def lens(robot: RobotDescription, stamp_ns: int) -> Json:
+    """Return the camera's intrinsics, as calibrated or as in the robot file."""
+    seen = robot.camera.intrinsics
+    model, count = _DISTORTION[len(seen.distortion) > 5]
+    return {
+        "timestamp": time_json(stamp_ns),
+        "frame_id": CAMERA,
+        "width": seen.width,
+        "height": seen.height,
+        "distortion_model": model if seen.distortion else "",
+        "D": [*seen.distortion, *[0.0] * (count - len(seen.distortion))] if seen.distortion else [],
+        "K": [seen.fx, 0.0, seen.cx, 0.0, seen.fy, seen.cy, 0.0, 0.0, 1.0],
+        "R": np.eye(3).ravel().tolist(),
+        "P": [seen.fx, 0.0, seen.cx, 0.0, 0.0, seen.fy, seen.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }
+
+
+def _frame(parent: str, child: str, translation: Json, rotation: Json, stamp_ns: int) -> Json:
     return {
         "timestamp": time_json(stamp_ns),
         "parent_frame_id": parent,

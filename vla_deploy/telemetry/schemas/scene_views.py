@@ -1,10 +1,14 @@
-"""Draw the things around the robot: boxes with names, surfaces, people, and the home's zones."""
+"""Draw the robot's surroundings: objects, surfaces, people, keep-out zones and the map."""
 
+import base64
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+import numpy as np
+
+from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.robots import RobotDescription
-from vla_deploy.telemetry.schemas.geometry import (
+from vla_deploy.telemetry.schemas.foxglove_json import (
     MAP,
     Json,
     colour_json,
@@ -36,12 +40,16 @@ _KINDS: Final = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles"
 _TEXT_M: Final = 0.06
 _LINE_M: Final = 0.02
 _DELETE_ALL: Final = 1
+_UINT8: Final = 1  # foxglove.NumericType
+_FREE: Final = (235, 235, 235, 255)
+_BLOCKED: Final = (110, 110, 110, 255)
+_SEEN_BY_LIDAR: Final = (30, 30, 30, 255)
 
 
 def scene(document: Mapping[str, Any], stamp_ns: int) -> Json:
-    """Return the scene anew: what is not in it any more is taken away."""
+    """Return the whole scene; it replaces the one before."""
     entities = [
-        *(_thing(one, stamp_ns) for one in document.get("objects", ())),
+        *(_object(one, stamp_ns) for one in document.get("objects", ())),
         *(_surface(i, one, stamp_ns) for i, one in enumerate(document.get("surfaces", ()))),
         *(_bystander(i, one, stamp_ns) for i, one in enumerate(document.get("bystanders", ()))),
     ]
@@ -50,7 +58,7 @@ def scene(document: Mapping[str, Any], stamp_ns: int) -> Json:
 
 
 def zones(robot: RobotDescription, stamp_ns: int) -> Json:
-    """Return the parts of the floor that the base must not enter."""
+    """Return the keep-out zones of the base."""
     entities = [
         _entity(
             f"zone/{zone.name}",
@@ -64,7 +72,37 @@ def zones(robot: RobotDescription, stamp_ns: int) -> Json:
     return {"deletions": [], "entities": entities}
 
 
-def _thing(thing: Mapping[str, Any], stamp_ns: int) -> Json:
+def home_map(robot: RobotDescription, stamp_ns: int) -> Json:
+    """Return the map as coloured cells: black crosses the lidar's plane, grey is blocked.
+
+    Raises:
+        MapInvalid: the robot's map cannot be read.
+    """
+    grid = load_map(robot.home.map_path)
+    rows, columns = grid.blocked.shape
+    cells = np.empty((rows, columns, 4), dtype=np.uint8)
+    cells[...] = _FREE
+    cells[grid.blocked] = _BLOCKED
+    if grid.seen_by_lidar is not None:
+        cells[grid.seen_by_lidar] = _SEEN_BY_LIDAR
+    fields = [
+        {"name": name, "offset": place, "type": _UINT8}
+        for place, name in enumerate(("red", "green", "blue", "alpha"))
+    ]
+    return {
+        "timestamp": time_json(stamp_ns),
+        "frame_id": MAP,
+        "pose": floor_pose_json(*grid.origin_m, 0.0),
+        "column_count": columns,
+        "cell_size": {"x": grid.resolution_m, "y": grid.resolution_m},
+        "row_stride": 4 * columns,
+        "cell_stride": 4,
+        "fields": fields,
+        "data": base64.b64encode(cells.tobytes()).decode(),
+    }
+
+
+def _object(thing: Mapping[str, Any], stamp_ns: int) -> Json:
     x_m, y_m, z_m = thing["position_m"]
     cube = {
         "pose": floor_pose_json(x_m, y_m, thing["yaw_rad"], z_m),

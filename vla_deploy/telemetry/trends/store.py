@@ -1,6 +1,5 @@
-"""Keep the history of every series: four levels of rings, each made of the finer one."""
+"""Keep the history of every series in four levels of rings, each made from the finer one."""
 
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,18 +8,51 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.telemetry.trends.columns import COLUMNS, Columns
-from vla_deploy.telemetry.trends.errors import SeriesUnknown, TrendsUnavailable
-from vla_deploy.telemetry.trends.levels import LEVELS, Level
-from vla_deploy.telemetry.trends.ring_file import CELL, RingFile, Row
+from vla_deploy.telemetry.errors import SeriesUnknown, TrendsUnavailable
+from vla_deploy.telemetry.trends.ring_file import CELL, COLUMNS, RingFile, Row, SeriesColumns
 
 _CATCH_UP: Final = 4
-"""Coarser rows that are made at once, where some are behind: after a gap, or a restart."""
+"""Coarser rows made at most at once, after a gap or a restart."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrendLevel:
+    """Hold `span_s` in steps of `step_s`; a level that `outlives` a boot is on the disk."""
+
+    name: str
+    span_s: int
+    step_s: int
+    outlives: bool
+
+    @property
+    def rows(self) -> int:
+        """Return how many steps are held."""
+        return self.span_s // self.step_s
+
+    def index(self, wall_s: float) -> int:
+        """Return the number of the step that a moment lies in."""
+        return int(wall_s // self.step_s)
+
+
+LEVELS: Final[tuple[TrendLevel, ...]] = (
+    TrendLevel(name="1min", span_s=60, step_s=1, outlives=False),
+    TrendLevel(name="10min", span_s=600, step_s=5, outlives=False),
+    TrendLevel(name="1h", span_s=3600, step_s=30, outlives=True),
+    TrendLevel(name="24h", span_s=86400, step_s=600, outlives=True),
+)
+"""The finest first; each step is a multiple of the one before."""
+
+
+def level_for(span_s: float) -> int:
+    """Return the number of the finest level that covers a span."""
+    return next(
+        (number for number, level in enumerate(LEVELS) if span_s <= level.span_s), len(LEVELS) - 1
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trend:
-    """Carry one series, oldest first, NaN where nothing is known; each step is `step_s` long."""
+    """Carry one series, the oldest first, NaN where nothing is known."""
 
     minimum: NDArray[np.float32]
     mean: NDArray[np.float32]
@@ -29,7 +61,7 @@ class Trend:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trends:
-    """Carry some series over one span; the first step begins at `start_s` of the wall clock."""
+    """Carry some series over one span in steps of `step_s`; `start_s` is wall clock."""
 
     start_s: int
     step_s: int
@@ -39,7 +71,7 @@ class Trends:
 class TrendStore:
     """Write one value of each series a second, and read them back at any level.
 
-    `disk` holds what outlives a boot; `memory` is to be a folder that costs no disk any writes.
+    `disk` holds what outlives a boot; `memory` is a folder in memory, to spare the disk.
 
     Raises:
         TrendsUnavailable: the files cannot be made.
@@ -47,7 +79,7 @@ class TrendStore:
 
     def __init__(self, disk: Path, memory: Path) -> None:
         try:
-            self._columns = Columns(disk, lambda: secrets.randbits(63) | 1)
+            self._columns = SeriesColumns(disk)
         except OSError as error:
             raise TrendsUnavailable(
                 f"{disk}: cannot keep the history: {error.strerror}; make room, or mend the folder"
@@ -56,17 +88,17 @@ class TrendStore:
         self._made: list[int | None] = [None] * len(LEVELS)
 
     def write(self, wall_s: float, values: Mapping[str, float]) -> None:
-        """Put the values of this second, and make the coarser rows that are due.
+        """Write the values of this second, and the coarser rows that are due.
 
         Raises:
             OSError: a new series has no place on the disk.
         """
         columns = self._columns.claim(sorted(values), wall_s, self._forget)
         row = np.zeros(COLUMNS, CELL)
-        told = np.array([values[series] for series in sorted(values)], dtype=np.float32)
+        new = np.array([values[series] for series in sorted(values)], dtype=np.float32)
         for name in ("min", "mean", "max"):
-            row[name][columns] = told
-        row["weight"][columns] = np.isfinite(told)
+            row[name][columns] = new
+        row["weight"][columns] = np.isfinite(new)
         step = LEVELS[0].index(wall_s)
         before = self._rings[0].read(step)
         self._rings[0].write(step, row if before is None else _merged([before, row]))
@@ -74,14 +106,14 @@ class TrendStore:
             self._make(number, LEVELS[number].index(wall_s))
 
     def series(self) -> list[str]:
-        """Return the name of every series that is kept."""
+        """Return the names of all series."""
         return self._columns.names
 
     def read(self, names: list[str], number: int, wall_s: float, span_s: float) -> Trends:
         """Return series over the last `span_s`, at level `number`, up to the present step.
 
         Raises:
-            SeriesUnknown: nothing of that name is kept.
+            SeriesUnknown: there is no series of that name.
         """
         columns = [self._column(name) for name in names]
         level = LEVELS[number]
@@ -92,9 +124,8 @@ class TrendStore:
             row = self._row(number, step)
             if row is not None:
                 table[place] = row[columns]
-        table["min"][table["weight"] == 0] = np.nan
-        table["mean"][table["weight"] == 0] = np.nan
-        table["max"][table["weight"] == 0] = np.nan
+        for field in ("min", "mean", "max"):
+            table[field][table["weight"] == 0] = np.nan
         return Trends(
             start_s=(last - count + 1) * level.step_s,
             step_s=level.step_s,
@@ -113,7 +144,7 @@ class TrendStore:
         for ring in self._rings:
             ring.close()
 
-    def _open(self, level: Level, folder: Path) -> RingFile:
+    def _open(self, level: TrendLevel, folder: Path) -> RingFile:
         return RingFile(
             folder / f"{level.name}.ring",
             generation=self._columns.generation,
@@ -138,7 +169,7 @@ class TrendStore:
         return row if row is not None or number == 0 else self._of_finer(number, step)
 
     def _of_finer(self, number: int, step: int) -> Row | None:
-        """Return the row of a step as the finer rows have it that are there."""
+        """Return the row of a step, merged from the finer rows that exist."""
         ratio = LEVELS[number].step_s // LEVELS[number - 1].step_s
         finer = (self._row(number - 1, one) for one in range(step * ratio, (step + 1) * ratio))
         rows = [row for row in finer if row is not None]

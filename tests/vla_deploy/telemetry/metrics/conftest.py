@@ -1,4 +1,4 @@
-"""Let a robot's processes tell what they tell, as far as the metrics read it."""
+"""Provide a robot whose processes report what the metrics read."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,23 +14,10 @@ from platforms.probes import Reading
 from vla_deploy.control.reporting.tick_periods import TickPeriods
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.budgets.documents import board
-from vla_deploy.telemetry.metrics import READ_TOPICS, Look, Looker, Readings, read
+from vla_deploy.telemetry.metrics import READ_TOPICS, Readings, TopicSampler, TopicSnapshot, read
 
 JOINTS = ("left_elbow", "right_elbow")
 OWN = {"version": "1.2.3", "look_s": 0.002, "left_out": 0, "clients": 3}
-
-
-class StepClock:
-    """Pass time only when it is told to."""
-
-    def __init__(self) -> None:
-        self.ns = 100 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 def control_status() -> dict[str, Any]:
@@ -162,22 +149,22 @@ DOCUMENTS: dict[str, dict[str, Any]] = {
 
 
 class Robot:
-    """Tell documents and packed cells, and look at them."""
+    """Write documents and packed cells, and read the metrics."""
 
     documents = DOCUMENTS
 
-    def __init__(self, folder: Path) -> None:
-        self.clock = StepClock()
+    def __init__(self, folder: Path, clock: Any) -> None:
+        self.clock = clock
         self.space = SharedSpace(folder / "ipc", self.clock)
-        self.looker = Looker(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
+        self.sampler = TopicSampler(self.space, self.clock, READ_TOPICS, lambda _: JOINTS)
         self._writers = {name: self.space.cell_writer(name) for name in READ_TOPICS}
 
-    def tell(self, **documents: dict[str, Any]) -> None:
+    def write(self, **documents: dict[str, Any]) -> None:
         for name, document in documents.items():
             self._writers[name].put_document(document)
 
-    def tell_all(self) -> None:
-        self.tell(**DOCUMENTS)
+    def write_all(self) -> None:
+        self.write(**DOCUMENTS)
         zeros = dict.fromkeys(("position", "velocity", "setpoint", "age_s"), ())
         self._writers["joint_state"].put(
             **zeros, joint_count=2, effort_ratio=(0.1, -0.2), error=(0, 4), torque_enabled=(1, 1)
@@ -188,27 +175,27 @@ class Robot:
         self._writers["pose"].put(**place, match_ratio=0.9, state=1, doubt=0)
 
     def later(self, seconds: float) -> None:
-        self.clock.ns += round(seconds * NS_PER_S)
+        self.clock.time_ns += round(seconds * NS_PER_S)
 
-    def look(self) -> Look:
-        return self.looker.look(OWN)
+    def look(self) -> TopicSnapshot:
+        return self.sampler.snapshot(OWN)
 
     def read(self) -> Readings:
         return read(self.look())
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(tmp_path)
+def robot(tmp_path: Path, clock: Any) -> Iterator[Robot]:
+    robot = Robot(tmp_path, clock)
     yield robot
     robot.space.close()
 
 
 @pytest.fixture
 def whole(robot: Robot) -> Robot:
-    """Return a robot whose every process has told, twice within a second."""
-    robot.tell_all()
+    """Return a robot whose processes have all written twice within a second."""
+    robot.write_all()
     robot.look()
     robot.later(1.0)
-    robot.tell_all()
+    robot.write_all()
     return robot

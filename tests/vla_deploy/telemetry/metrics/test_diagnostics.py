@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from vla_deploy.telemetry.diagnostics import Level, diagnostics
+from vla_deploy.telemetry.metrics.diagnostics import DiagnosticLevel, diagnostics
 
 if TYPE_CHECKING:
     from conftest import Robot
@@ -30,18 +30,18 @@ def test_parts_lie_in_a_hierarchy_below_the_robot_with_texts_alone(whole: "Robot
 def test_a_condition_that_holds_gives_its_part_level_and_words(whole: "Robot") -> None:
     statuses = told(whole)
     bus = statuses["/butler/Buses/servos"]
-    assert (bus["level"], bus["message"]) == (Level.WARN, "A servo bus loses answers.")
+    assert (bus["level"], bus["message"]) == (DiagnosticLevel.WARN, "A servo bus loses answers.")
     assert {"key": "bus_state", "value": "degraded"} in bus["values"]
     joint = statuses["/butler/Joints/right_elbow"]
-    assert (joint["level"], joint["hardware_id"]) == (Level.ERROR, "butler/right_elbow")
+    assert (joint["level"], joint["hardware_id"]) == (DiagnosticLevel.ERROR, "butler/right_elbow")
     assert (statuses["/butler/Buses/can"]["level"], statuses["/butler/Safety"]["level"]) == (0, 0)
 
 
 def test_a_part_whose_process_is_silent_is_stale_and_says_which_topic(whole: "Robot") -> None:
     whole.later(5.0)
-    whole.tell(process_table=whole.documents["process_table"])
+    whole.write(process_table=whole.documents["process_table"])
     safety = told(whole)["/butler/Safety"]
-    assert safety["level"] == Level.STALE
+    assert safety["level"] == DiagnosticLevel.STALE
     assert safety["message"] == "control_status has been silent for 5.0 s"
 
 

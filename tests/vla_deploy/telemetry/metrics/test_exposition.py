@@ -55,7 +55,7 @@ def test_what_is_missing_has_a_series_that_says_why(robot: "Robot") -> None:
 
 
 def test_label_values_with_quotes_and_line_ends_do_not_break_the_text(whole: "Robot") -> None:
-    whole.tell(planner_status={"by_rung": {'a "quoted"\nname\\': {"planned": 1}}})
+    whole.write(planner_status={"by_rung": {'a "quoted"\nname\\': {"planned": 1}}})
     text = expose(whole.read())[0].decode()
     family = next(one for one in plain_text(text) if one.name == "vla_planner_rung_attempts")
     assert family.samples[0].labels["rung"] == 'a "quoted"\nname\\'

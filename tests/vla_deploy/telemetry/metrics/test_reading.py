@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from vla_deploy.telemetry.metrics import METRICS, MOST_SERIES, Readings, Why
+from vla_deploy.telemetry.metrics import MAX_SERIES, METRICS, MissingReason, Readings
 
 if TYPE_CHECKING:
     from conftest import Robot
@@ -14,7 +14,7 @@ def value(readings: Readings, name: str, *labels: str) -> object:
     return next(point.value for point in readings.points[name] if point.labels == labels)
 
 
-def why(readings: Readings, name: str) -> tuple[Why, str]:
+def why(readings: Readings, name: str) -> tuple[MissingReason, str]:
     return next((one.why, one.text) for one in readings.missing if one.metric == name)
 
 
@@ -29,7 +29,7 @@ def test_nothing_is_read_as_zero_before_anybody_has_told(robot: "Robot") -> None
     told_by_itself = {"vla_build_info", "vla_metrics_look_seconds", "vla_metrics_left_out"}
     assert set(readings.points) == told_by_itself | {"vla_dashboard_clients"}
     assert why(readings, "vla_control_ticks_total") == (
-        Why.SILENT,
+        MissingReason.SILENT,
         "nobody has written control_status yet",
     )
 
@@ -55,10 +55,10 @@ def test_a_state_is_one_and_the_others_are_zero(whole: "Robot") -> None:
 
 def test_a_process_that_falls_silent_takes_its_metrics_with_it(whole: "Robot") -> None:
     whole.later(3.5)
-    whole.tell(process_table=whole.documents["process_table"])
+    whole.write(process_table=whole.documents["process_table"])
     readings = whole.read()
     assert why(readings, "vla_control_state") == (
-        Why.SILENT,
+        MissingReason.SILENT,
         "control_status has been silent for 3.5 s",
     )
     assert value(readings, "vla_process_restarts_total", "planner") == 2.0
@@ -66,7 +66,7 @@ def test_a_process_that_falls_silent_takes_its_metrics_with_it(whole: "Robot") -
 
 def test_what_the_computer_cannot_tell_is_missing_with_its_own_words(whole: "Robot") -> None:
     assert why(whole.read(), "vla_gpu_load_ratio") == (
-        Why.UNREADABLE,
+        MissingReason.UNREADABLE,
         "missing, because no GPU",
     )
 
@@ -86,11 +86,11 @@ def test_what_is_null_in_a_document_is_left_out_alone(whole: "Robot") -> None:
 def test_a_metric_with_too_many_series_loses_the_last_and_that_is_counted(whole: "Robot") -> None:
     table = whole.documents["process_table"]
     (row, *_) = table["processes"]
-    rows = [row | {"name": f"p{number}" + "x" * 100} for number in range(MOST_SERIES + 5)]
-    whole.tell(process_table=table | {"processes": rows})
+    rows = [row | {"name": f"p{number}" + "x" * 100} for number in range(MAX_SERIES + 5)]
+    whole.write(process_table=table | {"processes": rows})
     readings = whole.read()
     points = readings.points["vla_process_memory_bytes"]
-    assert len(points) == MOST_SERIES
+    assert len(points) == MAX_SERIES
     assert readings.left_out > 5
     assert max(len(point.labels[0]) for point in points) == 64
 
@@ -98,7 +98,7 @@ def test_a_metric_with_too_many_series_loses_the_last_and_that_is_counted(whole:
 def test_the_rate_of_a_topic_is_what_was_put_within_the_window(robot: "Robot") -> None:
     robot.look()
     for _ in range(20):
-        robot.tell(twin_status=robot.documents["twin_status"])
+        robot.write(twin_status=robot.documents["twin_status"])
         robot.later(0.5)
         robot.look()
     readings = robot.read()

@@ -7,11 +7,10 @@ from typing import Any
 
 import yaml
 
-from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, Kind
-from vla_deploy.telemetry.metrics.alert_rules import alert_rules
+from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, MetricKind
 from vla_deploy.telemetry.metrics.conditions import CONDITIONS
-from vla_deploy.telemetry.metrics.exposition import MISSING
 from vla_deploy.telemetry.metrics.grafana import grafana_dashboard
+from vla_deploy.telemetry.metrics.prometheus import MISSING, alert_rules
 
 SHIPPED = Path(__file__).parents[4] / "docs" / "monitoring"
 WORDS = {"rate", "sum", "by", "histogram_quantile", "le", "up", "job", "instance", "metric", "why"}
@@ -26,7 +25,7 @@ def judge(expression: str) -> None:
     assert known <= set(METRICS_BY_NAME), expression
     labels = {label for name in known for label in METRICS_BY_NAME[name].labels}
     assert names - metrics - {MISSING} <= labels, expression
-    assert all(METRICS_BY_NAME[name].kind is Kind.COUNTER for name in rated(expression))
+    assert all(METRICS_BY_NAME[name].kind is MetricKind.COUNTER for name in rated(expression))
 
 
 def rated(expression: str) -> set[str]:
@@ -56,7 +55,7 @@ def test_every_panel_refers_to_a_metric_and_every_metric_has_one() -> None:
     for expression in asked:
         judge(expression)
     shown = " ".join(asked)
-    assert all(one.name in shown for one in METRICS if one.kind is not Kind.INFO)
+    assert all(one.name in shown for one in METRICS if one.kind is not MetricKind.INFO)
     places = [tuple(panel["gridPos"][key] for key in "xy") for panel in panels]
     assert len(set(places)) == len(places) == len({panel["id"] for panel in panels})
 

@@ -1,4 +1,4 @@
-"""Give the tests a run whose topics they write, and a rolling recorder that writes at once."""
+"""Provide a run whose topics the tests write, and a rolling recorder that writes at once."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -14,61 +14,39 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
-from vla_deploy.telemetry.memory import Memory
-from vla_deploy.telemetry.recording.building import rolling_recorder
 from vla_deploy.telemetry.recording.folder import RecordingFolder
 from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.recording.settings import RecordingSettings
+from vla_deploy.telemetry.topic_history import TopicHistory
 
-WALL_NS = 1_800_000_000_000_000_000
 STEP_S = 0.04
-
-
-class StepClock:
-    """Stand still until told otherwise."""
-
-    def __init__(self) -> None:
-        self.time_ns = 100 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
 
 
 class Rig:
     """Hold a run directory, what its processes would write, and the recorder."""
 
-    def __init__(self, tmp_path: Path) -> None:
-        self.clock = StepClock()
-        self.run_dir = tmp_path / "base" / "run"
-        (self.run_dir / "logs").mkdir(parents=True)
-        self.space = SharedSpace(self.run_dir / "ipc", self.clock)
+    def __init__(self, tmp_path: Path, context: NodeContext, clock: Any) -> None:
+        self.clock = clock
+        self.context = context
+        self.run_dir = context.run_dir
+        self.space = SharedSpace(self.run_dir / "ipc", clock)
         self.folder_path = tmp_path / "recordings"
-        self.context = NodeContext(
-            run_dir=self.run_dir,
-            robot="butler",
-            profile="desktop",
-            devices_dir=None,
-            clock=self.clock,
-        )
         self.requests = self.space.ring_writer("recording_request")
         self.status = self.space.cell_reader("recording_status")
         self._base = self.space.cell_writer("base_state")
         self._control = self.space.cell_writer("control_status")
         self._control.put_document({"state": "armed", "tick": 1})
-        self._memory = Memory(self.space)
+        self._history = TopicHistory(self.space)
         self.recorder: RollingRecorder
         self._open: list[RollingRecorder] = []
 
     def begin(self, executor: Executor | None = None, **settings: Any) -> None:
         chosen = RecordingSettings(**{"spare_mb": 0.0, **settings})
         self.folder = RecordingFolder(self.folder_path, chosen.bounds)
-        self.recorder = rolling_recorder(
+        self.recorder = RollingRecorder(
             self.context,
             self.space,
-            lambda: WALL_NS + self.clock.now_ns(),
+            self.clock.wall_ns,
             settings=chosen,
             folder=self.folder,
             executor=executor or InlineExecutor(),
@@ -89,20 +67,20 @@ class Rig:
             self._base.put(x_m=x_m, y_m=0.0, yaw_rad=0.0, v_m_s=0.0, w_rad_s=0.0, enabled=1)
             each()
             now_ns = self.clock.now_ns()
-            self.recorder.step(now_ns, self._memory.refresh(now_ns), self._memory.newest)
+            self.recorder.step(now_ns, self._history.refresh(now_ns), self._history.newest)
 
     def ask(self, **request: Any) -> None:
         self.requests.publish({"act": "start", "source": "test", **request})
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         sample = self.status.latest()
         assert sample is not None
         return sample.document()
 
 
 @pytest.fixture
-def rig(tmp_path: Path) -> Iterator[Rig]:
-    rig = Rig(tmp_path)
+def rig(tmp_path: Path, context: NodeContext, clock: Any) -> Iterator[Rig]:
+    rig = Rig(tmp_path, context, clock)
     yield rig
     rig.close()
 

@@ -6,23 +6,18 @@ from typing import Any
 import pytest
 
 from vla_deploy.telemetry.errors import RecordingRefused
+from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
-from vla_deploy.telemetry.recording.request import RecordingWish
-from vla_deploy.telemetry.recording.summary import summary_of
-
-RUN = RecordedRun(run_id="run", robot="butler", profile="desktop")
+from vla_deploy.telemetry.recording.request import RecordingRequest
 
 
 def one(rig: Any, path: Path, **wish: Any) -> OneRecording:
     return OneRecording(
-        rig.run_dir,
-        RUN,
-        RecordingWish(**wish),
+        rig.context,
+        RecordingRequest(**wish),
         path,
         image_period_s=0.5,
-        clock=rig.clock,
-        wall_ns=lambda: 1_800_000_000_000_000_000 + rig.clock.now_ns(),
+        wall_ns=rig.clock.wall_ns,
     )
 
 
@@ -32,7 +27,7 @@ def test_a_file_of_its_own_has_what_was_and_what_came(rig: Any, read: Any, tmp_p
     rig.space.ring_writer("operator").publish({"act": "arm", "source": "test", "reason": ""})
     messages = begun.run(lambda: False)
     assert [topic for topic, _, _ in read(path)] == ["view/zones", "control_status", "operator"]
-    found = summary_of(path)
+    found = read_file(path)
     assert (found.kind, found.robot, sum(found.counts.values())) == ("recording", "butler", 3)
     assert messages == 3
     assert [one.name for one in tmp_path.iterdir() if one.is_file()] == ["mine.mcap"]

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from vla_deploy.ipc import TOPICS
 from vla_deploy.telemetry.channels import channels_of
-from vla_deploy.telemetry.recording import feed, recorder
+from vla_deploy.telemetry.recording import recorder
 from vla_deploy.telemetry.schemas.views import CHANNELS
 
 Usage = namedtuple("Usage", "total used free")
@@ -38,7 +38,7 @@ class Stuck(Executor):
 def test_nothing_is_recorded_unless_it_is_wanted(rig: Any) -> None:
     rig.begin()
     rig.run(1.0)
-    assert rig.told()["state"] == "off"
+    assert rig.report()["state"] == "off"
     assert not rig.folder_path.exists()
 
 
@@ -122,13 +122,13 @@ def test_every_file_begins_with_what_was_so_before(rig: Any, read: Any) -> None:
 def test_a_recording_ends_by_itself_and_the_one_by_settings_goes_on(rig: Any) -> None:
     rig.begin(always=True)
     rig.run(1.0)
-    assert (rig.told()["state"], rig.told()["label"]) == ("recording", "always")
+    assert (rig.report()["state"], rig.report()["label"]) == ("recording", "always")
     rig.ask(label="short", duration_s=2.0)
     rig.run(1.5)
-    assert rig.told()["label"] == "short"
-    assert 0.0 < rig.told()["left_s"] <= 1.0
+    assert rig.report()["label"] == "short"
+    assert 0.0 < rig.report()["left_s"] <= 1.0
     rig.run(2.0)
-    assert rig.told()["label"] == "always"
+    assert rig.report()["label"] == "always"
     assert [path.name.rpartition("-")[2] for path in rig.folder.files()] == [
         "always.mcap",
         "short.mcap",
@@ -153,20 +153,20 @@ def test_a_request_that_cannot_be_is_refused_with_the_reason(
     rig.begin()
     rig.ask(**request_)
     rig.run(0.1)
-    assert rig.told()["state"] == "off"
-    assert reason in rig.told()["refused"]
+    assert rig.report()["state"] == "off"
+    assert reason in rig.report()["refused"]
     assert not rig.folder_path.exists()
 
 
 def test_a_disk_that_hangs_holds_nobody_up_and_what_is_lost_is_counted(
     rig: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(feed, "BACKLOG_BYTES", 2000)
+    monkeypatch.setattr(recorder, "BACKLOG_BYTES", 2000)
     stuck = Stuck()
     rig.begin(executor=stuck)
     rig.ask(topics=["base_state"])
     rig.run(4.0)
-    told = rig.told()
+    told = rig.report()
     assert told["state"] == "beginning"
     assert 1000 < told["backlog_bytes"] <= 2000
     assert 50 < told["lost"] <= 100 - stuck.taken
@@ -203,12 +203,12 @@ def test_a_disk_that_refuses_is_told_and_tried_again(
             "vla_deploy.telemetry.mcap_file.McapFile.flush", lambda self: refuse(errno.EIO)
         )
         rig.run(3.0)
-    told = rig.told()
+    told = rig.report()
     assert told["state"] == "failed"
     assert told["why"].endswith("Input/output error")
     assert told["lost"] > 20
     rig.run(12.0)
-    assert rig.told()["state"] == "recording"
+    assert rig.report()["state"] == "recording"
     rig.recorder.stop()
     assert [len(read(path)) > 20 for path in rig.folder.files()] == [True, True]
 
@@ -222,12 +222,12 @@ def test_the_disk_is_never_filled(rig: Any, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(rig.folder.files()) == 2
     free["bytes"] = 10**7
     rig.run(2.0)
-    assert rig.told()["state"] == "paused"
-    assert "make room" in rig.told()["why"]
+    assert rig.report()["state"] == "paused"
+    assert "make room" in rig.report()["why"]
     assert len(rig.folder.files()) == 1  # what was being written; the older ones gave their room
     free["bytes"] = 10**10
     rig.run(12.0)
-    assert rig.told()["state"] == "recording"
+    assert rig.report()["state"] == "recording"
 
 
 def test_the_folder_stays_within_its_bounds(rig: Any) -> None:

@@ -1,21 +1,20 @@
-"""Give the tests a run that they write, a recording of it, and a list that takes entities."""
+"""Provide a run that the tests write, a recording of it, and a list that takes entities."""
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
-from vla_deploy.telemetry.recording.request import RecordingWish
+from vla_deploy.telemetry.recording.request import RecordingRequest
 from vla_deploy.telemetry.rerun.entity import Entity
 
-WALL_NS = 1_800_000_000 * NS_PER_S
 SCENE = {
     "objects": [
         {
@@ -34,32 +33,14 @@ SCENE = {
 }
 
 
-class StepClock:
-    """Stand still until told otherwise; `each` happens after every wait."""
-
-    def __init__(self) -> None:
-        self.time_ns = 100 * NS_PER_S
-        self.each: Callable[[], None] = lambda: None
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-        self.each()
-
-    def wall_ns(self) -> int:
-        return WALL_NS + self.time_ns
-
-
 class Run:
     """Hold a run directory whose topics, logs and images the test writes."""
 
-    def __init__(self, run_dir: Path) -> None:
-        (run_dir / "logs").mkdir(parents=True)
-        self.run_dir = run_dir
-        self.clock = StepClock()
-        self.space = SharedSpace(run_dir / "ipc", self.clock)
+    def __init__(self, context: NodeContext, clock: Any) -> None:
+        self.clock = clock
+        self.context = context
+        self.run_dir = context.run_dir
+        self.space = SharedSpace(self.run_dir / "ipc", clock)
         self._cells = {
             name: self.space.cell_writer(name)
             for name in ("joint_state", "pose", "scan", "near_obstacles", "scene", "control_status")
@@ -101,12 +82,10 @@ class Run:
     def record(self, path: Path, **wish: object) -> None:
         """Record two seconds of it."""
         OneRecording(
-            self.run_dir,
-            RecordedRun(run_id="r", robot="butler", profile="desktop"),
-            RecordingWish(duration_s=2.0, **wish),  # type: ignore[arg-type]
+            self.context,
+            RecordingRequest(duration_s=2.0, **wish),  # type: ignore[arg-type]
             path,
             image_period_s=0.5,
-            clock=self.clock,
             wall_ns=self.clock.wall_ns,
         ).run(lambda: False)
 
@@ -137,8 +116,8 @@ class Taken:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Iterator[Run]:
-    run = Run(tmp_path / "run")
+def run(context: NodeContext, clock: Any) -> Iterator[Run]:
+    run = Run(context, clock)
     yield run
     run.space.close()
 

@@ -1,17 +1,16 @@
 """Write files with Rerun's own library, and read them back with it; needs the extra [rerun]."""
 
 from collections import Counter
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from vla_deploy.telemetry.errors import ExtraMissing
-from vla_deploy.telemetry.recording.selection import Selection
-from vla_deploy.telemetry.replay.source import Source
+from vla_deploy.telemetry.recorded_file import read_file
+from vla_deploy.telemetry.recording.request import ChannelSelection
 from vla_deploy.telemetry.rerun.conversion import convert
-from vla_deploy.telemetry.rerun.showing import Showing
+from vla_deploy.telemetry.rerun.entity_logger import EntityLogger
 from vla_deploy.telemetry.rerun.stream import RerunStream
 
 pytest.importorskip("rerun", reason="the extra [rerun] is not installed")
@@ -19,15 +18,14 @@ pytest.importorskip("rerun", reason="the extra [rerun] is not installed")
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
 
-def written(file: Path, path: Path) -> Showing:
+def written(file: Path, path: Path) -> EntityLogger:
     stream = RerunStream(file.stem)
     stream.save(path)
-    showing = Showing(stream)
-    with closing(Source(file)) as source:
-        convert(source, showing, Selection())
+    logger = EntityLogger(stream)
+    convert(read_file(file), logger, ChannelSelection())
     stream.flush()
     stream.close()
-    return showing
+    return logger
 
 
 def chunks(path: Path) -> list[Any]:
@@ -42,12 +40,12 @@ def test_a_file_of_ours_becomes_one_of_reruns(
     kind: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     file = FLIGHT if kind == "flight" else request.getfixturevalue("recording")
-    showing = written(file, tmp_path / "out.rrd")
-    assert not showing.unfit
+    logger = written(file, tmp_path / "out.rrd")
+    assert not logger.unfit
     read: Counter[str] = Counter()
     for chunk in chunks(tmp_path / "out.rrd"):
         read[chunk.entity_path.removeprefix("/")] += chunk.num_rows
-    assert read == showing.shown
+    assert read == logger.shown
     assert {"world/map", "plots/joint_state/effort_ratio"} < read.keys()
 
 
@@ -62,12 +60,12 @@ def test_there_are_two_timelines_and_no_third(tmp_path: Path) -> None:
 def test_what_the_library_refuses_is_counted(tmp_path: Path) -> None:
     stream = RerunStream("odd")
     stream.save(tmp_path / "out.rrd")
-    showing = Showing(stream)
+    logger = EntityLogger(stream)
     text = b'{"frame_id": "camera", "K": [1, 0, 0, 0, 1, 0, 0, 0, 1], "width": "wide", "height": 1}'
-    showing.add("view/lens", 1, text)
-    showing.add("base_command", 2**70, b'{"v_m_s": 0.0}')
+    logger.add("view/lens", 1, text)
+    logger.add("base_command", 2**70, b'{"v_m_s": 0.0}')
     stream.close()
-    assert showing.unfit == {"view/lens": 1, "base_command": 1}
+    assert logger.unfit == {"view/lens": 1, "base_command": 1}
 
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:

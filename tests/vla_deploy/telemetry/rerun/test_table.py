@@ -12,12 +12,12 @@ from vla_deploy.ipc import BY_NAME, TOPICS, TopicKind
 from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.channels import TICKS, TOPIC_CHANNELS
-from vla_deploy.telemetry.rerun import shapes, spatial
+from vla_deploy.telemetry.rerun import drawing
 from vla_deploy.telemetry.rerun.entity import Entity
 from vla_deploy.telemetry.rerun.plots import plotted
-from vla_deploy.telemetry.rerun.table import VIEWS, Table, is_drawn
+from vla_deploy.telemetry.rerun.table import VIEWS, MessageDrawer, is_drawn
 from vla_deploy.telemetry.schemas import views
-from vla_deploy.telemetry.schemas.pictures import Pictures
+from vla_deploy.telemetry.schemas.views import ViewDrawer
 
 ROBOT = load_robot("butler")
 NOW_NS = 1_800_000_000_500_000_000
@@ -26,8 +26,8 @@ EMPTY_SCENE: dict[str, Any] = {"objects": [], "surfaces": [], "bystanders": []}
 
 def drafted() -> dict[str, bytes]:
     """Return what Foxglove gets of every view of a robot that stands still, by channel."""
-    pictures = Pictures(ROBOT)
-    messages = dict(pictures.still(NOW_NS, lambda _: True))
+    drawer = ViewDrawer(ROBOT)
+    messages = dict(drawer.constant_views(NOW_NS, lambda _: True))
     for topic in {view.topic for view in views.VIEWS}:
         declared = BY_NAME[topic]
         payload = (
@@ -35,12 +35,12 @@ def drafted() -> dict[str, bytes]:
             if is_document(declared)
             else np.zeros(1, record_dtype(declared)).tobytes()
         )
-        messages.update(pictures.of(topic, payload, NOW_NS, lambda _: True))
+        messages.update(drawer.views_of(topic, payload, NOW_NS, lambda _: True))
     return messages
 
 
 def drawn(channel: str, document: Any) -> dict[str, Entity]:
-    entities = Table().drawn(channel, json.dumps(document).encode()).entities
+    entities = MessageDrawer().draw(channel, json.dumps(document).encode()).entities
     return {entity.path: entity for entity in entities}
 
 
@@ -48,10 +48,10 @@ def test_every_view_that_foxglove_gets_is_drawn_where_the_table_says() -> None:
     rows = {row.channel: row for row in VIEWS}
     messages = drafted()
     assert messages.keys() == {one.channel for one in views.VIEWS} | {
-        one.channel for one in views.STILL
+        one.channel for one in views.CONSTANT_VIEWS
     }
     for channel, text in messages.items():
-        entities = Table().drawn(channel, text).entities
+        entities = MessageDrawer().draw(channel, text).entities
         assert entities, channel
         assert all(one.path.startswith(rows[channel].path) for one in entities)
 
@@ -63,11 +63,11 @@ def test_images_logs_events_ticks_and_packed_cells_are_drawn_as_well() -> None:
         is_packed = topic.kind is TopicKind.CELL and not is_document(topic)
         assert is_drawn(topic.name) or not is_packed
     assert not is_drawn("page_sound")
-    assert Table().drawn("page_sound", b"private").entities == ()
+    assert MessageDrawer().draw("page_sound", b"private").entities == ()
 
 
 def test_frames_are_where_their_transforms_place_them_with_axes_that_hold() -> None:
-    entities = Table().drawn("view/frames", drafted()["view/frames"]).entities
+    entities = MessageDrawer().draw("view/frames", drafted()["view/frames"]).entities
     placed = {one.path: one.values for one in entities if one.archetype == "Transform3D"}
     assert {f"world/base/{name}" for name in ROBOT.joint_names} < placed.keys()
     assert placed["world/base/camera"]["translation"][2] > 0.5
@@ -97,7 +97,7 @@ def test_a_cloud_is_read_by_its_own_fields() -> None:
     fields = [{"name": axis, "offset": 4 + 4 * i, "type": 7} for i, axis in enumerate("xyz")]
     data = base64.b64encode(rows.tobytes()).decode()
     message = {"frame_id": "base", "point_stride": 16, "fields": fields, "data": data}
-    (found,) = spatial.obstacles(message)
+    (found,) = drawing.obstacles(message)
     assert found.values["positions"].tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
@@ -110,20 +110,20 @@ def test_the_maps_first_row_is_the_images_last() -> None:
         "pose": {"position": {"x": -1, "y": -2, "z": 0}},
         "data": base64.b64encode(cells.tobytes()).decode(),
     }
-    (found,) = spatial.grid(message)
+    (found,) = drawing.grid(message)
     assert found.values["data"] == bytes([12, 16, 20, 0, 4, 8])
     assert (found.values["format"]["width"], found.values["format"]["height"]) == (3, 2)
     assert found.values["translation"] == [-1.0, -2.0, 0.0]
 
 
 def test_a_scene_without_anything_takes_away_what_was_there() -> None:
-    entities = list(shapes.scene({"entities": []}))
+    entities = list(drawing.scene({"entities": []}))
     assert {one.path for one in entities} == {
         f"world/scene/{place}" for place in ("boxes", "people", "outlines", "names")
     }
     boxes = next(one for one in entities if one.path == "world/scene/boxes")
     assert boxes.values["centers"] == boxes.values["labels"] == []
-    assert list(shapes.zones({"entities": []})) == []
+    assert list(drawing.zones({"entities": []})) == []
 
 
 def test_an_image_stands_before_the_camera_as_it_was_compressed() -> None:
@@ -154,7 +154,7 @@ def test_beams_and_points_are_drawn_and_not_plotted() -> None:
 
 
 def test_joints_are_named_in_every_plot_that_has_a_curve_for_each() -> None:
-    entities = Table().drawn("view/joints", drafted()["view/joints"]).entities
+    entities = MessageDrawer().draw("view/joints", drafted()["view/joints"]).entities
     named = {one.path: one.values["names"] for one in entities}
     assert named["plots/joint_state/position"] == list(ROBOT.joint_names)
     assert named.keys() >= {"plots/tick_record/sent", "plots/control_status/joints/temperature_c"}
@@ -162,11 +162,11 @@ def test_joints_are_named_in_every_plot_that_has_a_curve_for_each() -> None:
 
 def test_numbers_of_documents_are_plotted_by_tick_and_missing_ones_are_not() -> None:
     document = {"tick": 7, "period_s": 0.004, "joints": {"temperature_c": [40.5, None]}}
-    found = Table().drawn("control_status", json.dumps(document).encode())
+    found = MessageDrawer().draw("control_status", json.dumps(document).encode())
     assert found.tick == 7
     assert [one.path for one in found.entities] == [
         "plots/control_status/period_s",
         "plots/control_status/joints/temperature_c",
     ]
-    older = Table().drawn("control_status", b'{"period_s": 0.004, "joints": null}')
+    older = MessageDrawer().draw("control_status", b'{"period_s": 0.004, "joints": null}')
     assert (older.tick, len(older.entities)) == (None, 1)

@@ -12,11 +12,16 @@ import pytest
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.robots import load_robot
-from vla_deploy.telemetry.schemas.geometry import matrix_json
-from vla_deploy.telemetry.schemas.log_lines import RunLogs
-from vla_deploy.telemetry.schemas.pictures import Pictures
-from vla_deploy.telemetry.schemas.views import CHANNELS, LOG, LOG_SCHEMA, STILL, VIEWS
-from vla_deploy.telemetry.schemas.well_known import well_known
+from vla_deploy.telemetry.recording.messages import RunLogs
+from vla_deploy.telemetry.schemas.foxglove_json import foxglove_schema, matrix_json
+from vla_deploy.telemetry.schemas.views import (
+    CHANNELS,
+    CONSTANT_VIEWS,
+    LOG,
+    LOG_SCHEMA,
+    VIEWS,
+    ViewDrawer,
+)
 
 ROBOT = load_robot("butler")
 NOW_NS = 1_800_000_000_500_000_000
@@ -51,29 +56,29 @@ def payload_of(topic: str, **fields: Any) -> bytes:
     return record.tobytes()
 
 
-def drawn(pictures: Pictures, topic: str, stamp_ns: int = NOW_NS, **fields: Any) -> dict[str, Any]:
+def drawn(drawer: ViewDrawer, topic: str, stamp_ns: int = NOW_NS, **fields: Any) -> dict[str, Any]:
     payload = payload_of(topic, **fields)
     return {
         channel: json.loads(text)
-        for channel, text in pictures.of(topic, payload, stamp_ns, everything)
+        for channel, text in drawer.views_of(topic, payload, stamp_ns, everything)
     }
 
 
 @pytest.fixture
-def pictures() -> Pictures:
-    return Pictures(ROBOT)
+def drawer() -> ViewDrawer:
+    return ViewDrawer(ROBOT)
 
 
 def validate(schema_name: str, message: Mapping[str, Any]) -> None:
-    jsonschema_rs.validator_for(well_known(schema_name)).validate(message)
+    jsonschema_rs.validator_for(foxglove_schema(schema_name)).validate(message)
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.channel)
-def test_every_view_is_what_its_schema_says(pictures: Pictures, view: Any) -> None:
-    validate(view.schema_name, drawn(pictures, view.topic)[view.channel])
+def test_every_view_is_what_its_schema_says(drawer: ViewDrawer, view: Any) -> None:
+    validate(view.schema_name, drawn(drawer, view.topic)[view.channel])
 
 
-@pytest.mark.parametrize("still", STILL, ids=lambda still: still.channel)
+@pytest.mark.parametrize("still", CONSTANT_VIEWS, ids=lambda still: still.channel)
 def test_what_stays_is_what_its_schema_says(still: Any) -> None:
     validate(still.schema_name, still.draw(ROBOT, NOW_NS))
 
@@ -84,39 +89,39 @@ def test_the_schemas_kept_here_are_named_as_their_channels_say(channel: Any) -> 
 
 
 def test_a_view_comes_at_its_own_pace_and_again_when_the_clock_was_set_back(
-    pictures: Pictures,
+    drawer: ViewDrawer,
 ) -> None:
     times_ns = [NOW_NS + after_ns for after_ns in (0, 40_000_000, 80_000_000, 120_000_000, -5)]
-    counts = [len(drawn(pictures, "scan", stamp_ns)) for stamp_ns in times_ns]
+    counts = [len(drawn(drawer, "scan", stamp_ns)) for stamp_ns in times_ns]
     assert counts == [1, 0, 0, 1, 1]
 
 
-def test_what_nobody_wants_is_not_drawn(pictures: Pictures) -> None:
+def test_what_nobody_wants_is_not_drawn(drawer: ViewDrawer) -> None:
     payload = payload_of("joint_state")
-    some = list(pictures.of("joint_state", payload, NOW_NS, lambda name: name == "view/joints"))
+    some = list(drawer.views_of("joint_state", payload, NOW_NS, lambda name: name == "view/joints"))
     assert [channel for channel, _ in some] == ["view/joints"]
 
 
-def test_a_joint_that_is_not_known_has_a_name_but_no_position(pictures: Pictures) -> None:
+def test_a_joint_that_is_not_known_has_a_name_but_no_position(drawer: ViewDrawer) -> None:
     position = np.zeros(32)
     position[0] = np.nan
-    shown = drawn(pictures, "joint_state", position=position)
+    shown = drawn(drawer, "joint_state", position=position)
     joints = {joint["name"]: joint for joint in shown["view/joints"]["joints"]}
     assert joints.keys() == set(ROBOT.joint_names)
     assert "position" not in joints[ROBOT.joint_names[0]]
     assert shown["view/frames"]["transforms"] == []
 
 
-def test_frames_tell_where_the_camera_looks(pictures: Pictures) -> None:
-    frames = drawn(pictures, "joint_state")["view/frames"]["transforms"]
+def test_frames_tell_where_the_camera_looks(drawer: ViewDrawer) -> None:
+    frames = drawn(drawer, "joint_state")["view/frames"]["transforms"]
     camera = next(frame for frame in frames if frame["child_frame_id"] == "camera")
     assert camera["parent_frame_id"] == "base"
     assert camera["translation"]["z"] > 0.5
     assert {frame["child_frame_id"] for frame in frames} >= set(ROBOT.joint_names)
 
 
-def test_an_object_is_drawn_where_the_scene_says(pictures: Pictures) -> None:
-    entities = drawn(pictures, "scene")["view/scene"]["entities"]
+def test_an_object_is_drawn_where_the_scene_says(drawer: ViewDrawer) -> None:
+    entities = drawn(drawer, "scene")["view/scene"]["entities"]
     cup = next(entity for entity in entities if entity["id"] == "object/cup_1")
     assert cup["cubes"][0]["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.8}
     assert cup["texts"][0]["text"] == "cup_1"
@@ -156,9 +161,9 @@ def test_log_lines_of_all_processes_come_in_order_and_once(tmp_path: Any) -> Non
     (tmp_path / "control.log").write_text(line("control", 20) + "\n" + line("control", 40) + "\n")
     (tmp_path / "planner.log").write_text(line("planner", 30) + "\n" + '{"message": "cut')
     logs = RunLogs(tmp_path)
-    fresh = list(logs.fresh())
+    fresh = list(logs.new_lines())
     assert [one.stamp_ns for one in fresh] == [20, 30, 40]
-    assert list(logs.fresh()) == []
+    assert list(logs.new_lines()) == []
     message = json.loads(fresh[0].text(NOW_NS))
     validate(LOG_SCHEMA, message)
     assert (message["name"], message["level"]) == ("control", 3)

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vla_deploy.telemetry.trends import LEVELS, SeriesUnknown, TrendStore, TrendsUnavailable
-from vla_deploy.telemetry.trends.columns import COLUMNS
+from vla_deploy.telemetry.errors import SeriesUnknown, TrendsUnavailable
+from vla_deploy.telemetry.trends import LEVELS, TrendStore
+from vla_deploy.telemetry.trends.ring_file import COLUMNS
 
 START_S = 1_800_000_000  # a whole number of steps of every level
 Open = Callable[[], TrendStore]

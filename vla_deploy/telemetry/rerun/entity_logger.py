@@ -1,4 +1,4 @@
-"""Show messages: draw each by the table, hand it on, and count what does not fit."""
+"""Log messages to Rerun as entities, and count those that cannot be drawn."""
 
 import logging
 from collections import Counter
@@ -6,10 +6,10 @@ from typing import Any, Final, Protocol
 
 from vla_deploy.ipc import BadPayload
 from vla_deploy.telemetry.rerun.entity import Entity
-from vla_deploy.telemetry.rerun.table import Table
+from vla_deploy.telemetry.rerun.table import MessageDrawer
 
-# What a message raises that another version wrote, or nobody should have.
-ODD: Final = (
+# Raised by messages of another version, or malformed ones.
+UNFIT: Final = (
     BadPayload,
     ValueError,
     TypeError,
@@ -20,11 +20,11 @@ ODD: Final = (
 _log = logging.getLogger(__name__)
 
 
-class Stream(Protocol):
+class EntityStream(Protocol):
     """Take entities."""
 
     def at(self, stamp_ns: int, tick: int | None) -> None:
-        """Set the moment of what follows: wall clock, and control's tick if there is one."""
+        """Set the time of what follows: wall clock, and control's tick if there is one."""
         ...
 
     def log(self, entity: Entity) -> None:
@@ -32,7 +32,7 @@ class Stream(Protocol):
         ...
 
     def flush(self) -> None:
-        """Wait until everything is where it belongs.
+        """Wait until everything is written or sent.
 
         Raises:
             ExtraMissing: it cannot be.
@@ -40,31 +40,31 @@ class Stream(Protocol):
         ...
 
 
-class Showing:
-    """Show the messages of one file or of one run.
+class EntityLogger:
+    """Log the messages of one file or of one run.
 
     `shown` counts what was logged, by path; `unfit` what was left out, by channel.
     """
 
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: EntityStream) -> None:
         self.shown: Counter[str] = Counter()
         self.unfit: Counter[str] = Counter()
         self._stream = stream
-        self._table = Table()
+        self._drawer = MessageDrawer()
         self._static: dict[tuple[str, str], Any] = {}
 
     def add(self, channel: str, stamp_ns: int, text: bytes) -> None:
-        """Show one message; `stamp_ns` is wall clock. What does not fit is left out, counted."""
+        """Log one message, or count it as unfit; `stamp_ns` is wall clock."""
         try:
-            drawn = self._table.drawn(channel, text)
+            drawn = self._drawer.draw(channel, text)
             self._stream.at(stamp_ns, drawn.tick)
             for entity in drawn.entities:
                 self._log(entity)
-        except ODD as error:
+        except UNFIT as error:
             self.leave_out(channel, error)
 
     def flush(self) -> None:
-        """Wait until everything that was added is where it belongs.
+        """Wait until everything that was added is written or sent.
 
         Raises:
             ExtraMissing: it cannot be, as with a viewer that was closed.
@@ -72,13 +72,13 @@ class Showing:
         self._stream.flush()
 
     def leave_out(self, what: str, error: Exception) -> None:
-        """Count something that cannot be shown; the first of its kind is told."""
+        """Count what cannot be drawn; the first of its kind is logged as a warning."""
         if not self.unfit[what]:
             _log.warning("%s: left out: %s: %s", what, type(error).__name__, error)
         self.unfit[what] += 1
 
     def _log(self, entity: Entity) -> None:
-        """Hand on an entity; what holds at every time is told once, until it is another."""
+        """Log an entity; a static one only when it has changed."""
         if entity.static:
             key = entity.path, entity.archetype
             if self._static.get(key) == entity.values:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.telemetry.rerun.showing import Showing
+from vla_deploy.telemetry.rerun.entity_logger import EntityLogger
 
 GOOD = b'{"v_m_s": 0.1, "w_rad_s": 0.2}'
 STILL = (
@@ -39,24 +39,24 @@ STILL = (
     ],
 )
 def test_what_does_not_fit_is_left_out_and_counted(taken: Any, channel: str, text: bytes) -> None:
-    showing = Showing(taken)
-    showing.add(channel, 1, text)
-    showing.add("base_command", 2, GOOD)
-    assert showing.unfit == {channel: 1}
+    logger = EntityLogger(taken)
+    logger.add(channel, 1, text)
+    logger.add("base_command", 2, GOOD)
+    assert logger.unfit == {channel: 1}
     assert taken.counts == {"plots/base_command/v_m_s": 1, "plots/base_command/w_rad_s": 1}
-    assert taken.counts == showing.shown
+    assert taken.counts == logger.shown
 
 
 def test_only_the_first_of_its_kind_is_told(taken: Any, caplog: pytest.LogCaptureFixture) -> None:
-    showing = Showing(taken)
+    logger = EntityLogger(taken)
     for _ in range(3):
-        showing.add("base_command", 1, b"nothing")
-    assert showing.unfit.total() == 3
+        logger.add("base_command", 1, b"nothing")
+    assert logger.unfit.total() == 3
     assert [record.message.split(":")[0] for record in caplog.records] == ["base_command"]
 
 
 def test_what_stays_is_told_once_until_it_is_another(taken: Any) -> None:
-    showing = Showing(taken)
+    logger = EntityLogger(taken)
     for width in (3, 3, 5):
-        showing.add("view/lens", 1, STILL % width)
+        logger.add("view/lens", 1, STILL % width)
     assert [one.values["resolution"] for one in taken.of("world/base/camera")] == [[3, 4], [5, 4]]
