@@ -30,7 +30,7 @@ from vla_deploy.control.judging import safety_stage
 
 _COMMAND: Final = "pick up the red cup and put it in the box"
 _PARTS: Final[dict[str, tuple[str, ...]]] = {
-    "read": ("_servos.read", "_judging.watch.refresh", "_desk.listen", "_desk.next_act"),
+    "read": ("_servos.read", "_judging.watch.refresh", "_inbox.listen", "_inbox.next_act"),
     "inputs": ("_judging.watch.inputs",),
     "contact": ("_judging._surroundings._contact.note", "_judging._surroundings._contact.update"),
     "clearance": (

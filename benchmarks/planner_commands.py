@@ -28,8 +28,8 @@ from benchmarks.planner_corpus import (
     command_kinds,
     commands,
 )
-from benchmarks.planner_desk import PROFILE, PlannerAnswer, opened
 from benchmarks.planner_play import CaseVerdict, TurnJudgement, play_afresh
+from benchmarks.planner_session import PROFILE, PlannerAnswer, opened
 from vla_deploy.planning.plan import Plan
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import ASK, PLAN, REFUSE, home, other_talk, scenes
-from benchmarks.planner_desk import fresh_desk
+from benchmarks.planner_session import fresh_session
 
 SCENE: Final = "tidy"
 
@@ -21,9 +21,9 @@ def measure(misses: bool = False) -> dict[str, Any]:
     answers = []
     for text in other_talk():
         # A planner each: what is said next is no answer to what was asked before.
-        with fresh_desk() as desk:
-            desk.tell(world)
-            answers.append((text, desk.say(text)[1]))
+        with fresh_session() as session:
+            session.tell(world)
+            answers.append((text, session.say(text)[1]))
     left_alone = [answer.outcome in (ASK, REFUSE) for _, answer in answers]
     plans = [answer.plan for _, answer in answers if answer.outcome == PLAN]
     report = {

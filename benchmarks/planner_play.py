@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from benchmarks.planner_bounds import broken_bounds, moves
 from benchmarks.planner_corpus import ASK, PLAN, REFUSE, Case, CorpusTurn, home, scenes
-from benchmarks.planner_desk import Desk, PlannerAnswer, fresh_desk
 from benchmarks.planner_effects import perform
 from benchmarks.planner_goals import Goal
+from benchmarks.planner_session import PlannerAnswer, PlannerSession, fresh_session
 from benchmarks.planner_world import ActionFails, FlatWorld
 
 MOST_READINGS: Final = 12
@@ -48,13 +48,13 @@ class CaseVerdict:
         return next((one.answer.rung for one in reversed(self.judged) if one.answer.rung), "none")
 
 
-def play(case: Case, desk: Desk) -> CaseVerdict:
+def play(case: Case, session: PlannerSession) -> CaseVerdict:
     """Say every turn of a case and carry out what is planned, in a flat of its own."""
     world = scenes()[case.scene].world(home())
     judged: list[TurnJudgement] = []
     for turn in case.turns:
-        desk.tell(world)
-        judgement, world = _judge_turn(turn, world, desk)
+        session.tell(world)
+        judgement, world = _judge_turn(turn, world, session)
         judged.append(judgement)
         if judgement.wrong:
             break
@@ -63,16 +63,18 @@ def play(case: Case, desk: Desk) -> CaseVerdict:
 
 def play_afresh(case: Case) -> CaseVerdict:
     """Play a case with a planner of its own: no case is the past of another."""
-    with fresh_desk() as desk:
-        return play(case, desk)
+    with fresh_session() as session:
+        return play(case, session)
 
 
-def _judge_turn(turn: CorpusTurn, world: FlatWorld, desk: Desk) -> tuple[TurnJudgement, FlatWorld]:
-    command_id, answer = desk.say(turn.say) if turn.plan is None else desk.hand_in(turn.plan)
+def _judge_turn(
+    turn: CorpusTurn, world: FlatWorld, session: PlannerSession
+) -> tuple[TurnJudgement, FlatWorld]:
+    command_id, answer = session.say(turn.say) if turn.plan is None else session.hand_in(turn.plan)
     confirmed = answer.reads_back and PLAN in turn.must and ASK not in turn.must
     if confirmed:
         # Agreeing costs no time of planning.
-        first, (_, answer) = answer, desk.say(AGREEMENT)
+        first, (_, answer) = answer, session.say(AGREEMENT)
         answer = replace(answer, busy_s=first.busy_s, cpu_s=first.cpu_s)
     if answer.outcome != PLAN or answer.plan is None:
         wrong = "" if answer.outcome in turn.must else f"{answer.outcome}: {answer.text}"
@@ -84,7 +86,7 @@ def _judge_turn(turn: CorpusTurn, world: FlatWorld, desk: Desk) -> tuple[TurnJud
     if turn.goal is None:
         # What may not be done may still be declined aloud.
         wrong = "planned" if moves(answer.plan) or REFUSE not in turn.must else ""
-    desk.carried_out(command_id, answer.plan, failed)
+    session.carried_out(command_id, answer.plan, failed)
     broken = tuple(broken_bounds(answer.plan, world.home))
     judgement = TurnJudgement(
         say=turn.say, answer=answer, wrong=wrong, broken=broken, confirmed=confirmed

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.planner_corpus import PLAN, Case, commands, home, other_talk, scenes
-from benchmarks.planner_desk import PlannerAnswer, fresh_desk
+from benchmarks.planner_session import PlannerAnswer, fresh_session
 from benchmarks.speech_words import open_shipped
 from drivers.clock import NS_PER_S
 from training.speech.judging import NOISY_DB
@@ -98,9 +98,9 @@ def _typed(case: Case, text: str) -> Typed:
 
 def _answer(scene: str, given: Mapping[str, Any]) -> PlannerAnswer:
     """Return what a planner to whom nobody has spoken yet makes of an utterance."""
-    with fresh_desk() as desk:
-        desk.tell(scenes()[scene].world(home()))
-        return desk.give(**given)[1]
+    with fresh_session() as session:
+        session.tell(scenes()[scene].world(home()))
+        return session.give(**given)[1]
 
 
 def _heard_answer(

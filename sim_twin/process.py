@@ -16,7 +16,7 @@ from drivers.twin_page import PAGE_FILE, TwinPace
 from sim_twin.can import CanHub
 from sim_twin.errors import RefereeRefusal, TwinError
 from sim_twin.faults.camera_relay import faults_in_force
-from sim_twin.faults.desk import FaultDesk
+from sim_twin.faults.fault_server import FaultServer
 from sim_twin.faults.plug import Carrier
 from sim_twin.physics.engine import STEP_NS
 from sim_twin.pictures.drawing import start_camera, start_viewer
@@ -28,7 +28,7 @@ from sim_twin.ports.stream_line import StreamLine
 from sim_twin.priority import Priority, claim_priority
 from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.servos import WireTiming
-from sim_twin.sound.desk import SoundDesk
+from sim_twin.sound.sound_server import SoundServer
 from sim_twin.timing.governor import Governor
 from sim_twin.timing.pacer import Pacer, RealTimeFactor
 from sim_twin.timing.wall_time import WallTime
@@ -106,8 +106,8 @@ class TwinProcess:
             "truth": self._truth,
             "inside": self._inside,
             "hazards": self._hazards,
-            **FaultDesk(self._twin.faults, robot).operations,
-            **SoundDesk(self._twin, devices, options.seed, self._clock_ns).operations,
+            **FaultServer(self._twin.faults, robot).operations,
+            **SoundServer(self._twin, devices, options.seed, self._clock_ns).operations,
         }
         gc.collect()
         gc.freeze()  # a full collection of the model and libraries takes longer than a step

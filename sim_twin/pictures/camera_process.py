@@ -22,7 +22,7 @@ from drivers.twin_page import DEFAULT_HOLD, PAGE_FILE, Op, TimePage, TimeRole
 from sim_twin.faults.camera_relay import CameraBench, CameraFaults
 from sim_twin.physics.load import load_model
 from sim_twin.pictures.drawing_process import drawing_parser, run_drawing, take_over
-from sim_twin.pictures.film_desk import FilmDesk
+from sim_twin.pictures.film_server import FilmServer
 from sim_twin.pictures.head_camera import HeadCamera, camera_line
 from sim_twin.pictures.mirror import MirrorState, newest_state
 from sim_twin.pictures.mirror_link import PERIOD_NS
@@ -68,8 +68,8 @@ class Studio:
         bench = CameraBench(robot, self._camera, line, lambda: self._shown_ns)
         bench.plugs[robot.camera.device].add_socket(self._stream)
         self._faults = CameraFaults(bench)
-        self._desk = FilmDesk(self._model, self._data, camera=robot.camera.site)
-        self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._desk.answer)
+        self._film = FilmServer(self._model, self._data, camera=robot.camera.site)
+        self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._film.answer)
 
     def run(self, mirror: socket.socket) -> None:
         """Serve until the mirror's other end closes."""
@@ -130,7 +130,7 @@ class Studio:
 
     def close(self) -> None:
         """Finish the film and take the sockets away."""
-        self._desk.close()
+        self._film.close()
         self._film_server.close()
         self._stream.close()
         self._camera.close()
@@ -145,10 +145,10 @@ class Studio:
             if device.is_due(state.clock_ns):
                 self._hold_until(state.clock_ns + LATENCY_NS)
             device.step(state.clock_ns)
-        if self._desk.is_due(state.now_ns):
+        if self._film.is_due(state.now_ns):
             until_ns = state.clock_ns + _FILM_HOLD_NS
             self._hold_until(min(until_ns, device.next_event_ns(until_ns)))
-            self._desk.shoot(state.now_ns)
+            self._film.shoot(state.now_ns)
         self._stream.poll_once()
 
     def _hold_until(self, until_ns: int) -> None:

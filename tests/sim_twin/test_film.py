@@ -7,7 +7,7 @@ import pytest
 from sim_twin.errors import FilmFault, RefereeRefusal
 from sim_twin.physics.engine import Engine
 from sim_twin.pictures.film import HEIGHT, WIDTH, Film, contact_sheet
-from sim_twin.pictures.film_desk import FilmDesk
+from sim_twin.pictures.film_server import FilmServer
 
 OWN = "head_camera"
 
@@ -63,7 +63,7 @@ def test_the_sheet_spreads_over_the_whole_film() -> None:
 def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
     engine: Engine, tmp_path: Path
 ) -> None:
-    desk = FilmDesk(engine.model, engine.data, camera=OWN)
+    desk = FilmServer(engine.model, engine.data, camera=OWN)
     desk.answer({"op": "film_start", "path": str(tmp_path / "film.avi")})
     desk.answer({"op": "caption", "text": "hello"})
     for step in range(0, 1_000_000_000, 20_000_000):
@@ -75,9 +75,9 @@ def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
 @pytest.mark.parametrize("op", ["film_stop", "caption", "explode"])
 def test_the_desk_refuses_what_it_cannot_do(engine: Engine, op: str) -> None:
     with pytest.raises(RefereeRefusal):
-        FilmDesk(engine.model, engine.data, camera=OWN).answer({"op": op})
+        FilmServer(engine.model, engine.data, camera=OWN).answer({"op": op})
 
 
 def test_a_film_needs_a_path(engine: Engine) -> None:
     with pytest.raises(RefereeRefusal, match="expected a path"):
-        FilmDesk(engine.model, engine.data, camera=OWN).answer({"op": "film_start"})
+        FilmServer(engine.model, engine.data, camera=OWN).answer({"op": "film_start"})

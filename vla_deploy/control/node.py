@@ -11,7 +11,7 @@ from vla_deploy.control.judging.estop_button import EstopButton
 from vla_deploy.control.judging.safety_stage import Judging
 from vla_deploy.control.modes.controlled_descent import LOWERING_S
 from vla_deploy.control.modes.modes import AT_REST_MODES, Modes
-from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorDesk
+from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorInbox
 from vla_deploy.control.modes.resetting import Resetting
 from vla_deploy.control.modes.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.modes.standstill import Standstill
@@ -74,7 +74,7 @@ class ControlNode:
 
         self._button = EstopButton(robot, devices, clock)
         with closing(space.cell_reader("control_status")) as before:
-            self._desk = OperatorDesk(
+            self._inbox = OperatorInbox(
                 space.ring_reader("operator", from_start=True), self._button.source, before.latest()
             )
         self._judging = Judging(space, robot, servos, wheels, clock)
@@ -83,7 +83,7 @@ class ControlNode:
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
         self._status = Status(
-            self._ticks, self._modes, self._judging, self._desk, self._motions, servos, wheels
+            self._ticks, self._modes, self._judging, self._inbox, self._motions, servos, wheels
         )
 
     def start(self) -> None:
@@ -137,10 +137,10 @@ class ControlNode:
 
     def _switch_off(self) -> None:
         self._wheels.disable()
-        asked_before = self._desk.estop_source is not None
+        asked_before = self._inbox.estop_source is not None
         off = SwitchingOff(self._robot, self._servos, self._stopping, self._joints)
         self._wind_down(
-            lambda: off.step(self.period_s, None if asked_before else self._desk.estop_source),
+            lambda: off.step(self.period_s, None if asked_before else self._inbox.estop_source),
             LOWERING_S,
         )
         off.end()
@@ -150,7 +150,7 @@ class ControlNode:
         deadline_ns = self._clock.now_ns() + round(limit_s * NS_PER_S)
         while not done() and self._clock.now_ns() < deadline_ns:
             self._servos.read()
-            self._desk.listen()
+            self._inbox.listen()
             self._telemetry.tell_results(self._joints.move(self.period_s))
             self._telemetry.tell_joints(self._servos.state, self._joints.sent)
             self._base.brake(self.period_s)
@@ -186,10 +186,10 @@ class ControlNode:
             self._wheels.try_reopen()
         self._servos.read()
         self._judging.watch.refresh()
-        self._desk.listen()
+        self._inbox.listen()
 
     def _judge(self, now_ns: int) -> None:
-        self._act = None if self._resetting.under_way else self._desk.next_act()
+        self._act = None if self._resetting.under_way else self._inbox.next_act()
         if self._act is OperatorAct.RESET:
             self._modes.notice = self._resetting.begin(
                 now_ns,
@@ -202,14 +202,14 @@ class ControlNode:
             now_ns,
             self._joints.sent,
             energised=self._modes.mode is not Mode.DISARMED,
-            estop_source=self._desk.estop_source,
+            estop_source=self._inbox.estop_source,
             reset_requested=self._resetting.asks,
             base_at_rest=self._base.ramp.at_rest,
             standstill=self._modes.mode in _STANDSTILL_MODES,
         )
         self._follow_encoders(jumped)
         given_up = self._resetting.note(
-            now_ns, self._judging.verdict.reset, estop_asked=self._desk.estop_source is not None
+            now_ns, self._judging.verdict.reset, estop_asked=self._inbox.estop_source is not None
         )
         self._modes.notice = given_up or self._modes.notice
 

@@ -6,7 +6,7 @@ import pytest
 from drivers.errors import DeviceMissing, LinkLost
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
-from sim_twin.faults.desk import FaultDesk
+from sim_twin.faults.fault_server import FaultServer
 from sim_twin.faults.table import EFFECTS, faults_of
 from sim_twin.harness.lockstep import Lockstep
 
@@ -150,7 +150,7 @@ def test_every_effect_begins_and_ends(
 
 
 def test_the_desk_lists_injects_and_clears(lockstep: Lockstep) -> None:
-    desk = FaultDesk(lockstep.faults, lockstep.robot).operations
+    desk = FaultServer(lockstep.faults, lockstep.robot).operations
     listed = desk["fault_list"]({})
     (servo,) = [row for row in listed["catalogue"] if row["component"] == "servo"]
     assert servo["instances"]["left_elbow"] == ELBOW_ID
@@ -168,7 +168,7 @@ def test_the_desk_lists_injects_and_clears(lockstep: Lockstep) -> None:
 
 
 def test_the_desk_plays_a_scenario_by_name_or_text(lockstep: Lockstep) -> None:
-    desk = FaultDesk(lockstep.faults, lockstep.robot).operations
+    desk = FaultServer(lockstep.faults, lockstep.robot).operations
     played = desk["fault_run"]({"name": "servo_bus_unplug"})
     assert played["expect"]["cause"] == "servo_bus_lost"
     assert [fault["fault"] for fault in played["pending"]] == ["servo_bus: unplug"]

@@ -10,16 +10,16 @@ from vla_deploy.control.modes.operator_acts import (
     LOST,
     MOST_WAITING,
     OperatorAct,
-    OperatorDesk,
+    OperatorInbox,
 )
 from vla_deploy.ipc import RingWriter, SharedSpace
 
 
 @pytest.fixture
-def ring(tmp_path: Path) -> tuple[OperatorDesk, RingWriter]:
+def ring(tmp_path: Path) -> tuple[OperatorInbox, RingWriter]:
     space = SharedSpace(tmp_path, MonotonicClock())
     writer = space.ring_writer("operator")
-    return OperatorDesk(space.ring_reader("operator", from_start=False)), writer
+    return OperatorInbox(space.ring_reader("operator", from_start=False)), writer
 
 
 def ask(writer: RingWriter, *acts: str) -> None:
@@ -27,7 +27,7 @@ def ask(writer: RingWriter, *acts: str) -> None:
         writer.publish({"act": act, "source": "page", "reason": ""})
 
 
-def test_acts_are_handed_out_one_by_one_in_order(ring: tuple[OperatorDesk, RingWriter]) -> None:
+def test_acts_are_handed_out_one_by_one_in_order(ring: tuple[OperatorInbox, RingWriter]) -> None:
     desk, writer = ring
     ask(writer, "reset", "arm")
     desk.listen()
@@ -40,7 +40,7 @@ def test_acts_are_handed_out_one_by_one_in_order(ring: tuple[OperatorDesk, RingW
 
 
 def test_an_estop_acts_for_one_tick_and_drops_what_came_before(
-    ring: tuple[OperatorDesk, RingWriter],
+    ring: tuple[OperatorInbox, RingWriter],
 ) -> None:
     desk, writer = ring
     ask(writer, "arm", "estop", "reset")
@@ -51,7 +51,7 @@ def test_an_estop_acts_for_one_tick_and_drops_what_came_before(
     assert desk.estop_source is None
 
 
-def test_lost_events_count_as_an_estop(ring: tuple[OperatorDesk, RingWriter]) -> None:
+def test_lost_events_count_as_an_estop(ring: tuple[OperatorInbox, RingWriter]) -> None:
     desk, writer = ring
     ask(writer, *["reset"] * 200)
     desk.listen()
@@ -60,7 +60,7 @@ def test_lost_events_count_as_an_estop(ring: tuple[OperatorDesk, RingWriter]) ->
 
 
 def test_a_damaged_event_counts_as_an_estop(
-    ring: tuple[OperatorDesk, RingWriter], tmp_path: Path
+    ring: tuple[OperatorInbox, RingWriter], tmp_path: Path
 ) -> None:
     desk, writer = ring
     ask(writer, "reset")
@@ -74,7 +74,7 @@ def test_a_damaged_event_counts_as_an_estop(
 
 
 def test_whoever_floods_the_desk_delays_nobody_for_long(
-    ring: tuple[OperatorDesk, RingWriter],
+    ring: tuple[OperatorInbox, RingWriter],
 ) -> None:
     desk, writer = ring
     for _ in range(100):
@@ -87,7 +87,7 @@ def test_whoever_floods_the_desk_delays_nobody_for_long(
     ]
 
 
-def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorDesk, RingWriter]) -> None:
+def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorInbox, RingWriter]) -> None:
     desk, writer = ring
     ask(writer, "dance")
     desk.listen()
@@ -98,7 +98,7 @@ def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorDesk, RingW
     )
 
 
-def reopened(tmp_path: Path, *, latched: bool | None, before: bool) -> OperatorDesk:
+def reopened(tmp_path: Path, *, latched: bool | None, before: bool) -> OperatorInbox:
     """Return the desk of a control that starts after a press, told of `before` it or not."""
     space = SharedSpace(tmp_path, MonotonicClock())
     writer, status = space.ring_writer("operator"), space.cell_writer("control_status")
@@ -108,7 +108,7 @@ def reopened(tmp_path: Path, *, latched: bool | None, before: bool) -> OperatorD
     if latched is not None and before:
         status.put_document({"estop_latched": latched})
     ring = space.ring_reader("operator", from_start=True)
-    return OperatorDesk(ring, last_status=space.cell_reader("control_status").latest())
+    return OperatorInbox(ring, last_status=space.cell_reader("control_status").latest())
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_a_stop_that_no_control_saw_to_its_end_outlives_a_restart(
 def test_events_lost_while_control_was_away_count_as_an_estop(tmp_path: Path) -> None:
     space = SharedSpace(tmp_path, MonotonicClock())
     ask(space.ring_writer("operator"), *["arm"] * 100)
-    desk = OperatorDesk(space.ring_reader("operator", from_start=True))
+    desk = OperatorInbox(space.ring_reader("operator", from_start=True))
     desk.listen()
     assert desk.estop_source == LOST
 
@@ -145,7 +145,7 @@ def test_a_long_history_that_control_had_seen_is_no_loss(tmp_path: Path) -> None
     ask(space.ring_writer("operator"), *["arm"] * 100)
     space.cell_writer("control_status").put_document({"estop_latched": False})
     last = space.cell_reader("control_status").latest()
-    desk = OperatorDesk(space.ring_reader("operator", from_start=True), last_status=last)
+    desk = OperatorInbox(space.ring_reader("operator", from_start=True), last_status=last)
     ask(space.ring_writer("operator"), "arm")
     desk.listen()
     assert desk.estop_source is None

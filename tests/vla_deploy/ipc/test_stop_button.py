@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorDesk
+from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorInbox
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.memory.segment import Segment
 from vla_deploy.ipc.stop_button import StopButton
@@ -79,7 +79,7 @@ def test_a_press_waits_for_no_writer_that_is_frozen_in_the_middle(
     space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     frozen, press = space.ring_writer("operator"), StopButton(space, "page", clock).press
-    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    desk = OperatorInbox(space.ring_reader("operator", from_start=False))
     go_on = frozen._slots.write
 
     def freeze(*slot: Any) -> None:
@@ -101,7 +101,7 @@ def test_a_writer_that_is_frozen_as_it_tells_of_its_event_does_not_take_the_pres
     space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     press = StopButton(space, "page", clock).press
-    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    desk = OperatorInbox(space.ring_reader("operator", from_start=False))
     newest, tell = Segment.newest, Segment.newest.fset
     assert tell is not None
 
@@ -122,7 +122,7 @@ def test_a_press_that_is_frozen_itself_counts_though_others_went_on(
     space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch, passing: int
 ) -> None:
     button, other = StopButton(space, "page", clock), space.ring_writer("operator")
-    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    desk = OperatorInbox(space.ring_reader("operator", from_start=False))
     go_on = button._out._slots.write
     other_writes = ExitStack()
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import Desk, fresh_desk
+from benchmarks.planner_session import PlannerSession, fresh_desk
 from drivers.clock import MonotonicClock
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, StandingOrder
@@ -24,12 +24,12 @@ KEYS = Prohibition(what=Forbidden.THING, words="keys")
 KITCHEN = Prohibition(what=Forbidden.PLACE, words="kitchen")
 
 
-def in_the_flat(desk: Desk) -> Desk:
+def in_the_flat(desk: PlannerSession) -> PlannerSession:
     desk.tell(scenes()["tidy"].world(home()))
     return desk
 
 
-def refused(desk: Desk, text: str) -> str:
+def refused(desk: PlannerSession, text: str) -> str:
     answer = desk.say(text)[1]
     assert answer.outcome == "refuse", answer
     return answer.text

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import fresh_desk
+from benchmarks.planner_session import fresh_desk
 
 
 @pytest.mark.parametrize(

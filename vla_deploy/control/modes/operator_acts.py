@@ -21,7 +21,7 @@ class OperatorAct(Enum):
     DISARM = "disarm"
 
 
-class OperatorDesk:
+class OperatorInbox:
     """Drain the operator ring, and look at the robot's own button.
 
     `button` names the button as the source of a stop for as long as it is pressed. `last_status` is

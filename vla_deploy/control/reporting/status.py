@@ -4,7 +4,7 @@ from typing import Any
 
 from vla_deploy.control.judging.safety_stage import Judging
 from vla_deploy.control.modes.modes import Modes
-from vla_deploy.control.modes.operator_acts import OperatorDesk
+from vla_deploy.control.modes.operator_acts import OperatorInbox
 from vla_deploy.control.modes.state_machine import status_name
 from vla_deploy.control.motion.motions import MotionSet
 from vla_deploy.control.output.servos import ServoLine
@@ -27,7 +27,7 @@ class Status:
         ticks: TickClock,
         modes: Modes,
         judging: Judging,
-        desk: OperatorDesk,
+        inbox: OperatorInbox,
         motions: MotionSet,
         servos: ServoLine,
         wheels: Wheels,
@@ -35,7 +35,7 @@ class Status:
         self._ticks = ticks
         self._modes = modes
         self._judging = judging
-        self._desk = desk
+        self._inbox = inbox
         self._motions = motions
         self._servos = servos
         self._wheels = wheels
@@ -49,9 +49,9 @@ class Status:
 
     def _matters(self) -> tuple[Any, ...]:
         """Return what of it nobody may learn late."""
-        verdict, modes, desk = self._judging.verdict, self._modes, self._desk
+        verdict, modes, inbox = self._judging.verdict, self._modes, self._inbox
         return (
-            *(modes.mode, modes.notice, desk.complaint, self._motions.active_ids),
+            *(modes.mode, modes.notice, inbox.complaint, self._motions.active_ids),
             *(verdict.cause, verdict.reaction, verdict.latched, verdict.subject, verdict.blocked),
             self._judging.state.latched,
         )
@@ -62,7 +62,7 @@ class Status:
             "state": status_name(self._modes.mode, verdict.reaction),
             "estop_latched": self._judging.state.estop_latched,
             **verdict_document(verdict),
-            "detail": detail(verdict.text, self._modes.notice, self._desk.complaint),
+            "detail": detail(verdict.text, self._modes.notice, self._inbox.complaint),
             "tick": ticks.tick,
             "judged_tick": self._judging.tick,
             "late_ticks": ticks.late_ticks,

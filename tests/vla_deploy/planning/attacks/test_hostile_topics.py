@@ -7,20 +7,20 @@ from typing import Any, Final
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import Desk, fresh_desk
+from benchmarks.planner_session import PlannerSession, fresh_desk
 from benchmarks.planner_told import scene_document
 
 CLEAR: Final = ("plan", "ask", "refuse")
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
+def desk() -> Iterator[PlannerSession]:
     with fresh_desk() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         yield desk
 
 
-def assert_goes_on(desk: Desk) -> None:
+def assert_goes_on(desk: PlannerSession) -> None:
     desk.tell(scenes()["tidy"].world(home()))
     assert desk.say("go to the kitchen")[1].outcome == "plan"
 
@@ -49,7 +49,7 @@ UTTERANCES: Final[dict[str, dict[str, Any]]] = {
 
 @pytest.mark.parametrize("utterance", UTTERANCES.values(), ids=UTTERANCES)
 def test_an_utterance_of_any_form_has_a_clear_outcome(
-    desk: Desk, utterance: dict[str, Any]
+    desk: PlannerSession, utterance: dict[str, Any]
 ) -> None:
     _, answer = desk.give(**utterance)
     allowed = CLEAR if utterance.get("text") == "go to the kitchen" else CLEAR[1:]
@@ -79,7 +79,7 @@ SCENES: Final[dict[str, dict[str, Any]]] = {
 
 @pytest.mark.parametrize("document", SCENES.values(), ids=SCENES)
 def test_a_scene_of_any_form_keeps_nobody_from_answering(
-    desk: Desk, document: dict[str, Any]
+    desk: PlannerSession, document: dict[str, Any]
 ) -> None:
     desk.show("scene", document)
     for text in ("pick up the red cup", "put the ball in the box", "where is the box"):

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_desk import fresh_desk
+from benchmarks.planner_session import fresh_desk
 
 SENTENCES = (
     "take the ball to the kitchen, I changed my mind",

@@ -15,11 +15,11 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.motions import Claimed, JointView, Motions
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.pursuing import (
-    ActionDesk,
     Begin,
     Feedback,
     GoalEnding,
     GoalOutcome,
+    GoalServer,
 )
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.robots import RobotDescription
@@ -147,7 +147,7 @@ class _Parallel:
         )
 
 
-def gripper_desks(gateway: Gateway, motions: Motions) -> Iterator[ActionDesk]:
+def gripper_servers(gateway: Gateway, motions: Motions) -> Iterator[GoalServer]:
     """Yield the servers of every hand."""
     for hand, described in gateway.robot.hands.items():
         fingers = GripperJoint.of(gateway.robot, hand)
@@ -156,7 +156,7 @@ def gripper_desks(gateway: Gateway, motions: Motions) -> Iterator[ActionDesk]:
             (_Parallel(fingers.joint), f"/{described.gripper}_parallel_controller/gripper_cmd"),
         ):
             server = GripperServer(gateway, motions, hand, fingers, dialect)
-            yield ActionDesk(gateway.graph, dialect.kind, name, server.judge)
+            yield GoalServer(gateway.graph, dialect.kind, name, server.judge)
 
 
 class GripperServer:

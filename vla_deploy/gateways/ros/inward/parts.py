@@ -11,12 +11,12 @@ from vla_deploy.client.motions import Claimed, Motions
 from vla_deploy.gateways.ros.inward.acts import Acts
 from vla_deploy.gateways.ros.inward.claiming import Borrowed, PartsHold
 from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
-from vla_deploy.gateways.ros.inward.grippers import gripper_desks
+from vla_deploy.gateways.ros.inward.grippers import gripper_servers
 from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
 from vla_deploy.gateways.ros.inward.orders import CommandOrders
 from vla_deploy.gateways.ros.inward.plans import PlanServer
-from vla_deploy.gateways.ros.inward.pursuing import ActionDesk
+from vla_deploy.gateways.ros.inward.pursuing import GoalServer
 from vla_deploy.gateways.ros.inward.say_topic import SayTopic
 from vla_deploy.gateways.ros.inward.trajectories import TrajectoryServer
 from vla_deploy.gateways.ros.inward.velocity import Velocity
@@ -52,14 +52,14 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
         parts.append(Velocity(gateway, Claimed(link, "ros/cmd_vel", (BASE,))))
     if takes_all or settings.are_arms_beyond:
         parts.append(Shared(motions, orders))
-        parts += _trajectory_desks(gateway, motions, lending)
+        parts += _trajectory_servers(gateway, motions, lending)
     if takes_all:
         navigation = NavigationServer(gateway, orders)
         plans = PlanServer(gateway, orders)
         navigating = f"{OWN if settings.is_driven_by_nav2 else ''}/navigate_to_pose"
-        parts += gripper_desks(gateway, motions)
-        parts.append(ActionDesk(graph, NavigateToPose, navigating, navigation.judge))
-        parts.append(ActionDesk(graph, ExecutePlan, f"{OWN}/execute_plan", plans.judge))
+        parts += gripper_servers(gateway, motions)
+        parts.append(GoalServer(graph, NavigateToPose, navigating, navigation.judge))
+        parts.append(GoalServer(graph, ExecutePlan, f"{OWN}/execute_plan", plans.judge))
         parts += [CommandTopics(gateway, orders), SayTopic(gateway)]
         if not settings.are_arms_beyond:
             parts.append(JointCommands(gateway, motions))
@@ -84,7 +84,9 @@ class Shared:
         self._orders.close()
 
 
-def _trajectory_desks(gateway: Gateway, motions: Motions, lending: Lending) -> Iterator[ActionDesk]:
+def _trajectory_servers(
+    gateway: Gateway, motions: Motions, lending: Lending
+) -> Iterator[GoalServer]:
     """Yield a server for each group, and one for all joints.
 
     Where servers beyond the robot move its arms, those have the names: ours go by another one, and
@@ -112,4 +114,4 @@ def _trajectory_desks(gateway: Gateway, motions: Motions, lending: Lending) -> I
     )
     for name, server in servers.items():
         action = f"{OWN if arms else ''}/{name}/follow_joint_trajectory"
-        yield ActionDesk(gateway.graph, FollowJointTrajectory, action, server.judge)
+        yield GoalServer(gateway.graph, FollowJointTrajectory, action, server.judge)

@@ -62,7 +62,7 @@ class _Goal:
     cancelling: bool = False
 
 
-class ActionDesk:
+class GoalServer:
     """Take the goals of one action; a sound new goal ends the one before it, as usual in ROS."""
 
     def __init__(self, graph: GraphLink, kind: Any, name: str, judge: Judge) -> None:

@@ -57,15 +57,15 @@ class PlannerAnswer:
 
 
 @contextmanager
-def fresh_desk() -> Iterator["Desk"]:
+def fresh_session() -> Iterator["PlannerSession"]:
     """Give a planner to whom nobody has spoken yet."""
     memory = Path("/dev/shm")
     with TemporaryDirectory(prefix="vla-", dir=memory if memory.is_dir() else None) as folder:
-        desk = Desk(Path(folder) / "base" / "run")
+        session = PlannerSession(Path(folder) / "base" / "run")
         try:
-            yield desk
+            yield session
         finally:
-            desk.close()
+            session.close()
 
 
 @cache
@@ -75,12 +75,12 @@ def _robot() -> RobotDescription:
 
 @cache
 def opened(profile: str) -> tuple[tuple[BackEnd, ...], dict[str, str]]:
-    """Open the shipped models that a profile names, once for all desks: that takes longest."""
+    """Open the shipped models that a profile names, once for all sessions: that takes longest."""
     shelf = ModelShelf.of_base(NOWHERE, MonotonicClock())
     return open_local_models(_robot(), load_profile(profile), shelf)
 
 
-class Desk:
+class PlannerSession:
     """Run one planner on a time of its own; `say` returns its answer."""
 
     def __init__(self, folder: Path, profile: str = PROFILE) -> None:

@@ -22,7 +22,7 @@ from vla_deploy.speech.voice.clip import Clip
 Answer = dict[str, Any]
 
 
-class SoundDesk:
+class SoundServer:
     """Serve one twin's room; `clock_ns` returns the run's time of a simulated one."""
 
     def __init__(self, twin: Twin, folder: Path, seed: int, clock_ns: Callable[[int], int]) -> None:

@@ -13,7 +13,7 @@ from vla_deploy.robots import RobotDescription
 Answer = dict[str, Any]
 
 
-class FaultDesk:
+class FaultServer:
     """Carry out requests on one injector; `operations` are by their names on the wire."""
 
     def __init__(self, injector: FaultInjector, robot: RobotDescription) -> None:

@@ -13,7 +13,7 @@ from sim_twin.pictures.film import FPS, Film
 _Text = Mapping[str, Any]
 
 
-class FilmDesk:
+class FilmServer:
     """Own at most one film of a model's state; `camera` is the robot's own, for the inset."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, *, camera: str) -> None:
