@@ -8,7 +8,7 @@ from sim_twin.stack import LockstepStack
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import Feasible
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.cli.analyse import ask
+from vla_deploy.cli.observation.analyse import ask
 from vla_deploy.cli.session import Session
 
 pytestmark = pytest.mark.gl

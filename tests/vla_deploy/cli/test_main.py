@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.cli import demo
 from vla_deploy.cli.commands import COMMANDS
 from vla_deploy.cli.errors import USER_ERRORS
 from vla_deploy.cli.main import main, parser
+from vla_deploy.cli.operation import demo
 
-BUTLER = Path(demo.__file__).parents[1] / "robots" / "butler"
+BUTLER = Path(demo.__file__).parents[2] / "robots" / "butler"
 CYCLE = {
     "goal": "wait for ever",
     "actions": [
@@ -233,6 +233,6 @@ def test_the_service_tries_again_after_a_fault_of_the_system(capsys, monkeypatch
     def fill_up(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("vla_deploy.cli.run.main", fill_up)
+    monkeypatch.setattr("vla_deploy.cli.operation.run.main", fill_up)
     assert main(["run", "--twin"]) == 1
     assert capsys.readouterr().err == "vla-deploy: [Errno 28] No space left on device\n"
