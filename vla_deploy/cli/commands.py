@@ -26,14 +26,12 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "demo": Command("operation.demo", "do the main job on the twin"),
     "say": Command("operation.say", "give the robot a command and follow it"),
     "hear": Command(
-        "observation.hear", "tell what is understood of a recording, or of what you say now"
+        "observation.hear", "show what is understood of a recording, or of live speech"
     ),
-    "plan": Command(
-        "observation.plan", "tell what would be done for a command, and who planned it"
-    ),
-    "status": Command("observation.status", "tell what runs and how the robot is"),
+    "plan": Command("observation.plan", "show the plan for a command, and which back end made it"),
+    "status": Command("observation.status", "show what runs and the state of the robot"),
     "dashboard": Command(
-        "maintenance.dashboard", "tell where the robot's page is, and who may use it"
+        "maintenance.dashboard", "show where the robot's page is, and who may use it"
     ),
     "top": Command(
         "observation.top", "show processes, budgets, control and topics on one screen, for ssh"
@@ -41,11 +39,11 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "metrics": Command(
         "observation.metrics", "list what is measured; print alert rules or a Grafana dashboard"
     ),
-    "scene": Command("observation.scene", "tell what the robot knows of the things around it"),
-    "memory": Command("observation.memory", "tell what the robot remembers, and have it forget"),
+    "scene": Command("observation.scene", "show what the robot knows about the things around it"),
+    "memory": Command("observation.memory", "show what the robot remembers, and delete it"),
     "budget": Command(
         "observation.budget",
-        "tell what the robot uses of its budgets, and what is done about an excess",
+        "show what the robot uses of its budgets, and what is done about an excess",
     ),
     "logs": Command("observation.logs", "show what the processes log"),
     "crashes": Command("observation.logs", "list and show crash reports"),
@@ -73,17 +71,17 @@ COMMANDS: Final[Mapping[str, Command]] = {
     ),
     "can": Command("devices.can", "find CAN nodes and watch the traffic"),
     "fault": Command("devices.fault", "make the twin's devices fail"),
-    "flight": Command("recording.flight", "look into what the flight recorder saved"),
+    "flight": Command("recording.flight", "show what the flight recorder saved"),
     "record": Command(
         "recording.record", "record what the robot does: rolling files, or one of your own"
     ),
     "replay": Command(
-        "recording.replay", "show a recording or a flight as if it were happening; no robot"
+        "recording.replay", "replay a recording or a flight on the dashboard; no robot"
     ),
     "foxglove": Command(
-        "recording.viewers", "let viewers such as Foxglove watch the run live, read-only"
+        "recording.viewers", "serve the run live to viewers such as Foxglove, read-only"
     ),
-    "rerun": Command("recording.viewers", "look at a recording, a flight or the run live in Rerun"),
+    "rerun": Command("recording.viewers", "show a recording, a flight or the live run in Rerun"),
     "check": Command(
         "maintenance.check", "check a robot, a profile or a plan, and report all faults"
     ),
@@ -91,16 +89,16 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "map": Command("maintenance.map", "record, look at, check and convert maps in the ROS format"),
     "models": Command("models.commands", "add, fetch, list, measure, quantise and verify models"),
     "analyse": Command(
-        "observation.analyse", "tell what the scene holds, and whether a goal can be reached"
+        "observation.analyse", "analyse the scene, and whether a goal can be reached"
     ),
     "servers": Command("models.servers", "see and try the model servers that the robot may ask"),
     "doctor": Command(
-        "maintenance.doctor", "examine this computer, and say how to mend what is wrong"
+        "maintenance.doctor", "examine this computer, and say how to repair what is wrong"
     ),
     "probes": Command(
         "maintenance.doctor", "print load, memory, power, heat and throttling of this computer"
     ),
-    "bench": Command("maintenance.measure", "measure beside a peer or a limit, in the same run"),
+    "bench": Command("maintenance.measure", "measure against a peer or a limit, in the same run"),
     "validate": Command("maintenance.measure", "run a campaign against the twin"),
     "install": Command("maintenance.install", "install the robot as a service of this computer"),
     "uninstall": Command("maintenance.install", "remove exactly what install wrote"),

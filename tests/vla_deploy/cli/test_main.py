@@ -5,6 +5,7 @@ import errno
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -42,9 +43,19 @@ def commands() -> dict[str, argparse.ArgumentParser]:
     return sub.choices
 
 
-@pytest.mark.parametrize("name", sorted(commands()))
-def test_the_help_of_every_command_ends_with_an_example(name):
-    assert f"  vla-deploy {name}" in commands()[name].format_help().split("examples:")[1]
+def every_parser(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for one in action.choices.values():
+                yield one
+                yield from every_parser(one)
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param(one, id=one.prog) for one in every_parser(parser())]
+)
+def test_the_help_of_every_command_ends_with_an_example(command):
+    assert f"  {command.prog}" in command.format_help().split("examples:")[1]
 
 
 def test_the_list_of_commands_tells_of_each_what_it_tells_of_itself():

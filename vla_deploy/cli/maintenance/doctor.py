@@ -40,7 +40,7 @@ def register(commands: Any) -> None:
         run,
         json="print JSON",
     )
-    examined.add_argument("--robot", metavar="NAME", help="check the devices of this robot, too")
+    examined.add_argument("--robot", metavar="NAME", help="also check the devices of this robot")
     examined.add_argument(
         "--profile", metavar="NAME", help="what is needed (default: as run has it)"
     )

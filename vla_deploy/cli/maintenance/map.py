@@ -47,7 +47,7 @@ def register(commands: Any) -> None:
             ("convert", "write a map of any mode and image as a trinary PGM", run_convert),
         )
     )
-    record.add_argument("map", type=Path, help="the YAML file to write; its image lies beside it")
+    record.add_argument("map", type=Path, help="the YAML file to write; its image goes next to it")
     record.add_argument("--robot", default="butler", help="name or folder (default: butler)")
     record.add_argument(
         "--seconds",
@@ -62,10 +62,12 @@ def register(commands: Any) -> None:
         help="of a cell (0.05 m)",
     )
     show.add_argument("--png", type=Path, metavar="FILE", help="write an image instead")
-    check.add_argument("--robot", help="name or folder: does it fit there, does it get about")
+    check.add_argument(
+        "--robot", help="name or folder: check that it fits there and reaches its places"
+    )
     for act in (show, check, convert):
         act.add_argument("map", type=Path, help="its YAML file")
-    convert.add_argument("to", type=Path, help="the YAML file to write; its image lies beside it")
+    convert.add_argument("to", type=Path, help="the YAML file to write; its image goes next to it")
     for act in (record, convert):
         act.add_argument("--replace", action="store_true", help="replace a map of that name")
 

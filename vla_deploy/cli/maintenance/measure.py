@@ -19,7 +19,7 @@ BENCHMARKS: Final = {
     "control": "CPU time of a control tick by stage: at rest, driving, arms moving",
     "dashboard": "what clients cost control, one of them frozen; its stop to the wire; --part",
     "estop": "emergency stop: from the request to the wire under load, and to standstill",
-    "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",
+    "perception": "how well, how fast and at what cost the robot sees; int8 against fp32; --part",
     "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
     "recorder": "what the flight recorder costs: per control tick, per look, per flight",
     "ros": "the ROS gateway: its share of a core, its latency, late ticks with and without it",
@@ -31,7 +31,7 @@ BENCHMARKS: Final = {
 CAMPAIGNS: Final = {
     "faults": "every fault in every phase of the work, on the lock-step twin",
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
-    "load": "the main job again and again beside eight busy loops: only its duration may change",
+    "load": "the main job repeatedly, with eight busy loops: only its duration may change",
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",

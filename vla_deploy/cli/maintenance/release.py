@@ -40,7 +40,7 @@ def register(commands: Any) -> None:
     release.add_argument("--id", help="of the release to add (default: version and checksum)")
     release.add_argument("--wheelhouse", type=Path, help="a folder of wheels; no network is used")
     release.add_argument(
-        "--system-packages", action="store_true", help="let it see the computer's packages"
+        "--system-packages", action="store_true", help="give it access to the computer's packages"
     )
     release.add_argument(
         "--share-packages", type=Path, metavar="DIR", help="use that folder's packages, not its own"

@@ -145,7 +145,7 @@ def _bench(acts: Any) -> None:
     bench = add_command(
         acts,
         "bench",
-        "measure a detector's files beside each other, or a Whisper on sounds",
+        "compare the files of a detector, or measure a Whisper on sounds",
         "  vla-deploy models bench detector\n"
         "  vla-deploy models bench mugs --images photos --profile jetson_orin_nx --json\n",
     )
@@ -196,7 +196,7 @@ def _calibrate(acts: Any) -> None:
     calibrate = add_command(
         acts,
         "calibrate",
-        "learn how sure the words of an added detector or Whisper are",
+        "measure how reliable an added detector or Whisper is",
         "  vla-deploy models calibrate mugs --labelled validation\n"
         "  vla-deploy models calibrate whisper-small.en --sounds recordings\n",
     )
@@ -212,7 +212,7 @@ def _calibrate(acts: Any) -> None:
         "--sounds",
         type=Path,
         metavar="DIR",
-        help="WAV files, the words of each in a .txt beside it, empty for other sound",
+        help="WAV files, each with its words in a .txt file, which is empty for other sound",
     )
     _profile(calibrate)
 

@@ -14,7 +14,7 @@ from vla_deploy.model_servers.shelf import ServerShelf
 
 EXAMPLES = """  vla-deploy servers list
   vla-deploy servers check                 reachable, how fast, has it the model, does it see
-  vla-deploy servers check bench --ask     let its model answer, too
+  vla-deploy servers check bench --ask     also ask its model something
 """
 
 
@@ -97,8 +97,8 @@ def _row(shelf: ServerShelf, name: str, settings: ServerSettings) -> dict[str, A
 def _may_be_told(settings: ServerSettings) -> str:
     text = settings.is_local or settings.allow_text_off_robot
     images = settings.vision and (settings.is_local or settings.allow_images_off_robot)
-    told = [what for what, may in (("text", text), ("images", images)) if may]
-    return " ".join(told) or "nothing"
+    allowed = [what for what, may in (("text", text), ("images", images)) if may]
+    return " ".join(allowed) or "nothing"
 
 
 def _key(shelf: ServerShelf, settings: ServerSettings) -> str:

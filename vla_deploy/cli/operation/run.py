@@ -98,7 +98,7 @@ def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless:
         action="store_const",
         const=TwinPace.FAST,
         default=TwinPace.REAL,
-        help="let the twin's time go as fast as this computer can (default: as the wall clock, "
+        help="run the twin's time as fast as this computer can (default: as the wall clock, "
         "or slower where the robot's processes need longer)",
     )
     pace.add_argument(
@@ -106,7 +106,8 @@ def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless:
         dest="pace",
         action="store_const",
         const=TwinPace.WALL,
-        help="let the wall clock be the twin's time, whoever is late: for real-time measurements",
+        help="use the wall clock as the twin's time, even if processes are late: for real-time "
+        "measurements",
     )
 
 

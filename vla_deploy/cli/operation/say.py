@@ -21,7 +21,7 @@ EXAMPLES = """  vla-deploy say "go to the kitchen"
   vla-deploy say --aloud "go to the kitchen" --voice en-us+f4 --snr 10
   vla-deploy say --answer "the red one"           to what the robot has asked
 
-exit code 3: the robot asks something, and nobody is at the terminal to answer
+exit code 3: the robot asks something, and no terminal is there to answer at
 """
 _SIGNS: Final[Mapping[str, str]] = {
     "active": "…",
@@ -40,7 +40,7 @@ def register(commands: Any) -> None:
     what.add_argument("--plan", type=Path, help="a plan as JSON, in any of the known dialects")
     what.add_argument("--answer", metavar="WORDS", help="answer what the robot has asked")
     say.add_argument(
-        "--aloud", action="store_true", help="let a synthetic person say it in the twin's room"
+        "--aloud", action="store_true", help="say it by a synthetic voice in the twin's room"
     )
     say.add_argument("--voice", help=f"whose voice, of eSpeak NG (default: {DEFAULT_VOICE})")
     say.add_argument("--snr", type=float, metavar="DB", help="over noise, this much louder")
@@ -110,7 +110,7 @@ class Follower:
         self._is_asked = False
 
     def follow(self, utterance: dict[str, Any]) -> dict[str, Any]:
-        """Give a command and return its last event, or a question that nobody can answer here."""
+        """Give a command and return its last event, or a question that cannot be answered here."""
         return self.narrate(self._session.command(self.pause, **utterance))
 
     def narrate(self, events: Iterable[dict[str, Any]]) -> dict[str, Any]:

@@ -35,17 +35,18 @@ def register(commands: Any) -> None:
     acts = add_top_command(commands, "record", EXAMPLES).add_subparsers(
         dest="act", required=True, metavar="ACT"
     )
-    added = {
-        name: add_command(acts, name, summary, EXAMPLES, run, json="print it as JSON")
-        for name, summary, run in (
-            ("start", "have the recorder write rolling files", run_start),
-            ("stop", "end the recording; its file is finished", run_stop),
-            ("status", "show whether a recording is made, into which file", run_status),
-            ("list", "list the recordings, the oldest first", run_list),
-            ("topics", "list the names that can be recorded", run_topics),
-            ("once", "record into one file, without the recorder", run_once),
-        )
-    }
+    added = {}
+    for name, summary, run in (
+        ("start", "have the recorder write rolling files", run_start),
+        ("stop", "end the recording; its file is finished", run_stop),
+        ("status", "show whether a recording is made, into which file", run_status),
+        ("list", "list the recordings, the oldest first", run_list),
+        ("topics", "list the names that can be recorded", run_topics),
+        ("once", "record into one file, without the recorder", run_once),
+    ):
+        example = f"  vla-deploy record {name}"
+        examples = EXAMPLES if example in EXAMPLES else f"{example}\n"
+        added[name] = add_command(acts, name, summary, examples, run, json="print it as JSON")
     for name in ("start", "once"):
         add_topic_arguments(added[name], "record")
         added[name].add_argument("--duration", type=float, metavar="S", help="end after so long")

@@ -1,100 +1,64 @@
 """`vla-deploy fault` against a socket that answers as the twin does."""
 
-import json
-import os
-import socket
-import threading
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.cli.main import main
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.runtime import own_start_ticks
+
+Fault = Callable[..., Any]
 
 
 class Twin:
     """Answer each request with what was prepared, and keep what was asked."""
 
-    def __init__(self, path: Path) -> None:
-        self.asked: list[dict] = []
-        self.answer: dict = {"ok": True}
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._listener.bind(str(path))
-        self._listener.listen()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
+    def __init__(self) -> None:
+        self.asked: list[dict[str, Any]] = []
+        self.answer: dict[str, Any] = {"ok": True}
 
-    def _serve(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            with client, client.makefile("rwb") as stream:
-                self.asked.append(json.loads(stream.readline()))
-                stream.write(json.dumps(self.answer).encode() + b"\n")
-                stream.flush()
-
-    def close(self) -> None:
-        self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        self._thread.join()
+    def take(self, request: dict[str, Any]) -> dict[str, Any]:
+        self.asked.append(request)
+        return self.answer
 
 
 @pytest.fixture
-def base(tmp_path: Path) -> Path:
-    """Return a runtime directory in which this process runs a robot."""
-    run_dir = tmp_path / "run"
-    (run_dir / "dev").mkdir(parents=True)
-    owner = {
-        "pid": os.getpid(),
-        "start_ticks": own_start_ticks(),
-        "run_id": "run",
-        "run_dir": str(run_dir),
-    }
-    (tmp_path / "lock").write_text(json.dumps(owner))
-    return tmp_path
+def twin(run_dir: Path, serve_twin: Callable[..., Any]) -> Twin:
+    twin = Twin()
+    serve_twin(run_dir, twin.take)
+    return twin
 
 
 @pytest.fixture
-def twin(base: Path) -> Iterator[Twin]:
-    twin = Twin(base / "run" / "dev" / "referee")
-    yield twin
-    twin.close()
+def fault(vla: Fault) -> Fault:
+    return partial(vla, "fault")
 
 
-def fault(base: Path, *words: str) -> int:
-    return main(["--runtime-base", str(base), "fault", *words])
-
-
-def test_without_a_run_it_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert fault(tmp_path, "list") == 2
-    assert "no robot runs" in capsys.readouterr().err
+def test_without_a_run_it_is_refused(fault: Fault) -> None:
+    said = fault("list")
+    assert said.code == 2
+    assert "no robot runs" in said.err
 
 
 @pytest.mark.parametrize(
     "words", [("list",), ("inject", "servo", "off", "3"), ("clear",), ("run", "servo_off")]
 )
 def test_a_run_without_a_twin_is_refused_in_one_line(
-    base: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+    fault: Fault, run_dir: Path, words: tuple[str, ...]
 ) -> None:
-    assert fault(base, *words) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    assert "this run has no twin" in told.err
-    assert "vla-deploy run --twin" in told.err
+    said = fault(*words)
+    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert "this run has no twin" in said.err
+    assert "vla-deploy run --twin" in said.err
 
 
-def test_a_fault_is_sent_as_it_was_typed(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fault_is_sent_as_it_was_typed(fault: Fault, twin: Twin) -> None:
     twin.answer = {"ok": True, "injected": {"id": 4, "fault": "servo left_elbow: delayed"}}
     words = ("inject", "servo", "delayed", "left_elbow", "--start", "1", "--for", "2.5")
-    assert fault(base, *words, "--set", "delay_s=0.02", "--seed", "7") == 0
+    said = fault(*words, "--set", "delay_s=0.02", "--seed", "7")
     assert twin.asked == [
         {
             "op": "fault_inject",
@@ -107,39 +71,31 @@ def test_a_fault_is_sent_as_it_was_typed(
             "seed": 7,
         }
     ]
-    assert capsys.readouterr().out == "fault 4: servo left_elbow: delayed\n"
+    assert (said.code, said.out) == (0, "fault 4: servo left_elbow: delayed\n")
 
 
-def test_the_twins_refusal_is_told_in_one_line(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_refusal_of_the_twin_is_one_line(fault: Fault, twin: Twin) -> None:
     twin.answer = {"ok": False, "error": "servo: there is no fault 'echo' here"}
-    assert fault(base, "inject", "servo", "echo") == 2
-    assert capsys.readouterr().err == (
-        "vla-deploy: the twin refuses: servo: there is no fault 'echo' here\n"
-    )
+    said = fault("inject", "servo", "echo")
+    assert said.code == 2
+    assert said.err == "vla-deploy: the twin refuses: servo: there is no fault 'echo' here\n"
 
 
-def test_a_setting_without_a_number_is_refused(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert fault(base, "inject", "servo_bus", "brown_out", "--set", "volts=low") == 2
-    assert "--set volts=low: expected NAME=NUMBER" in capsys.readouterr().err
+def test_a_setting_without_a_number_is_refused(fault: Fault, twin: Twin) -> None:
+    said = fault("inject", "servo_bus", "brown_out", "--set", "volts=low")
+    assert said.code == 2
+    assert "--set volts=low: expected NAME=NUMBER" in said.err
     assert twin.asked == []
 
 
-def test_clear_names_what_is_left(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_clear_names_what_is_left(fault: Fault, twin: Twin) -> None:
     twin.answer = {"ok": True, "pending": [{"id": 2, "fault": "lidar: off", "on": True}]}
-    assert fault(base, "clear", "1") == 0
+    said = fault("clear", "1")
     assert twin.asked == [{"op": "fault_clear", "id": 1}]
-    assert capsys.readouterr().out == "fault 2: lidar: off (on)\n"
+    assert (said.code, said.out) == (0, "fault 2: lidar: off (on)\n")
 
 
-def test_list_prints_what_can_fail_with_its_parameters(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_list_prints_what_can_fail_with_its_parameters(fault: Fault, twin: Twin) -> None:
     parameter = {"name": "volts_v", "default": 4.0, "range": [0.0, 30.0], "meaning": "drop"}
     row = {"fault": "brown_out", "summary": "the supply sags", "parameters": [parameter]}
     twin.answer = {
@@ -148,16 +104,14 @@ def test_list_prints_what_can_fail_with_its_parameters(
         "scenarios": ["servo_off"],
         "pending": [],
     }
-    assert fault(base, "list") == 0
-    told = capsys.readouterr().out
-    assert "brown_out         the supply sags; volts_v=4 (0..30)" in told
-    assert "no fault is in force" in told
-    assert fault(base, "list", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["scenarios"] == ["servo_off"]
+    said = fault("list")
+    assert "brown_out         the supply sags; volts_v=4 (0..30)" in said.out
+    assert "no fault is in force" in said.out
+    assert fault("list", "--json").document["scenarios"] == ["servo_off"]
 
 
 def test_a_scenario_file_is_sent_as_text_and_its_cause_is_awaited(
-    base: Path, twin: Twin, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fault: Fault, twin: Twin, tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("summary = 'x'")
@@ -169,9 +123,10 @@ def test_a_scenario_file_is_sent_as_text_and_its_cause_is_awaited(
         "end_s": -0.9,
         "expect": {"cause": "servo_bus_lost"},
     }
-    assert fault(base, "run", str(path)) == 1
+    said = fault("run", path)
+    assert said.code == 1
     assert twin.asked == [{"op": "fault_run", "name": "mine", "text": "summary = 'x'"}]
-    assert "cause none, state silent; expected cause servo_bus_lost" in capsys.readouterr().err
+    assert "cause none, state silent; expected cause servo_bus_lost" in said.err
 
 
 @pytest.mark.parametrize(
@@ -184,38 +139,24 @@ def test_a_scenario_file_is_sent_as_text_and_its_cause_is_awaited(
     ],
 )
 def test_a_scenario_file_that_cannot_be_read_is_refused_in_one_line(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str], name: str, complaint: str
+    fault: Fault, twin: Twin, tmp_path: Path, name: str, complaint: str
 ) -> None:
-    (base / "noise.toml").write_bytes(b"\xfe\xff\x00")
-    assert fault(base, "run", f"{base}/{name}") == 2
-    error = capsys.readouterr().err
-    assert complaint in error
-    assert error.count("\n") == 1
+    (tmp_path / "noise.toml").write_bytes(b"\xfe\xff\x00")
+    said = fault("run", f"{tmp_path}/{name}")
+    assert said.code == 2
+    assert complaint in said.err
+    assert said.err.count("\n") == 1
     assert twin.asked == []
 
 
 def test_a_robot_that_is_stopped_already_is_not_judged_by_that_cause(
-    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
+    fault: Fault, twin: Twin, run_dir: Path
 ) -> None:
-    space = SharedSpace(base / "run" / "ipc", MonotonicClock())
+    space = SharedSpace(run_dir / "ipc", MonotonicClock())
     status = {"state": "stopped", "cause": "servo_bus_lost"}
     space.cell_writer("control_status").put_document(status)
-    assert fault(base, "run", "servo_off") == 2
+    said = fault("run", "servo_off")
     space.close()
-    assert "control is stopped already, cause servo_bus_lost" in capsys.readouterr().err
+    assert said.code == 2
+    assert "control is stopped already, cause servo_bus_lost" in said.err
     assert twin.asked == []
-
-
-@pytest.mark.parametrize("action", ["list", "inject", "clear", "run"])
-def test_help_of_an_action_ends_with_an_example(
-    action: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit):
-        main(["fault", action, "--help"])
-    assert f"examples:\n  vla-deploy fault {action}" in capsys.readouterr().out
-
-
-def test_help_ends_with_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["fault", "--help"])
-    assert "vla-deploy fault inject servo off left_elbow --for 2" in capsys.readouterr().out

@@ -1,11 +1,11 @@
 import json
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.main import main
 from vla_deploy.cli.maintenance import profile
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
@@ -19,20 +19,8 @@ from vla_deploy.supervisor.profile_choice import (
 
 
 @pytest.fixture
-def base(tmp_path):
-    return tmp_path / "base"
-
-
-@pytest.fixture
-def vla(base, capsys):
-    """Run one command line; return its exit code, what it said and what it complained of."""
-
-    def vla(*arguments: str) -> tuple[int, str, str]:
-        code = main(["--runtime-base", str(base), "profile", *arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    return vla
+def vla(vla):
+    return partial(vla, "profile")
 
 
 @pytest.fixture

@@ -2,30 +2,20 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from vla_deploy.cli.main import main
 from vla_deploy.runtime.state_dir import models_dir_of
 
 Vla = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def base(tmp_path: Path) -> Path:
-    return tmp_path / "base"
-
-
-@pytest.fixture
-def vla(base: Path, capsys: pytest.CaptureFixture[str]) -> Vla:
-    def vla(*arguments: str) -> tuple[int, str, str]:
-        code = main(["--runtime-base", str(base), "models", *arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    return vla
+def vla(vla: Vla) -> Vla:
+    return partial(vla, "models")
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import sys
 
 import pytest
 
-from vla_deploy.cli.main import main
 from vla_deploy.runtime.state_dir import config_dir_of
 
 SERVER = """
@@ -19,19 +18,16 @@ max_attempts = 1
 
 
 @pytest.fixture
-def vla(tmp_path, capsys, loopback):
-    """Run one command line with a declared server; return its exit code and what it said."""
-    base = tmp_path / "base"
+def vla(vla, base, loopback):
+    """Run one command line with a declared server."""
     file = config_dir_of(base) / "servers.toml"
     file.parent.mkdir()
 
-    def vla(*arguments: str, location: str = "local", extra: str = "") -> tuple[int, str, str]:
+    def with_server(*words: str, location: str = "local", extra: str = ""):
         file.write_text(SERVER.format(url=loopback.url, location=location) + extra)
-        code = main(["--runtime-base", str(base), "servers", *arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
+        return vla("servers", *words)
 
-    return vla
+    return with_server
 
 
 def test_servers_are_listed_with_what_they_may_be_told(vla):

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,26 +13,18 @@ from drivers.audio.base import AudioFormat
 from drivers.audio.wav import WavOutput
 from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
-from vla_deploy.cli.main import main
 from vla_deploy.runtime.state_dir import models_dir_of
 
 Hear = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def hear(tmp_path: Path, capsys: pytest.CaptureFixture[str], scripted_whisper: Any) -> Hear:
-    base = tmp_path / "base"
+def hear(vla: Hear, base: Path, scripted_whisper: Any) -> Hear:
     models = models_dir_of(base)
     models.parent.mkdir(parents=True, exist_ok=True)
     scripted_whisper.model("says-left", "turn left")
     models.symlink_to(scripted_whisper.folder)
-
-    def hear(*arguments: str) -> tuple[int, str, str]:
-        code = main(["--runtime-base", str(base), "hear", *arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    return hear
+    return partial(vla, "hear")
 
 
 @pytest.fixture

@@ -1,9 +1,6 @@
 """`say --aloud` and the demo's times: the twin and the robot at the other end are the test's."""
 
-import json
-import socket
-import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -35,29 +32,9 @@ class Twin:
         self.verdicts: list[str] = ["accepted"]
         self.played: list[dict[str, Any]] = []
         self.ended_ns = 0
-        (run_dir / "dev").mkdir()
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._listener.bind(str(run_dir / "dev" / "referee"))
-        self._listener.listen()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
 
-    def close(self) -> None:
-        self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        self._thread.join()
-        self.space.close()
-
-    def _serve(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            with client, client.makefile("rwb") as stream:
-                asked = json.loads(stream.readline())
-                answer = self._ear() if asked["op"] == "sound_ear" else self._play(asked)
-                stream.write(json.dumps({"ok": True} | answer).encode() + b"\n")
+    def answer(self, asked: dict[str, Any]) -> dict[str, Any]:
+        return {"ok": True} | (self._ear() if asked["op"] == "sound_ear" else self._play(asked))
 
     def _ear(self) -> dict[str, Any]:
         return {"position_m": [0.0, 0.0, 1.2], "rate_hz": 16_000, "seed": 0}
@@ -94,11 +71,12 @@ def session(tmp_path: Path) -> Iterator[Session]:
 
 
 @pytest.fixture
-def twin(tmp_path: Path, session: Session) -> Iterator[Twin]:
+def twin(tmp_path: Path, session: Session, serve_twin: Callable[..., Any]) -> Iterator[Twin]:
     made = Twin(tmp_path)
     made.space.cell_writer("speech_status").put_document(LISTENING)
+    serve_twin(tmp_path, made.answer)
     yield made
-    made.close()
+    made.space.close()
 
 
 def tell(twin: Twin, event: str, **details: Any) -> None:
