@@ -14,95 +14,113 @@ Run = Callable[[argparse.Namespace], int]
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandEntry:
     """Name the module that registers a command, and say what the command is for."""
 
     module: str
     summary: str
 
 
-COMMANDS: Final[Mapping[str, Command]] = {
-    "run": Command("operation.run", "run the robot until Ctrl-C"),
-    "demo": Command("operation.demo", "do the main job on the twin"),
-    "say": Command("operation.say", "give the robot a command and follow it"),
-    "hear": Command(
+COMMANDS: Final[Mapping[str, CommandEntry]] = {
+    "run": CommandEntry("operation.run", "run the robot until Ctrl-C"),
+    "demo": CommandEntry("operation.demo", "do the main job on the twin"),
+    "say": CommandEntry("operation.say", "give the robot a command and follow it"),
+    "hear": CommandEntry(
         "observation.hear", "show what is understood of a recording, or of live speech"
     ),
-    "plan": Command("observation.plan", "show the plan for a command, and which back end made it"),
-    "status": Command("observation.status", "show what runs and the state of the robot"),
-    "dashboard": Command(
+    "plan": CommandEntry(
+        "observation.plan", "show the plan for a command, and which back end made it"
+    ),
+    "status": CommandEntry("observation.status", "show what runs and the state of the robot"),
+    "dashboard": CommandEntry(
         "maintenance.dashboard", "show where the robot's page is, and who may use it"
     ),
-    "top": Command(
+    "top": CommandEntry(
         "observation.top", "show processes, budgets, control and topics on one screen, for ssh"
     ),
-    "metrics": Command(
+    "metrics": CommandEntry(
         "observation.metrics", "list what is measured; print alert rules or a Grafana dashboard"
     ),
-    "scene": Command("observation.scene", "show what the robot knows about the things around it"),
-    "memory": Command("observation.memory", "show what the robot remembers, and delete it"),
-    "budget": Command(
+    "scene": CommandEntry(
+        "observation.scene", "show what the robot knows about the things around it"
+    ),
+    "memory": CommandEntry("observation.memory", "show what the robot remembers, and delete it"),
+    "budget": CommandEntry(
         "observation.budget",
         "show what the robot uses of its budgets, and what is done about an excess",
     ),
-    "logs": Command("observation.logs", "show what the processes log"),
-    "crashes": Command("observation.logs", "list and show crash reports"),
-    "estop": Command(
+    "logs": CommandEntry("observation.logs", "show what the processes log"),
+    "crashes": CommandEntry("observation.logs", "list and show crash reports"),
+    "estop": CommandEntry(
         "operation.operate", "stop the robot now and latch the stop (a software stop)"
     ),
-    "reset": Command(
+    "reset": CommandEntry(
         "operation.operate", "release a latched stop; nothing moves, arm the robot next"
     ),
-    "arm": Command(
+    "arm": CommandEntry(
         "operation.operate",
         "put power on the joints where they are, so that commands may move them",
     ),
-    "disarm": Command("operation.operate", "take power off the joints"),
-    "stop": Command("operation.operate", "stop what the robot does; it stays ready"),
-    "shutdown": Command(
+    "disarm": CommandEntry("operation.operate", "take power off the joints"),
+    "stop": CommandEntry("operation.operate", "stop what the robot does; it stays ready"),
+    "shutdown": CommandEntry(
         "operation.operate",
         "end the run in order, as Ctrl-C does; power goes off, so support the arms",
     ),
-    "profile": Command("maintenance.profile", "choose how the stack uses this computer"),
-    "robot": Command("devices.robot", "write the robot's description as URDF, for ROS"),
-    "servo": Command("devices.servo", "find, look at, set up and calibrate servos"),
-    "camera": Command(
+    "profile": CommandEntry("maintenance.profile", "choose how the stack uses this computer"),
+    "robot": CommandEntry("devices.robot", "write the robot's description as URDF, for ROS"),
+    "servo": CommandEntry("devices.servo", "find, look at, set up and calibrate servos"),
+    "camera": CommandEntry(
         "devices.camera", "calibrate the camera: its lens, and how it sits on the head"
     ),
-    "can": Command("devices.can", "find CAN nodes and watch the traffic"),
-    "fault": Command("devices.fault", "make the twin's devices fail"),
-    "flight": Command("recording.flight", "show what the flight recorder saved"),
-    "record": Command(
+    "can": CommandEntry("devices.can", "find CAN nodes and watch the traffic"),
+    "fault": CommandEntry("devices.fault", "make the twin's devices fail"),
+    "flight": CommandEntry("recording.flight", "show what the flight recorder saved"),
+    "record": CommandEntry(
         "recording.record", "record what the robot does: rolling files, or one of your own"
     ),
-    "replay": Command(
+    "replay": CommandEntry(
         "recording.replay", "replay a recording or a flight on the dashboard; no robot"
     ),
-    "foxglove": Command(
+    "foxglove": CommandEntry(
         "recording.viewers", "serve the run live to viewers such as Foxglove, read-only"
     ),
-    "rerun": Command("recording.viewers", "show a recording, a flight or the live run in Rerun"),
-    "check": Command(
+    "rerun": CommandEntry(
+        "recording.viewers", "show a recording, a flight or the live run in Rerun"
+    ),
+    "check": CommandEntry(
         "maintenance.check", "check a robot, a profile or a plan, and report all faults"
     ),
-    "schema": Command("maintenance.check", "print the JSON Schema of a plan or of an analysis"),
-    "map": Command("maintenance.map", "record, look at, check and convert maps in the ROS format"),
-    "models": Command("models.commands", "add, fetch, list, measure, quantise and verify models"),
-    "analyse": Command(
+    "schema": CommandEntry(
+        "maintenance.check", "print the JSON Schema of a plan or of an analysis"
+    ),
+    "map": CommandEntry(
+        "maintenance.map", "record, look at, check and convert maps in the ROS format"
+    ),
+    "models": CommandEntry(
+        "models.commands", "add, fetch, list, measure, quantise and verify models"
+    ),
+    "analyse": CommandEntry(
         "observation.analyse", "analyse the scene, and whether a goal can be reached"
     ),
-    "servers": Command("models.servers", "see and try the model servers that the robot may ask"),
-    "doctor": Command(
+    "servers": CommandEntry(
+        "models.servers", "see and try the model servers that the robot may ask"
+    ),
+    "doctor": CommandEntry(
         "maintenance.doctor", "examine this computer, and say how to repair what is wrong"
     ),
-    "probes": Command(
+    "probes": CommandEntry(
         "maintenance.doctor", "print load, memory, power, heat and throttling of this computer"
     ),
-    "bench": Command("maintenance.measure", "measure against a peer or a limit, in the same run"),
-    "validate": Command("maintenance.measure", "run a campaign against the twin"),
-    "install": Command("maintenance.install", "install the robot as a service of this computer"),
-    "uninstall": Command("maintenance.install", "remove exactly what install wrote"),
-    "release": Command("maintenance.release", "add releases, switch between them, go back"),
+    "bench": CommandEntry(
+        "maintenance.measure", "measure against a peer or a limit, in the same run"
+    ),
+    "validate": CommandEntry("maintenance.measure", "run a campaign against the twin"),
+    "install": CommandEntry(
+        "maintenance.install", "install the robot as a service of this computer"
+    ),
+    "uninstall": CommandEntry("maintenance.install", "remove exactly what install wrote"),
+    "release": CommandEntry("maintenance.release", "add releases, switch between them, go back"),
 }
 
 

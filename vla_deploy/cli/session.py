@@ -20,7 +20,7 @@ FRESH_S: Final = 5.0
 T = TypeVar("T")
 
 
-class Session(RobotLink):
+class RobotSession(RobotLink):
     """Talk to a running robot through its topics, and wait for its answers."""
 
     def __init__(self, run_dir: Path, clock: Clock | None = None) -> None:
@@ -135,7 +135,7 @@ def base_of(arguments: argparse.Namespace) -> Path:
     return base
 
 
-def attach(runtime_base: Path | None) -> Session:
+def attach(runtime_base: Path | None) -> RobotSession:
     """Return a session with the robot that runs on this machine.
 
     Raises:
@@ -146,4 +146,4 @@ def attach(runtime_base: Path | None) -> Session:
     owner = running(base)
     if owner is None:
         raise UsageError(f"no robot runs in {base}; start one: vla-deploy run --twin")
-    return Session(Path(owner.run_dir))
+    return RobotSession(Path(owner.run_dir))

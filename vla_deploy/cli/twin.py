@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from drivers.clock import NS_PER_S
 from drivers.twin_clock import TwinClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.client.unix_rpc import request
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class SteppingClock:
             self._clock.sleep_until(min(deadline_ns, now_ns + _STEP_NS))
 
 
-def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
+def ask_referee(session: RobotSession, op: str, **details: str) -> dict[str, Any]:
     """Return the answer of the twin's referee.
 
     Raises:
@@ -92,7 +92,7 @@ def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
     return answer_of(session, "sim_twin.referee", "--run-dir", str(session.run_dir), op, *words)
 
 
-def answer_of(session: Session, module: str, *words: str) -> dict[str, Any]:
+def answer_of(session: RobotSession, module: str, *words: str) -> dict[str, Any]:
     """Return the JSON output of a module of the twin; a process of its own, never an import.
 
     It may take seconds, in which the session waits so that the supervisor goes on; where the

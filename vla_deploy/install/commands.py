@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from vla_deploy.install.errors import CommandFailed
+from vla_deploy.install.errors import SystemCommandFailed
 from vla_deploy.install.files import SystemFile
 from vla_deploy.install.layout import RELEASE_FILES, SERVICE, STATE_FOLDERS, Layout
 
@@ -53,15 +53,15 @@ def run_command(command: Sequence[str]) -> str:
     """Run one command and return what it printed.
 
     Raises:
-        CommandFailed: it is missing, failed or took too long.
+        SystemCommandFailed: it is missing, failed or took too long.
     """
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise CommandFailed(f"`{shlex.join(command)}` did not run: {error}") from error
+        raise SystemCommandFailed(f"`{shlex.join(command)}` did not run: {error}") from error
     if done.returncode:
         words = (done.stderr or done.stdout).strip() or "nothing said"
-        raise CommandFailed(f"`{shlex.join(command)}` ended with {done.returncode}: {words}")
+        raise SystemCommandFailed(f"`{shlex.join(command)}` ended with {done.returncode}: {words}")
     return done.stdout

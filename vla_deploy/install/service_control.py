@@ -5,7 +5,7 @@ from typing import Protocol
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.install.commands import run_command
-from vla_deploy.install.errors import CommandFailed
+from vla_deploy.install.errors import SystemCommandFailed
 from vla_deploy.install.layout import SERVICE
 from vla_deploy.supervisor.status_line import trouble_in
 
@@ -32,14 +32,14 @@ class ServiceControl(Protocol):
         """Restart it; return when it is ready.
 
         Raises:
-            CommandFailed: it did not become ready.
+            SystemCommandFailed: it did not become ready.
         """
 
     def state(self) -> ServiceState:
         """Tell its state.
 
         Raises:
-            CommandFailed: the service manager does not answer.
+            SystemCommandFailed: the service manager does not answer.
         """
 
 
@@ -67,7 +67,9 @@ class SystemdService:
                 status=values.get("StatusText", ""),
             )
         except (KeyError, ValueError) as error:
-            raise CommandFailed(f"systemctl show {self._unit}: cannot read {text!r}") from error
+            raise SystemCommandFailed(
+                f"systemctl show {self._unit}: cannot read {text!r}"
+            ) from error
 
 
 def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float, known: str = "") -> str:
@@ -77,7 +79,7 @@ def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float, know
     the robot that fails or is late is one, too, unless the trouble was `known` before.
 
     Raises:
-        CommandFailed: the service manager does not answer.
+        SystemCommandFailed: the service manager does not answer.
     """
     first = now = service.state()
     if first.active != "active":
@@ -98,6 +100,6 @@ def known_trouble(service: ServiceControl) -> str:
     """Return the trouble that a service has already; none where it does not run or answer."""
     try:
         now = service.state()
-    except CommandFailed:
+    except SystemCommandFailed:
         return ""
     return trouble_in(now.status) if now.active == "active" else ""

@@ -8,7 +8,7 @@ from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.install.commands import run_command
-from vla_deploy.install.errors import CommandFailed, ReleaseRefused, SwitchFailed
+from vla_deploy.install.errors import ReleaseRefused, SwitchFailed, SystemCommandFailed
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import ServiceControl, known_trouble, trouble_within
 
@@ -124,7 +124,7 @@ class Switch:
         _log.info("%s", step.value)
         try:
             self.do[step]()
-        except (CommandFailed, ReleaseRefused, SwitchFailed, OSError) as error:
+        except (SystemCommandFailed, ReleaseRefused, SwitchFailed, OSError) as error:
             return str(error)
         return ""
 

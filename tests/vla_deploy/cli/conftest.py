@@ -10,7 +10,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.main import main
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.runtime import own_start_ticks
 
@@ -154,7 +154,7 @@ def robot(tmp_path: Path, clock: ScriptedClock) -> Iterator[Robot]:
 
 
 @pytest.fixture
-def session(tmp_path: Path, clock: ScriptedClock) -> Iterator[Session]:
-    session = Session(tmp_path, clock)
+def session(tmp_path: Path, clock: ScriptedClock) -> Iterator[RobotSession]:
+    session = RobotSession(tmp_path, clock)
     yield session
     session.close()

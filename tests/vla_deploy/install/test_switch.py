@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.install.errors import CommandFailed, ReleaseRefused
+from vla_deploy.install.errors import ReleaseRefused, SystemCommandFailed
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import ServiceState, trouble_within
 from vla_deploy.install.switch import NEXT, End, Step, Switch, SwitchPlan, recover
@@ -46,7 +46,7 @@ class RecordedService:
         self.started.append(self._store.current())
         self._asked = 0
         if self._fails.get(self.started[-1]) == "start":
-            raise CommandFailed("`systemctl restart vla-deploy.service` ended with 1")
+            raise SystemCommandFailed("`systemctl restart vla-deploy.service` ended with 1")
 
     def state(self) -> ServiceState:
         self._asked += 1

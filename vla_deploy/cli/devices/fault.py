@@ -11,7 +11,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.cli.twin import ask_twin
 
 _EXAMPLES: Final = """  vla-deploy fault list                     what can fail
@@ -153,7 +153,7 @@ def _scenario(word: str) -> dict[str, str]:
         raise UsageError(f"{path}: got {error}, expected a TOML document in UTF-8") from error
 
 
-def _require_no_cause(session: Session) -> None:
+def _require_no_cause(session: RobotSession) -> None:
     """Refuse where control has a cause already, from before the scenario."""
     status = session.document("control_status", age_limit_s=1.0) or {}
     if status.get("cause"):
@@ -163,7 +163,7 @@ def _require_no_cause(session: Session) -> None:
         )
 
 
-def _watch(session: Session, duration_s: float) -> dict[str, Any]:
+def _watch(session: RobotSession, duration_s: float) -> dict[str, Any]:
     """Return the first cause that control reports within a time, and its state at the end."""
     start_ns = now_ns = session.clock.now_ns()
     seen: dict[str, Any] = {"cause": "none", "after_s": None, "state": "silent"}

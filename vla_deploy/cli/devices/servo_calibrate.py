@@ -5,17 +5,14 @@ import os
 import select
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.dynamixel.control_table import PULSES_PER_REV
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tools import BenchLink
-from drivers.dynamixel.tools.bench_link import ONE_TRY
 from drivers.dynamixel.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
-from drivers.dynamixel.tools.travel import JointRange, Mounting, TravelRefused
-from drivers.errors import NoReply
+from drivers.dynamixel.tools.travel import Mounting, TravelRefused
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
     ServoBusPort,
@@ -26,13 +23,12 @@ from vla_deploy.cli.devices.servo_bus import (
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.calibration import (
-    CALIBRATION_FILE,
-    JointCalibration,
-    read_calibration,
-    write_calibration,
+from vla_deploy.robots.calibration import CALIBRATION_FILE
+from vla_deploy.robots.joint_calibration import (
+    CalibrationRecord,
+    answering_servos,
+    guided_joints,
 )
-from vla_deploy.robots.mjcf import read_mjcf_names
 
 _POLL_S: Final = 0.02
 _TRIES: Final = 3
@@ -101,22 +97,23 @@ def calibrate(
     """
     pose = _read_pose(robot, arguments.from_pose) if arguments.from_pose else {}
     names = _chosen_joints(robot, arguments.joint or list(pose))
-    _require_values(robot, names, pose, arguments)
-    watched = _answering(robot, link, names)
+    joints = guided_joints(robot, names)
+    _require_values(joints, pose, arguments)
+    watched = answering_servos(robot, link, names)
     _release(arguments, link, watched)
-    results = _Results(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE, person)
+    record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
     guide = CalibrationGuide(
         link.registers, watched, person, bus.clock, accept_sign=arguments.accept_sign
     )
-    joints = _guided_joints(robot, names)
+    failures = []
     if pose:
         stands = guide.as_it_stands({joint: pose[joint.name] for joint in joints})
-        results.keep(joints, stands, "pose")
-        failures = []
+        _store(record, joints, stands, "pose", person)
     else:
-        failures = _calibrate_one_by_one(arguments, guide, joints, results, person)
+        failures = _calibrate_one_by_one(arguments, guide, joints, record, person)
     _warn_of_turns(link, joints, person)
-    emit(arguments, results.document(failures), "")
+    report = {"file": str(record.file), "joints": record.changes, "failed": failures}
+    emit(arguments, report, "")
     if failures:
         raise CommandFailed(f"not calibrated: {', '.join(failures)}; see above, then try again")
     return 0
@@ -126,7 +123,7 @@ def _calibrate_one_by_one(
     arguments: argparse.Namespace,
     guide: CalibrationGuide,
     joints: Sequence[GuidedJoint],
-    results: "_Results",
+    record: CalibrationRecord,
     person: Person,
 ) -> list[str]:
     """Return the joints that could not be measured."""
@@ -139,56 +136,24 @@ def _calibrate_one_by_one(
             except TravelRefused as refusal:
                 person.tell(f"refused: {refusal}")
                 continue
-            results.keep([joint], {joint.name: found}, arguments.method)
+            _store(record, [joint], {joint.name: found}, arguments.method, person)
             break
         else:
             failures.append(joint.name)
     return failures
 
 
-class _Results:
-    """Write each result at once, over those of earlier sessions."""
-
-    def __init__(self, file: Path, person: Person) -> None:
-        self._file = file
-        self._person = person
-        self._all = read_calibration(file)
-        self._changes: list[dict[str, Any]] = []
-
-    def keep(
-        self, joints: Sequence[GuidedJoint], found: Mapping[str, Mounting], method: str
-    ) -> None:
-        """Write the mounting of some joints, and show what changes."""
-        made_at = datetime.now(UTC).isoformat(timespec="seconds")
-        for joint in joints:
-            mounting = found[joint.name]
-            self._all[joint.name] = JointCalibration(
-                servo_id=joint.servo.id,
-                sign=mounting.sign,
-                offset=round(mounting.offset, 6),
-                method=method,
-                made_at=made_at,
-            )
-            self._changes.append(_change(joint, mounting))
-        write_calibration(self._file, self._all)
-        for joint in joints:
-            self._person.tell(_words(joint, found[joint.name]))
-        self._person.tell(f"written to {self._file}")
-
-    def document(self, failures: Sequence[str]) -> dict[str, Any]:
-        """Return all of this session as a JSON document."""
-        return {"file": str(self._file), "joints": self._changes, "failed": list(failures)}
-
-
-def _change(joint: GuidedJoint, after: Mounting) -> dict[str, Any]:
-    return {
-        "joint": joint.name,
-        "servo_id": joint.servo.id,
-        "sign_before": joint.present.sign,
-        "sign": after.sign,
-        "offset_before": joint.present.offset,
-        "offset": round(after.offset, 6),
-    }
+def _store(
+    record: CalibrationRecord,
+    joints: Sequence[GuidedJoint],
+    found: Mapping[str, Mounting],
+    method: str,
+    person: Person,
+) -> None:
+    record.store(joints, found, method)
+    for joint in joints:
+        person.tell(_words(joint, found[joint.name]))
+    person.tell(f"written to {record.file}")
 
 
 def _warn_of_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Person) -> None:
@@ -200,24 +165,6 @@ def _warn_of_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Perso
                 f"{joint.servo} counts {position} pulses, beyond one turn; restart it before the "
                 f"robot runs: vla-deploy servo reboot {joint.servo.id}"
             )
-
-
-def _answering(robot: RobotDescription, link: BenchLink, names: Sequence[str]) -> list[ServoSpec]:
-    """Return the servos to watch: the chosen ones must answer, the others may be away.
-
-    Raises:
-        ServoSilent: a chosen servo does not answer.
-    """
-    watched = []
-    for servo in robot.servo_bus.servos:
-        try:
-            if servo.joint not in names:
-                link.ping(servo.id, ONE_TRY)
-            watched.append(link.servo(servo.id, servo.joint))
-        except NoReply:
-            if servo.joint in names:
-                raise
-    return watched
 
 
 def _release(arguments: argparse.Namespace, link: BenchLink, servos: Sequence[ServoSpec]) -> None:
@@ -266,60 +213,22 @@ def _chosen_joints(robot: RobotDescription, names: Sequence[str]) -> list[str]:
 
 
 def _require_values(
-    robot: RobotDescription,
-    names: Sequence[str],
-    pose: Mapping[str, float],
-    arguments: argparse.Namespace,
+    joints: Sequence[GuidedJoint], pose: Mapping[str, float], arguments: argparse.Namespace
 ) -> None:
-    """Check that every joint can have its value.
+    """Check that every joint can have the value that it is said to have.
 
     Raises:
         UsageError: a value is missing or outside of the joint's range.
     """
-    is_mark = not pose and arguments.method == "mark"
-    values = dict.fromkeys(names, arguments.at) if is_mark else pose
-    ranges = _ranges(robot)
-    missing = [name for name in names if pose and name not in pose]
+    if not pose and arguments.method != "mark":
+        return
+    missing = [joint.name for joint in joints if pose and joint.name not in pose]
     if missing:
         raise UsageError(f"--from-pose gives no value for {', '.join(missing)}")
-    for name, value in values.items():
-        low, high = ranges[name]
+    for joint in joints:
+        value, low, high = pose.get(joint.name, arguments.at), joint.range.low, joint.range.high
         if not low <= value <= high:
-            raise UsageError(f"{name}: {value:g} is outside of its range {low:g}..{high:g}")
-
-
-def _guided_joints(robot: RobotDescription, names: Sequence[str]) -> list[GuidedJoint]:
-    """Describe joints by robot file and MJCF."""
-    ranges = _ranges(robot)
-    joints = []
-    for name in names:
-        servo = robot.servo_bus.servos[robot.joint_index[name]]
-        limits = robot.limits[name]
-        low, high = ranges[name]
-        joints.append(
-            GuidedJoint(
-                servo=ServoSpec(id=servo.id, model_name=servo.model, joint=name),
-                range=JointRange(
-                    joint=name,
-                    low=low,
-                    high=high,
-                    sign=servo.sign,
-                    travel_per_rad=servo.travel_per_rad,
-                ),
-                limits=(limits.min, limits.max),
-                present=Mounting(sign=servo.sign, offset=servo.offset),
-            )
-        )
-    return joints
-
-
-def _ranges(robot: RobotDescription) -> dict[str, tuple[float, float]]:
-    """Return the joints' ranges in the MJCF, their limits where that has none."""
-    ranges = read_mjcf_names(robot.mjcf_path).joint_ranges
-    return {
-        name: ranges[name] or (robot.limits[name].min, robot.limits[name].max)
-        for name in robot.joint_names
-    }
+            raise UsageError(f"{joint.name}: {value:g} is outside of its range {low:g}..{high:g}")
 
 
 def _words(joint: GuidedJoint, after: Mounting) -> str:

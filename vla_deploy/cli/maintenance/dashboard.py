@@ -12,7 +12,7 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.session import Session, attach, base_of
+from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.dashboard.access.accounts import Accounts, User, new_token, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.audit import AuditLog
@@ -111,7 +111,7 @@ def show_address(arguments: argparse.Namespace) -> int:
     return emit(arguments, status, status["url"])
 
 
-def _why_silent(session: Session) -> str:
+def _why_silent(session: RobotSession) -> str:
     """Return the supervisor's state of the dashboard in words."""
     table = session.document("process_table", age_limit_s=_STATUS_AGE_S) or {"processes": []}
     for row in table["processes"]:

@@ -9,7 +9,7 @@ import cv2
 
 from vla_deploy.cli.commands import add_command, add_top_command, emit, number_above_zero
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.navigation.map_check import as_characters, check_for_robot, describe
 from vla_deploy.navigation.map_file import (
     files_of,
@@ -97,7 +97,7 @@ def run_record(arguments: argparse.Namespace) -> int:
     return _emit(arguments, describe(file) | counts | {"map": str(arguments.map)})
 
 
-def _record(session: Session, recorder: "MapRecorder", arguments: argparse.Namespace) -> None:
+def _record(session: RobotSession, recorder: "MapRecorder", arguments: argparse.Namespace) -> None:
     """Step the recorder until the time is over or Ctrl-C."""
     steps, mapper = 0, recorder.mapper
     try:

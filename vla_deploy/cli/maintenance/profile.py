@@ -13,7 +13,7 @@ from platforms.profile import PROFILES, profile_from, profile_names
 from platforms.profile_source import Source, flat, read_source
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.session import Session, attach, base_of
+from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
 from vla_deploy.install.service_profile import slice_too_small
 from vla_deploy.supervisor.profile_change import Outcome, Phase
@@ -188,7 +188,7 @@ def _choose(arguments: argparse.Namespace, name: str) -> int:
     return emit(arguments, document, f"profile {name}: {outcome} for the next start; no robot runs")
 
 
-def _request(session: Session, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
+def _request(session: RobotSession, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
     """Send the request to the supervisor and wait for its outcome.
 
     Raises:

@@ -10,7 +10,7 @@ from vla_deploy.analysis.geometric import GeometricAnalyser
 from vla_deploy.analysis.question import Analyser, Question
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.commands import add_top_command
-from vla_deploy.cli.session import FRESH_S, Session, attach, base_of
+from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.dashboard.analysing import question_about
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def ask(session: Session, goal: str) -> Question:
+def ask(session: RobotSession, goal: str) -> Question:
     """Return the question about the robot's present scene, image and state.
 
     Raises:
@@ -56,7 +56,7 @@ def ask(session: Session, goal: str) -> Question:
     return question_about(session, session.scene(), goal, image)
 
 
-def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
+def analyser_for(session: RobotSession, arguments: argparse.Namespace) -> Analyser:
     """Return the analyser for the robot that runs, with the model server that is named.
 
     Raises:

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 
 AGE_LIMIT_S: Final = 3.0
 WATCH_PERIOD_S: Final = 1.0
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
         session.pause(WATCH_PERIOD_S)
 
 
-def collect(session: Session) -> dict[str, Any]:
+def collect(session: RobotSession) -> dict[str, Any]:
     """Return the supervisor's report on the budgets.
 
     Raises:

@@ -11,7 +11,7 @@ from platforms import load_profile
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.operation.say import EXIT_ASKED, read_json
-from vla_deploy.cli.session import FRESH_S, Session, attach, base_of
+from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.client.action_words import action_words
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.command import UserCommand
@@ -105,7 +105,7 @@ def _attempt_line(attempt: Attempt) -> str:
     return f"{attempt.back_end} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
 
 
-def _session(arguments: argparse.Namespace) -> Session | None:
+def _session(arguments: argparse.Namespace) -> RobotSession | None:
     try:
         return attach(arguments.runtime_base)
     except UsageError:  # none runs, and none is needed
@@ -113,7 +113,7 @@ def _session(arguments: argparse.Namespace) -> Session | None:
 
 
 def _request(
-    arguments: argparse.Namespace, robot: RobotDescription, session: Session | None
+    arguments: argparse.Namespace, robot: RobotDescription, session: RobotSession | None
 ) -> Request:
     command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
     if session is None:

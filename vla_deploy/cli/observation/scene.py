@@ -6,7 +6,7 @@ from typing import Any
 
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.knowledge import match_place, spoken_places
 from vla_deploy.robots import RobotDescription
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     return emit(arguments, report, as_text(report, arguments))
 
 
-def collect(session: Session, arguments: argparse.Namespace) -> dict[str, Any]:
+def collect(session: RobotSession, arguments: argparse.Namespace) -> dict[str, Any]:
     """Return the report that the arguments ask for.
 
     Raises:

@@ -22,7 +22,7 @@ from rich.text import Text
 
 from vla_deploy.cli.commands import add_top_command, number_within
 from vla_deploy.cli.observation.status import twin_words
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.ipc import TOPICS, PulseReader
 
 DOCUMENTS: Final = (
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
 class TopReader:
     """Read what the screen shows from the topics."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         self.session = session
         self._pulses: dict[str, PulseReader] = {
             topic.name: session.space.pulse_reader(topic.name) for topic in TOPICS

@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.cli.twin import answer_of, has_twin
 
 DEFAULT_VOICE: Final = "en-gb"
@@ -49,7 +49,7 @@ class Hearing:
 class Aloud:
     """Speak to the robot of a session, and follow the command that it understands."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         """Subscribe to what the robot hears.
 
         Raises:
@@ -115,7 +115,7 @@ class Aloud:
         )
 
 
-def why_deaf(session: Session) -> str:
+def why_deaf(session: RobotSession) -> str:
     """Return why the robot understands no speech; empty when it listens."""
     status = session.document("speech_status", age_limit_s=_STATUS_AGE_S)
     if status is None:
@@ -125,7 +125,7 @@ def why_deaf(session: Session) -> str:
     return "" if status.get("model") else "it has no model that reads words"
 
 
-def wait_until_listening(session: Session) -> str:
+def wait_until_listening(session: RobotSession) -> str:
     """Wait until the robot listens; return why it does not, or ""."""
     listens = session.wait_for(lambda: not why_deaf(session) or None, _LISTENS_WITHIN_S, 0.1)
     return "" if listens else why_deaf(session)
@@ -134,7 +134,7 @@ def wait_until_listening(session: Session) -> str:
 class MotionWatch:
     """Remember when the robot was first seen to move."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         self.first_ns: int | None = None
         self._session = session
 
@@ -162,7 +162,7 @@ class MotionWatch:
 class SpokenCommand:
     """Speak one command, repeat it where the robot asks for that, and take the times."""
 
-    def __init__(self, session: Session, motion: MotionWatch) -> None:
+    def __init__(self, session: RobotSession, motion: MotionWatch) -> None:
         """Subscribe to what the robot hears and plans.
 
         Raises:
@@ -237,7 +237,7 @@ class SpokenCommand:
         }
 
 
-def is_speaking(session: Session) -> bool:
+def is_speaking(session: RobotSession) -> bool:
     """Return whether the robot speaks."""
     status = session.document("speech_status", age_limit_s=_STATUS_AGE_S)
     return status is not None and bool(status["speaking"] or status["voice"].get("waiting"))

@@ -27,7 +27,7 @@ from vla_deploy.cli.operation.aloud import (
 )
 from vla_deploy.cli.operation.run import add_robot_arguments, add_twin_arguments, run_options
 from vla_deploy.cli.operation.say import line_of
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.cli.twin import SteppingClock, ask_referee
 from vla_deploy.client.action_words import action_words
 from vla_deploy.planning.knowledge import parse_object
@@ -108,7 +108,7 @@ class Demo:
         with Supervisor(self._options) as supervisor:
             supervisor.start()
             clock = SteppingClock(supervisor)
-            session = Session(supervisor.run_dir, clock)
+            session = RobotSession(supervisor.run_dir, clock)
             self._wait_armed(session)
             film = self._start_film(session)
             started_ns, started_s = clock.now_ns(), time.monotonic()
@@ -121,7 +121,7 @@ class Demo:
             table = session.document("process_table") or {}
         return self._outcome(took_s, wall_s, judged, film_files, table) | seen
 
-    def _wait_armed(self, session: Session) -> None:
+    def _wait_armed(self, session: RobotSession) -> None:
         def is_armed() -> bool | None:
             status = session.document("control_status", age_limit_s=1.0) or {}
             return status.get("state") == "armed" or None
@@ -130,7 +130,9 @@ class Demo:
             status = session.document("control_status", age_limit_s=1.0)
             raise CommandFailed(f"the robot did not arm within {ARM_TIMEOUT_S:g} s: {status}")
 
-    def _give_command(self, session: Session, clock: SteppingClock) -> Iterator[dict[str, Any]]:
+    def _give_command(
+        self, session: RobotSession, clock: SteppingClock
+    ) -> Iterator[dict[str, Any]]:
         """Return the events of the command: spoken, or as text where no speech is understood."""
         order = self._arguments.order
         self._why_typed = self._why_typed or wait_until_listening(session)
@@ -143,7 +145,7 @@ class Demo:
         self._print(f'a voice says: "{order}"')
         return spoken.events(order, self._arguments.voice, self._arguments.snr)
 
-    def _follow(self, events: Iterator[dict[str, Any]], session: Session) -> None:
+    def _follow(self, events: Iterator[dict[str, Any]], session: RobotSession) -> None:
         for event in events:
             self._last = event
             if event["event"] == "plan":
@@ -156,7 +158,7 @@ class Demo:
                     session, "caption", text=action_words(event["skill"], event["parameters"])
                 )
 
-    def _judge(self, session: Session) -> dict[str, Any]:
+    def _judge(self, session: RobotSession) -> dict[str, Any]:
         """Ask the referee where the plan's object ended, when it was to end in a box."""
         pair = _object_and_container(self._plan)
         if pair is None:
@@ -164,7 +166,7 @@ class Demo:
         answer = ask_referee(session, "inside", object=pair[0], container=pair[1])
         return {"judged_by": "mujoco", **answer}
 
-    def _control_counters(self, session: Session) -> dict[str, Any]:
+    def _control_counters(self, session: RobotSession) -> dict[str, Any]:
         """Return control's counters, and a digest of all bytes on its buses."""
         status = session.document("control_status") or {}
         return {
@@ -174,19 +176,19 @@ class Demo:
             "wire_digest": ask_referee(session, "truth")["wire_digest"],
         }
 
-    def _start_film(self, session: Session) -> bool:
+    def _start_film(self, session: RobotSession) -> bool:
         if self._arguments.headless:
             return False
         path = (self._arguments.out / "demo.webm").resolve()
         return self._film_op(session, "film_start", path=str(path)) is not None
 
-    def _stop_film(self, session: Session) -> dict[str, Any]:
+    def _stop_film(self, session: RobotSession) -> dict[str, Any]:
         files = self._film_op(session, "film_stop") or {}
         if files.get("film") and os.environ.get("DISPLAY") and shutil.which("xdg-open"):
             subprocess.Popen(["xdg-open", files["film"]], stderr=subprocess.DEVNULL)
         return files
 
-    def _film_op(self, session: Session, op: str, **details: str) -> dict[str, Any] | None:
+    def _film_op(self, session: RobotSession, op: str, **details: str) -> dict[str, Any] | None:
         """Send a request about the film; a film that fails must not fail the job."""
         if self._arguments.headless:
             return None

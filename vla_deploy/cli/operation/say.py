@@ -11,7 +11,7 @@ from typing import Any, Final, TextIO
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.aloud import DEFAULT_VOICE, STOP, Aloud
-from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.client.action_words import action_words
 
 EXIT_ASKED: Final = 3
@@ -79,7 +79,7 @@ def _utterance(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _follow_aloud(
-    session: Session, follower: "Follower", arguments: argparse.Namespace
+    session: RobotSession, follower: "Follower", arguments: argparse.Namespace
 ) -> dict[str, Any]:
     """Speak a command in the twin's room, print what was heard, and return the last event.
 
@@ -103,7 +103,7 @@ class Follower:
     Without a terminal, or where only the outcome is to be printed, a question is the end.
     """
 
-    def __init__(self, session: Session, quiet: bool, terminal: TextIO | None = None) -> None:
+    def __init__(self, session: RobotSession, quiet: bool, terminal: TextIO | None = None) -> None:
         self._session = session
         self._quiet = quiet
         self._terminal = sys.stdin if terminal is None else terminal

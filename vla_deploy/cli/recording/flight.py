@@ -10,7 +10,7 @@ from typing import Any
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.session import Session, attach, base_of
+from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.flight import Flight, read_flight
@@ -114,7 +114,7 @@ def run_save(arguments: argparse.Namespace) -> int:
     return emit(arguments, answer, answer["file"])
 
 
-def _save(session: Session, reason: str) -> dict[str, Any] | None:
+def _save(session: RobotSession, reason: str) -> dict[str, Any] | None:
     """Request a flight; return the recorder's answer, None when it is silent."""
     answers = session.events("flight_event")
     session.publish("flight_request", {"source": session.source, "reason": reason})

@@ -11,7 +11,7 @@ from typing import Any, Final
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.recording.runs import add_topic_arguments, stop_requested, topic_wish
-from vla_deploy.cli.session import Session, attach, base_of
+from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS, RecordedRun
@@ -139,7 +139,7 @@ def _source() -> str:
     return f"cli-{os.getpid()}"
 
 
-def _wait(session: Session, reached: Callable[[Status], bool]) -> Status:
+def _wait(session: RobotSession, reached: Callable[[Status], bool]) -> Status:
     """Return the first status of the recorder that fits.
 
     Raises:

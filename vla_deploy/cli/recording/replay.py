@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.recording.runs import find_recorded, stop_requested
-from vla_deploy.cli.session import Session, attach, base_of
+from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE
 from vla_deploy.runtime.node import run_node
 from vla_deploy.supervisor.process import ChildProcess
@@ -78,7 +78,7 @@ def _show(arguments: argparse.Namespace) -> int:
             flush=True,
         )
         page = _page(runtime, source) if arguments.dashboard else None
-        address = _Address(Session(runtime.run_dir), wanted=page is not None)
+        address = _Address(RobotSession(runtime.run_dir), wanted=page is not None)
 
         def should_stop() -> bool:
             address.print_once()
@@ -97,7 +97,7 @@ def _show(arguments: argparse.Namespace) -> int:
 class _Address:
     """Print the page's address as soon as the dashboard publishes it."""
 
-    def __init__(self, session: Session, *, wanted: bool) -> None:
+    def __init__(self, session: RobotSession, *, wanted: bool) -> None:
         self._session = session
         self._wanted = wanted
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.runtime.node import Node, NodeContext, run_node
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
@@ -29,7 +29,7 @@ def find_recorded(base: Path, name: str) -> Path:
     return folders[0].find(name)
 
 
-def watched_run(session: Session) -> NodeContext:
+def watched_run(session: RobotSession) -> NodeContext:
     """Return the context of a node that only watches this run, a robot's or a replay's."""
     head = session.document("process_table") or session.document("replay_status") or {}
     return NodeContext(
@@ -41,7 +41,7 @@ def watched_run(session: Session) -> NodeContext:
     )
 
 
-def run_until_stopped(node: Node, session: Session) -> None:
+def run_until_stopped(node: Node, session: RobotSession) -> None:
     """Run a node that watches the run until Ctrl-C or SIGTERM."""
     run_node(node, session.clock, stop_requested())
 

@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.maintenance import profile
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.profile_choice import (
     ProfileChoice,
@@ -164,7 +164,7 @@ def ask(tmp_path, clock):
 
         clock.after_wait = tell
         arguments = SimpleNamespace(allow_restart=True, dry_run=False, json=False)
-        answer = profile._request(Session(Path(tmp_path), clock), "calm", arguments)
+        answer = profile._request(RobotSession(Path(tmp_path), clock), "calm", arguments)
         assert (request["profile"], request["allow_restart"]) == ("calm", True)
         return answer
 

@@ -7,7 +7,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.observation import budget
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 
 TOLD = {
@@ -67,14 +67,14 @@ TOLD = {
 
 @pytest.fixture
 def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    session = Session(tmp_path)
+    session = RobotSession(tmp_path)
     monkeypatch.setattr(budget, "attach", lambda _: session)
     yield session
     session.close()
 
 
 @pytest.fixture
-def told(tmp_path: Path, session: Session):
+def told(tmp_path: Path, session: RobotSession):
     space = SharedSpace(tmp_path / "ipc", MonotonicClock())
     space.cell_writer("budget").put_document(TOLD)
     yield

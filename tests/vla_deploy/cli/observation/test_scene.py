@@ -11,7 +11,7 @@ import pytest
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.main import main, parser
 from vla_deploy.cli.observation.scene import as_text, collect
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.world import UnknownWord
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def tell(robot: "Robot") -> Callable[..., None]:
     return tell
 
 
-def ask(session: Session, *words: str) -> tuple[dict[str, Any], str]:
+def ask(session: RobotSession, *words: str) -> tuple[dict[str, Any], str]:
     arguments: argparse.Namespace = parser(["scene"]).parse_args(["scene", *words])
     told = collect(session, arguments)
     return told, as_text(told, arguments)
@@ -60,7 +60,7 @@ CUP, BOTTLE = thing("cup_1", 2.2, 1.6, 0.095), thing("bottle_1", 2.0, 1.6, 0.18)
 
 
 def test_a_line_for_each_thing_with_place_and_whether_it_can_be_taken(
-    session: Session, tell: Callable[..., None]
+    session: RobotSession, tell: Callable[..., None]
 ) -> None:
     tell(CUP, thing("box_1", 2.5, 1.5, 0.13, size_m=[0.24, 0.24, 0.13]))
     told, text = ask(session)
@@ -73,7 +73,7 @@ def test_a_line_for_each_thing_with_place_and_whether_it_can_be_taken(
 
 
 def test_relations_as_seen_from_here_and_from_the_other_side(
-    session: Session, tell: Callable[..., None]
+    session: RobotSession, tell: Callable[..., None]
 ) -> None:
     tell(CUP, BOTTLE)
     assert "bottle_1 right of cup_1" in ask(session, "--relations")[1]
@@ -84,7 +84,9 @@ def test_relations_as_seen_from_here_and_from_the_other_side(
     assert (here["name"], there["name"]) == ("robot", "kitchen")
 
 
-def test_what_is_asked_for_is_what_is_told(session: Session, tell: Callable[..., None]) -> None:
+def test_what_is_asked_for_is_what_is_told(
+    session: RobotSession, tell: Callable[..., None]
+) -> None:
     tell(CUP, BOTTLE, thing("cup_2", 6.3, 4.3, 0.095, rests={"relation": "on", "of": "floor"}))
     named = [one["id"] for one in ask(session, "--of", "cup")[0]["things"]]
     assert named == ["cup_1", "cup_2"]
@@ -95,14 +97,14 @@ def test_what_is_asked_for_is_what_is_told(session: Session, tell: Callable[...,
     assert "nothing of that kind" in ask(session, "--of", "keys")[1]
 
 
-def test_why_not_says_what_is_in_the_way(session: Session, tell: Callable[..., None]) -> None:
+def test_why_not_says_what_is_in_the_way(session: RobotSession, tell: Callable[..., None]) -> None:
     ball = thing("ball_1", 2.2, 1.6, 0.05, rests={"relation": "on", "of": "cup_1"})
     tell(CUP, ball)
     _, text = ask(session, "--of", "cup", "--why-not", "reachable")
     assert "cup_1: on top: the red ball is on it" in text
 
 
-def test_where_to_look_and_what_has_gone(session: Session, tell: Callable[..., None]) -> None:
+def test_where_to_look_and_what_has_gone(session: RobotSession, tell: Callable[..., None]) -> None:
     gone = thing("cup_2", 6.3, 4.3, 0.095, cause="the left hand lost it",
                  rests={"relation": "on", "of": "kitchen_table"})  # fmt: skip
     tell(lost=[gone])
@@ -112,7 +114,7 @@ def test_where_to_look_and_what_has_gone(session: Session, tell: Callable[..., N
 
 
 def test_a_command_is_planned_in_a_scene_that_was_printed_while_something_was_lost(
-    session: Session, tell: Callable[..., None], tmp_path: Path
+    session: RobotSession, tell: Callable[..., None], tmp_path: Path
 ) -> None:
     tell(CUP, lost=[thing("bottle_2", 6.3, 4.3, 0.18, cause="the left hand lost it")])
     scene = tmp_path / "scene.json"
@@ -121,13 +123,13 @@ def test_a_command_is_planned_in_a_scene_that_was_printed_while_something_was_lo
     assert main([*base, "plan", "pick up the red cup", "--scene", str(scene)]) == 0
 
 
-def test_what_a_hand_feels(session: Session, tell: Callable[..., None]) -> None:
+def test_what_a_hand_feels(session: RobotSession, tell: Callable[..., None]) -> None:
     tell(hands={"left": {"class": None, "told": "cup", "felt": "lost", "cause": "it slipped out"}})
     assert "left hand: nothing, felt lost (it slipped out)" in ask(session)[1]
 
 
 def test_without_perception_or_with_words_it_does_not_know_it_says_so(
-    session: Session, tell: Callable[..., None]
+    session: RobotSession, tell: Callable[..., None]
 ) -> None:
     with pytest.raises(UsageError, match="perception tells no scene"):
         ask(session)

@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.main import main
 from vla_deploy.cli.operation.aloud import Aloud, MotionWatch, SpokenCommand, why_deaf
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 
 ORDER = "go to the kitchen"
@@ -64,14 +64,14 @@ class Twin:
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Iterator[Session]:
-    made = Session(tmp_path)
+def session(tmp_path: Path) -> Iterator[RobotSession]:
+    made = RobotSession(tmp_path)
     yield made
     made.close()
 
 
 @pytest.fixture
-def twin(tmp_path: Path, session: Session, serve_twin: Callable[..., Any]) -> Iterator[Twin]:
+def twin(tmp_path: Path, session: RobotSession, serve_twin: Callable[..., Any]) -> Iterator[Twin]:
     made = Twin(tmp_path)
     made.space.cell_writer("speech_status").put_document(LISTENING)
     serve_twin(tmp_path, made.answer)
@@ -85,7 +85,7 @@ def tell(twin: Twin, event: str, **details: Any) -> None:
 
 
 def test_what_is_said_in_the_room_is_heard_and_followed_by_its_command(
-    twin: Twin, session: Session
+    twin: Twin, session: RobotSession
 ) -> None:
     aloud = Aloud(session)
     hearing = aloud.speak(ORDER, "en-us", 10.0)
@@ -100,7 +100,7 @@ def test_what_is_said_in_the_room_is_heard_and_followed_by_its_command(
 
 
 def test_a_command_that_was_not_understood_is_said_again_and_the_times_are_of_the_last(
-    twin: Twin, session: Session
+    twin: Twin, session: RobotSession
 ) -> None:
     twin.verdicts = ["rejected", "accepted", "accepted"]
     motion = MotionWatch(session)
@@ -122,19 +122,19 @@ def test_a_command_that_was_not_understood_is_said_again_and_the_times_are_of_th
     assert 0.0 < told["end_to_motion_s"] <= told["end_to_plan_s"] < 60.0
 
 
-def test_words_that_are_no_command_are_followed_nowhere(twin: Twin, session: Session) -> None:
+def test_words_that_are_no_command_are_followed_nowhere(twin: Twin, session: RobotSession) -> None:
     twin.verdicts = ["rejected"]
     aloud = Aloud(session)
     with pytest.raises(UsageError, match="asks for a repetition: I am not sure"):
         aloud.follow(aloud.speak(ORDER))
 
 
-def test_a_voice_that_nobody_has_is_one_line(twin: Twin, session: Session) -> None:
+def test_a_voice_that_nobody_has_is_one_line(twin: Twin, session: RobotSession) -> None:
     with pytest.raises(CommandFailed, match="voice does not exist"):
         Aloud(session).speak(ORDER, "klingon-orc")
 
 
-def test_a_real_robot_is_spoken_to_by_people(session: Session) -> None:
+def test_a_real_robot_is_spoken_to_by_people(session: RobotSession) -> None:
     with pytest.raises(UsageError, match="this run has a real robot: speak to it"):
         Aloud(session)
     assert why_deaf(session) == "no speech process runs"
@@ -148,7 +148,7 @@ def test_a_real_robot_is_spoken_to_by_people(session: Session) -> None:
     ],
 )
 def test_a_deaf_robot_says_why(
-    twin: Twin, session: Session, status: dict[str, Any], why: str
+    twin: Twin, session: RobotSession, status: dict[str, Any], why: str
 ) -> None:
     assert why_deaf(session) == ""
     twin.space.cell_writer("speech_status").put_document(status)
