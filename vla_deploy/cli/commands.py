@@ -197,10 +197,21 @@ def whole_number(low: int = 1) -> Callable[[str], int]:
     return parse
 
 
-def emit(arguments: argparse.Namespace, document: object, text: str, indent: int | None = 2) -> int:
-    """Print a result, as JSON where `--json` is given; return exit code 0."""
+def emit(
+    arguments: argparse.Namespace,
+    document: object,
+    text: str | Callable[[], str],
+    indent: int | None = 2,
+) -> int:
+    """Print a result, as JSON where `--json` is given; return exit code 0.
+
+    A text that is composed from another process's document is passed as a function: whatever is
+    wrong with it, the document itself can be printed.
+    """
     if arguments.json:
         print(json.dumps(document, indent=indent))
-    elif text:
+        return 0
+    text = text if isinstance(text, str) else text()
+    if text:
         print(text)
     return 0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.cli.commands import COMMANDS
+from vla_deploy.cli.commands import COMMANDS, emit
 from vla_deploy.cli.errors import USER_ERRORS
 from vla_deploy.cli.main import main, parser
 from vla_deploy.cli.operation import demo
@@ -247,3 +247,8 @@ def test_the_service_tries_again_after_a_fault_of_the_system(capsys, monkeypatch
     monkeypatch.setattr("vla_deploy.cli.operation.run.main", fill_up)
     assert main(["run", "--twin"]) == 1
     assert capsys.readouterr().err == "vla-deploy: [Errno 28] No space left on device\n"
+
+
+def test_a_document_is_printed_even_where_no_text_can_be_made_of_it(capsys):
+    assert emit(argparse.Namespace(json=True), {"state": 7}, lambda: 1 // 0) == 0
+    assert json.loads(capsys.readouterr().out) == {"state": 7}

@@ -126,9 +126,10 @@ def run_crashes(arguments: argparse.Namespace) -> int:
     reports = {path.stem: path for path in folder.entries()}
     if arguments.act == "show":
         report = _read(_chosen_report(reports, arguments.crash))
-        return emit(arguments, report, _report_text(report))
+        return emit(arguments, report, lambda: _report_text(report))
     rows = [{"crash": name, **_read_or_fault(path)} for name, path in reports.items()]
-    return emit(arguments, rows, "\n".join(map(_row, rows)) or "no process has crashed")
+    nothing = "no process has crashed"
+    return emit(arguments, rows, lambda: "\n".join(map(_row, rows)) or nothing)
 
 
 def _chosen_report(reports: Mapping[str, Path], name: str | None) -> Path:

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     result = planner.plan(request)
     asks = confirmation_of(result.plan, request, result.proposal) if result.plan else ""
     document = document_of(result, asks, planner.away)
-    emit(arguments, document, as_text(result, asks, planner.away))
+    emit(arguments, document, lambda: as_text(result, asks, planner.away))
     if isinstance(result.error, Ambiguous):
         return EXIT_ASKED
     if result.error is not None:

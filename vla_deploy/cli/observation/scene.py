@@ -39,7 +39,7 @@ def register(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the scene of the run on this machine."""
     report = collect(attach(arguments.runtime_base), arguments)
-    return emit(arguments, report, as_text(report, arguments))
+    return emit(arguments, report, lambda: as_text(report, arguments))
 
 
 def collect(session: RobotSession, arguments: argparse.Namespace) -> dict[str, Any]:

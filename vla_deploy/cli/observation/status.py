@@ -29,7 +29,7 @@ def register(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the status of the run on this machine."""
     status = collect(attach(arguments.runtime_base))
-    return emit(arguments, status, as_text(status))
+    return emit(arguments, status, lambda: as_text(status))
 
 
 def as_text(status: dict[str, Any]) -> str:

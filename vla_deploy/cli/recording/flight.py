@@ -53,9 +53,8 @@ def run_list(arguments: argparse.Namespace) -> int:
     """Print one line per flight."""
     folder = _folder(arguments)
     flights = [_summary_or_fault(path) for path in folder.flights()]
-    lines = [_row(one) for one in flights]
     nothing = f"no flights in {folder.path}; one is saved at every stop and crash"
-    return emit(arguments, flights, "\n".join(lines) or nothing)
+    return emit(arguments, flights, lambda: "\n".join(map(_row, flights)) or nothing)
 
 
 def _row(flight: Mapping[str, Any]) -> str:

@@ -10,7 +10,12 @@ from typing import Any, Final
 
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.recording.runs import add_topic_arguments, stop_requested, topic_wish
+from vla_deploy.cli.recording.runs import (
+    add_topic_arguments,
+    stop_requested,
+    topic_wish,
+    watched_run,
+)
 from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
@@ -67,7 +72,7 @@ def run_start(arguments: argparse.Namespace) -> int:
     session = attach(arguments.runtime_base)
     session.publish("recording_request", wish.document())
     status = _wait(session, lambda status: status.get("source") == wish.source)
-    return emit(arguments, status, _words(status))
+    return emit(arguments, status, lambda: _words(status))
 
 
 def run_stop(arguments: argparse.Namespace) -> int:
@@ -75,7 +80,7 @@ def run_stop(arguments: argparse.Namespace) -> int:
     session = attach(arguments.runtime_base)
     session.publish("recording_request", {"act": STOP, "source": session.source})
     status = _wait(session, lambda status: status["state"] == "off")
-    return emit(arguments, status, _words(status))
+    return emit(arguments, status, lambda: _words(status))
 
 
 def run_status(arguments: argparse.Namespace) -> int:
@@ -87,7 +92,7 @@ def run_status(arguments: argparse.Namespace) -> int:
     status = attach(arguments.runtime_base).document("recording_status", _STATUS_AGE_S)
     if status is None:
         raise CommandFailed("the recorder is silent; see: vla-deploy status")
-    return emit(arguments, status, _words(status))
+    return emit(arguments, status, lambda: _words(status))
 
 
 def run_list(arguments: argparse.Namespace) -> int:
@@ -115,12 +120,9 @@ def run_once(arguments: argparse.Namespace) -> int:
     """Record into one file until the time is over, or Ctrl-C."""
     wish = topic_wish(arguments, duration_s=arguments.duration, source=_source())
     session = attach(arguments.runtime_base)
-    table = session.document("process_table") or {}
-    run = RecordedRun(
-        run_id=session.run_dir.resolve().name,
-        robot=str(table.get("robot", "")),
-        profile=str(table.get("profile", "")),
-    )
+    watched = watched_run(session)
+    run_id = session.run_dir.resolve().name
+    run = RecordedRun(run_id=run_id, robot=watched.robot, profile=watched.profile)
     one = OneRecording(
         session.run_dir,
         run,
