@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,13 +27,12 @@ SERIAL_NAMES = ("ttyUSB*", "ttyACM*", "ttyTHS*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoBusPort:
-    """Describe the port of a servo bus; `joints` are those of a robot file by servo id."""
+    """Describe the port of a servo bus, and the robot file that declares its servos."""
 
     port: Path
     baud: int
     baud_given: bool = True
     robot: RobotDescription | None = None
-    joints: Mapping[int, str] = field(default_factory=dict)
     record: Path | None = None
     clock: Clock = field(default_factory=MonotonicClock)
 
@@ -69,6 +68,17 @@ class ServoBusPort:
         if baud != self.baud:
             file = file.with_name(f"{file.stem}-{baud}{file.suffix}")
         return WireRecorder(file, self.clock, note=f"{self.port} at {baud} baud")
+
+    @property
+    def declared(self) -> dict[int, tuple[str, str]]:
+        """Return joint and model of the servos in the robot file, by id; none without a file."""
+        servos = self.robot.servo_bus.servos if self.robot else ()
+        return {servo.id: (servo.joint, servo.model) for servo in servos}
+
+    @property
+    def joints(self) -> dict[int, str]:
+        """Return the joint of each declared servo."""
+        return {servo_id: joint for servo_id, (joint, _) in self.declared.items()}
 
     def joint(self, servo_id: int) -> str:
         """Return the joint that a servo drives, "" without a robot file."""
@@ -118,7 +128,6 @@ def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
         baud=arguments.baud or (bus.baud if bus else DEFAULT_BAUD),
         baud_given=arguments.baud is not None,
         robot=robot,
-        joints={servo.id: servo.joint for servo in bus.servos} if bus else {},
         record=arguments.record,
     )
 

@@ -8,7 +8,7 @@ from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tools import BenchLink
 from drivers.dynamixel.tools.bench_link import Keep
-from drivers.dynamixel.tools.scan import is_clash
+from drivers.dynamixel.tools.scan import is_clash, is_taken
 from drivers.errors import DriverError, NoReply, ProtocolError
 from vla_deploy.cli.commands import Run, add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
@@ -74,14 +74,14 @@ def run_set_id(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         servo = link.servo(old, bus.joint(old))
         _require_alone(link, bus, old)
-        if new == old or _is_taken(link, new):
+        if new == old or is_taken(link, new):
             raise UsageError(f"{bus.port}: id {new} is taken; see: vla-deploy servo scan")
         torque = _torque_question(link, [servo])
         confirm(arguments, f"{servo} gets the id {new}.{torque}")
         link.write(servo, "torque_enable", 0)
         link.write(servo, "id", new)
         moved = link.servo(new, bus.joint(new))
-        if link.read(moved, "id") != new or _is_taken(link, old):
+        if link.read(moved, "id") != new or is_taken(link, old):
             raise CommandFailed(f"{servo}: did not take the id {new}; see: vla-deploy servo scan")
     document = {"id": new, "old_id": old}
     return emit(arguments, document, f"{servo} has the id {new} now", indent=None)
@@ -93,17 +93,6 @@ def _require_alone(link: BenchLink, bus: ServoBusPort, one: int) -> None:
             f"{bus.port}: more than one servo has the id {one}, both would change; connect one of "
             "them alone"
         )
-
-
-def _is_taken(link: BenchLink, one: int) -> bool:
-    """Return whether anything answers to an id; a damaged answer counts."""
-    try:
-        link.ping(one)
-    except NoReply:
-        return False
-    except ProtocolError:
-        return True
-    return True
 
 
 def _torque_question(link: BenchLink, servos: Sequence[ServoSpec]) -> str:
@@ -193,7 +182,7 @@ def run_factory_reset(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         servo = link.servo(arguments.id, bus.joint(arguments.id))
         _require_alone(link, bus, servo.id)
-        if new_id != servo.id and _is_taken(link, new_id):
+        if new_id != servo.id and is_taken(link, new_id):
             raise UsageError(f"{servo} would get the id {new_id}, which is taken; use --keep id")
         torque = _torque_question(link, [servo])
         confirm(arguments, f"{servo} forgets all settings but {arguments.keep}.{torque}")

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.tools import BenchLink, FoundServo, SpeedReport, scan_speed
+from drivers.dynamixel.tools.scan import ServoScan
 from drivers.errors import NoReply
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
@@ -66,9 +67,15 @@ def run_scan(arguments: argparse.Namespace) -> int:
                 break  # servos without a speed answer at each
     finally:
         progress.clear()
-    missing = _missing(bus, reports) if arguments.ids is None else []
-    emit(arguments, _scan_document(bus, reports, missing), "\n".join(_scan_lines(bus, reports)))
-    _raise_findings(bus, reports, missing)
+    scan = ServoScan(
+        port=str(bus.port),
+        reports=reports,
+        declared=bus.declared,
+        is_complete=arguments.ids is None,
+    )
+    emit(arguments, _scan_document(bus, scan), "\n".join(_scan_lines(bus, reports)))
+    if fault := scan.fault():
+        raise CommandFailed(fault)
     return 0
 
 
@@ -78,16 +85,10 @@ def _speeds(bus: ServoBusPort) -> Sequence[int]:
     return (bus.baud, *(speed for speed in SPEEDS if speed != bus.baud))
 
 
-def _missing(bus: ServoBusPort, reports: Sequence[SpeedReport]) -> list[int]:
-    answered = {one.servo_id for one in reports[0].servos} | set(reports[0].clashes)
-    return sorted(set(bus.joints) - answered)
-
-
-def _scan_document(
-    bus: ServoBusPort, reports: Sequence[SpeedReport], missing: Sequence[int]
-) -> dict[str, Any]:
+def _scan_document(bus: ServoBusPort, scan: ServoScan) -> dict[str, Any]:
+    reports = scan.reports
     return {
-        "port": str(bus.port),
+        "port": scan.port,
         "servos": [
             {"baud": report.baud, **_row(bus, servo)}
             for report in reports
@@ -100,7 +101,7 @@ def _scan_document(
             {"baud": report.baud, "id": one} for report in reports for one in report.protocol_1_ids
         ],
         "noise_bytes": {report.baud: report.noise_bytes for report in reports},
-        "missing": list(missing),
+        "missing": scan.missing,
     }
 
 
@@ -129,57 +130,6 @@ def _scan_lines(bus: ServoBusPort, reports: Sequence[SpeedReport]) -> list[str]:
         "same; see: vla-deploy servo set-baud --help"
     ]
     return [*(head if rows else []), *rows, *(hints if len(speeds) > 1 else [])]
-
-
-def _raise_findings(
-    bus: ServoBusPort, reports: Sequence[SpeedReport], missing: Sequence[int]
-) -> None:
-    for report in reports:
-        if report.clashes:
-            ids = ", ".join(map(str, report.clashes))
-            raise CommandFailed(
-                f"{bus.port} at {report.baud} baud: the answers of id {ids} are damaged: more "
-                "than one servo has it, or the cable is bad. Connect one of them alone and give it "
-                "a free id: vla-deploy servo set-id"
-            )
-    if not any(report.servos for report in reports):
-        raise CommandFailed(_nothing_found(bus, reports))
-    if missing:
-        names = ", ".join(bus.label(one) for one in missing)
-        raise CommandFailed(
-            f"{bus.port} at {reports[0].baud} baud: no answer from {names}; check power, cable "
-            "and speed (see the table for servos at another speed)"
-        )
-    if wrong := _wrong_models(bus, reports[0]):
-        raise CommandFailed(f"{'; '.join(wrong)}; correct the robot file or the wiring")
-
-
-def _wrong_models(bus: ServoBusPort, report: SpeedReport) -> list[str]:
-    declared = {one.id: one.model for one in bus.robot.servo_bus.servos} if bus.robot else {}
-    return [
-        f"{bus.label(one.servo_id)} is {one.model_name}, the robot file says "
-        f"{declared[one.servo_id]}"
-        for one in report.servos
-        if declared.get(one.servo_id, one.model_name) != one.model_name
-    ]
-
-
-def _nothing_found(bus: ServoBusPort, reports: Sequence[SpeedReport]) -> str:
-    old = next((report for report in reports if report.protocol_1_ids), None)
-    noisy = next((report for report in reports if report.noise_bytes), None)
-    if old is not None:
-        ids = ", ".join(map(str, old.protocol_1_ids))
-        return (
-            f"{bus.port} at {old.baud} baud: id {ids} answers in Protocol 1.0, only 2.0 is spoken "
-            "here; set the servo's protocol_type to 2, if it has one"
-        )
-    if noisy is not None:
-        return (
-            f"{bus.port}: bytes came at {noisy.baud} baud, but no packet: another speed, an "
-            "adapter that echoes, or another device; check the adapter's mode"
-        )
-    asked = ", ".join(str(report.baud) for report in reports)
-    return f"{bus.port}: no servo answers at {asked} baud; check power, cable and port"
 
 
 def run_ping(arguments: argparse.Namespace) -> int:
