@@ -3,10 +3,10 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from vla_deploy.cli.main import main
 from vla_deploy.memory import Episode, LastSeen, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
 
@@ -14,8 +14,7 @@ Run = Callable[..., tuple[int, str]]
 
 
 @pytest.fixture
-def memory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
-    base = tmp_path / "run"
+def memory(base: Path, vla: Callable[..., Any]) -> Run:
     store = MemoryStore.of_base(base)
     told_s = unix_s() - 7200.0
     keys = LastSeen(
@@ -33,9 +32,8 @@ def memory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     store.close()
 
     def run(*arguments: str) -> tuple[int, str]:
-        code = main(["--runtime-base", str(base), "memory", *arguments])
-        shown = capsys.readouterr()
-        return code, shown.out + shown.err
+        said = vla("memory", *arguments)
+        return said.code, said.out + said.err
 
     return run
 

@@ -4,8 +4,6 @@ import json
 
 import pytest
 
-from vla_deploy.cli.main import main
-
 SCENE = {
     "stamp_ns": 1,
     "things": [
@@ -23,15 +21,13 @@ SCENE = {
 
 
 @pytest.fixture
-def plan(tmp_path, capsys):
+def plan(tmp_path, vla):
     """Plan a command in the scene; return the exit code and what was printed."""
     scene = tmp_path / "scene.json"
     scene.write_text(json.dumps(SCENE))
 
     def plan(*words: str) -> tuple[int, str]:
-        base = ["--runtime-base", str(tmp_path / "none")]
-        code = main([*base, "plan", *words, "--scene", str(scene)])
-        return code, capsys.readouterr().out
+        return vla("plan", *words, "--scene", scene)[:2]
 
     return plan
 
@@ -74,8 +70,7 @@ def test_a_server_that_is_not_there_is_told(plan, tmp_path):
 
 
 @pytest.mark.parametrize("content", ["[1, 2]", "{", '{"objects": 3}', '{"things": [7]}'])
-def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, capsys, content):
+def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, vla, content):
     (tmp_path / "bad.json").write_text(content)
-    base = ["--runtime-base", str(tmp_path / "none")]
-    assert main([*base, "plan", "go", "--scene", str(tmp_path / "bad.json")]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
+    said = vla("plan", "go", "--scene", tmp_path / "bad.json")
+    assert (said.code, len(said.err.splitlines())) == (2, 1)
