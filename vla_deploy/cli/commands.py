@@ -133,11 +133,16 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def add_command(
-    commands: Any, name: str, summary: str, examples: str, run: Run | None = None, json: str = ""
+    commands: Any,
+    name: str,
+    summary: str,
+    examples: str,
+    run: Run | None = None,
+    json_help: str = "",
 ) -> argparse.ArgumentParser:
     """Add a command that `run` carries out and whose `--help` ends with examples.
 
-    `json` is the help text of its option `--json`; without one it has no such option.
+    `json_help` is the help text of its option `--json`; without one it has no such option.
     """
     added: argparse.ArgumentParser = commands.add_parser(
         name,
@@ -146,18 +151,18 @@ def add_command(
         epilog=f"examples:\n{examples}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    if json:
-        added.add_argument("--json", action="store_true", help=json)
+    if json_help:
+        added.add_argument("--json", action="store_true", help=json_help)
     if run is not None:
         added.set_defaults(run=run)
     return added
 
 
 def add_top_command(
-    commands: Any, name: str, examples: str, run: Run | None = None, json: str = ""
+    commands: Any, name: str, examples: str, run: Run | None = None, json_help: str = ""
 ) -> argparse.ArgumentParser:
     """Add a command of the table `COMMANDS`, which has its summary."""
-    return add_command(commands, name, COMMANDS[name].summary, examples, run, json)
+    return add_command(commands, name, COMMANDS[name].summary, examples, run, json_help)
 
 
 def number_within(low: float, high: float, expected: str) -> Callable[[str], float]:

@@ -71,7 +71,7 @@ def _add_act(acts: Any, name: str, summary: str, run: Run, views: int) -> argpar
         f"  vla-deploy camera {name} --robot butler --square-mm 35.8\n"
         f"  vla-deploy camera {name} --robot butler --images photos --json\n"
     )
-    act = add_command(acts, name, summary, example, run, json="print JSON")
+    act = add_command(acts, name, summary, example, run, json_help="print JSON")
     act.add_argument("--robot", default="butler", help="name or folder of a robot")
     act.add_argument(
         "--images", type=Path, metavar="DIR", help="a folder (default: the robot that runs)"

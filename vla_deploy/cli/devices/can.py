@@ -52,7 +52,7 @@ def register(commands: Any) -> None:
         "  vla-deploy can scan --robot butler\n"
         "  vla-deploy can scan --interface socketcan --channel can0 --protocol odrive --json\n",
         run_scan,
-        json="print JSON",
+        json_help="print JSON",
     )
     _add_bus_arguments(scan)
     monitor = add_command(
@@ -64,7 +64,7 @@ def register(commands: Any) -> None:
         "  vla-deploy can monitor --robot butler --id 0x181 --id 0x201\n"
         "  vla-deploy can monitor --interface vla_hub --channel ./can --count 20 --json\n",
         run_monitor,
-        json="print JSON",
+        json_help="print JSON",
     )
     _add_bus_arguments(monitor)
     monitor.add_argument("--count", type=whole_number(), help="stop after so many frames")

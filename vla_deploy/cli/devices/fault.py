@@ -58,7 +58,7 @@ def _add(
     actions: Any, name: str, summary: str, run: Run, *examples: str
 ) -> argparse.ArgumentParser:
     text = "".join(f"  vla-deploy fault {one}\n" for one in examples)
-    return add_command(actions, name, summary, text, run, json="print the answer as JSON")
+    return add_command(actions, name, summary, text, run, json_help="print the answer as JSON")
 
 
 def _add_inject_arguments(inject: argparse.ArgumentParser) -> None:

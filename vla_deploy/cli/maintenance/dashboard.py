@@ -36,7 +36,7 @@ _STATUS_AGE_S: Final = 3.0
 def register(commands: Any) -> None:
     """Add the command."""
     dashboard = add_top_command(
-        commands, NAME, EXAMPLES, show_address, json="print the addresses as JSON"
+        commands, NAME, EXAMPLES, show_address, json_help="print the addresses as JSON"
     )
     dashboard.add_argument("--open", action="store_true", help="open the page in the browser")
     acts = dashboard.add_subparsers(dest="act", metavar="ACT")
@@ -59,7 +59,12 @@ def register_acts(acts: Any) -> None:
         "--stdin", action="store_true", help="take a password of your own from standard input"
     )
     users = _add(
-        acts, "users", "list the accounts, or remove one", list_users, "users", json="print JSON"
+        acts,
+        "users",
+        "list the accounts, or remove one",
+        list_users,
+        "users",
+        json_help="print JSON",
     )
     users.add_argument("--remove", metavar="USER", help="whose account to remove")
     token = _add(acts, "token", "make, list and revoke tokens", None, "token list")
@@ -74,7 +79,14 @@ def register_acts(acts: Any) -> None:
     add.add_argument("name", metavar="NAME", help="what it is for")
     add.add_argument("--role", choices=ROLES, required=True)
     add.add_argument("--days", type=float, metavar="N", help="how long it is valid (for ever)")
-    _add(token_acts, "list", "list the tokens", list_tokens, "token list --json", json="print JSON")
+    _add(
+        token_acts,
+        "list",
+        "list the tokens",
+        list_tokens,
+        "token list --json",
+        json_help="print JSON",
+    )
     revoke = _add(
         token_acts,
         "revoke",
@@ -84,16 +96,21 @@ def register_acts(acts: Any) -> None:
     )
     revoke.add_argument("name", metavar="NAME")
     audit = _add(
-        acts, "audit", "show who did what", show_audit, "audit --count 50", json="print JSON lines"
+        acts,
+        "audit",
+        "show who did what",
+        show_audit,
+        "audit --count 50",
+        json_help="print JSON lines",
     )
     audit.add_argument("--count", type=int, default=20, metavar="N", help="the last N (20)")
 
 
 def _add(
-    acts: Any, name: str, summary: str, run: Run | None, *examples: str, json: str = ""
+    acts: Any, name: str, summary: str, run: Run | None, *examples: str, json_help: str = ""
 ) -> argparse.ArgumentParser:
     text = "".join(f"  vla-deploy dashboard {one}\n" for one in examples)
-    return add_command(acts, name, summary, text, run, json)
+    return add_command(acts, name, summary, text, run, json_help)
 
 
 def show_address(arguments: argparse.Namespace) -> int:

@@ -38,7 +38,7 @@ def register(commands: Any) -> None:
         "  vla-deploy doctor --robot butler --profile jetson_orin_nx\n"
         "  vla-deploy doctor --json | jq '.findings[] | select(.level == \"fail\")'\n",
         run,
-        json="print JSON",
+        json_help="print JSON",
     )
     examined.add_argument("--robot", metavar="NAME", help="also check the devices of this robot")
     examined.add_argument(
@@ -49,7 +49,7 @@ def register(commands: Any) -> None:
         "probes",
         "  vla-deploy probes\n  vla-deploy probes --watch 1\n  vla-deploy probes --json\n",
         run_probes,
-        json="print JSON",
+        json_help="print JSON",
     )
     probes.add_argument(
         "--watch",

@@ -39,7 +39,7 @@ def register(commands: Any) -> None:
         dest="act", required=True, metavar="ACT"
     )
     record, show, check, convert = (
-        add_command(acts, name, summary, EXAMPLES, run, json="print JSON")
+        add_command(acts, name, summary, EXAMPLES, run, json_help="print JSON")
         for name, summary, run in (
             ("record", "draw a map while the robot is driven around", run_record),
             ("show", "draw a map in the terminal, or into a PNG", run_show),

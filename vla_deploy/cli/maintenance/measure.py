@@ -46,7 +46,7 @@ _PASSED_ON: Final = ("only", "count", "hours", "seed", "workers", "junit")
 def register(commands: Any) -> None:
     """Add the commands."""
     bench = add_top_command(
-        commands, "bench", _BENCH_EXAMPLES, run_bench, json="print the figures as JSON"
+        commands, "bench", _BENCH_EXAMPLES, run_bench, json_help="print the figures as JSON"
     )
     bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=_listed(BENCHMARKS))
     bench.add_argument(
@@ -55,7 +55,7 @@ def register(commands: Any) -> None:
         help="of dashboard, perception, planner, speech: only this, repeatable",
     )
     validate = add_top_command(
-        commands, "validate", _VALIDATE_EXAMPLES, run_campaign, json="print the report as JSON"
+        commands, "validate", _VALIDATE_EXAMPLES, run_campaign, json_help="print the report as JSON"
     )
     validate.add_argument("campaign", choices=tuple(CAMPAIGNS), help=_listed(CAMPAIGNS))
     validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")

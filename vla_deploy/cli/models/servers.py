@@ -28,7 +28,7 @@ def register(commands: Any) -> None:
         "list the declared servers, and which data may be sent to each",
         "  vla-deploy servers list --json\n",
         list_servers,
-        json="print JSON",
+        json_help="print JSON",
     )
     check = add_command(
         acts,
@@ -36,7 +36,7 @@ def register(commands: Any) -> None:
         "try servers; 1 where one of them fails",
         "  vla-deploy servers check bench --ask --json\n",
         check_servers,
-        json="print JSON",
+        json_help="print JSON",
     )
     check.add_argument("names", nargs="*", metavar="NAME", help="which ones (default: all)")
     check.add_argument(

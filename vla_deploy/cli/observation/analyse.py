@@ -23,7 +23,9 @@ EXAMPLES: Final = """  vla-deploy analyse
 
 def register(commands: Any) -> None:
     """Add the command."""
-    analyse = add_top_command(commands, "analyse", EXAMPLES, run, json="print the analysis as JSON")
+    analyse = add_top_command(
+        commands, "analyse", EXAMPLES, run, json_help="print the analysis as JSON"
+    )
     analyse.add_argument(
         "--goal", default="", metavar="WORDS", help="judge whether this can be done"
     )

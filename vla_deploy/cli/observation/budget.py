@@ -28,7 +28,7 @@ def register(commands: Any) -> None:
         "budget",
         "  vla-deploy budget\n  vla-deploy budget --watch\n  vla-deploy budget --json\n",
         run,
-        json="print everything as JSON",
+        json_help="print everything as JSON",
     )
     budget.add_argument("--watch", action="store_true", help="go on until Ctrl-C")
 

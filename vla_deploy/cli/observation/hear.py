@@ -41,7 +41,7 @@ def register(commands: Any) -> None:
         "  vla-deploy hear --microphone --seconds 20\n"
         "  vla-deploy hear command.wav --model whisper-small.en\n",
         run,
-        json="print JSON, live a line for each phrase",
+        json_help="print JSON, live a line for each phrase",
     )
     source = hear.add_mutually_exclusive_group(required=True)
     source.add_argument("file", type=Path, nargs="?", metavar="FILE.wav", help="a recording")

@@ -43,13 +43,15 @@ _POLL_NS = NS_PER_S // 5
 def register(commands: Any) -> None:
     """Add the commands."""
     logs = add_top_command(
-        commands, "logs", LOGS_EXAMPLES, run_logs, json="print one JSON object per line"
+        commands, "logs", LOGS_EXAMPLES, run_logs, json_help="print one JSON object per line"
     )
     logs.add_argument("process", nargs="?", help="one process of the table, e.g. control")
     logs.add_argument("--follow", action="store_true", help="go on until Ctrl-C or the run's end")
     logs.add_argument("--level", choices=LEVELS, default="info", help="the least level to show")
     logs.add_argument("--last-run", action="store_true", help="the run that has ended last")
-    crashes = add_top_command(commands, "crashes", CRASHES_EXAMPLES, run_crashes, json="print JSON")
+    crashes = add_top_command(
+        commands, "crashes", CRASHES_EXAMPLES, run_crashes, json_help="print JSON"
+    )
     crashes.add_argument("act", choices=("list", "show"), help="all in a line each, or one whole")
     crashes.add_argument("crash", nargs="?", help="its name in the list (default: the newest)")
 

@@ -35,7 +35,9 @@ exit code 3: the robot would ask back
 
 def register(commands: Any) -> None:
     """Add the command."""
-    plan = add_top_command(commands, "plan", EXAMPLES, run, json="print plan and attempts as JSON")
+    plan = add_top_command(
+        commands, "plan", EXAMPLES, run, json_help="print plan and attempts as JSON"
+    )
     plan.add_argument("text", help="the command in words")
     plan.add_argument(
         "--scene",

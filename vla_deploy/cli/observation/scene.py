@@ -24,7 +24,7 @@ EXAMPLES = """  vla-deploy scene
 
 def register(commands: Any) -> None:
     """Add the command."""
-    scene = add_top_command(commands, "scene", EXAMPLES, run, json="print everything as JSON")
+    scene = add_top_command(commands, "scene", EXAMPLES, run, json_help="print everything as JSON")
     scene.add_argument("--of", metavar="WORDS", default="", help='such as "small cup", "cup_1"')
     scene.add_argument("--near", metavar="WORDS", help="only what is near this thing or furniture")
     scene.add_argument("--on", metavar="WORDS", help="only what is on this thing or furniture")

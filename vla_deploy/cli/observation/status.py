@@ -22,7 +22,7 @@ def register(commands: Any) -> None:
         "status",
         "  vla-deploy status\n  vla-deploy status --json\n",
         run,
-        json="print everything as JSON",
+        json_help="print everything as JSON",
     )
 
 

@@ -47,7 +47,7 @@ _EXAMPLES: Final = "  vla-deploy top\n  vla-deploy top --once\n  vla-deploy top 
 def register(commands: Any) -> None:
     """Add the command."""
     top = add_top_command(
-        commands, "top", _EXAMPLES, run, json="print it as JSON, one object a line"
+        commands, "top", _EXAMPLES, run, json_help="print it as JSON, one object a line"
     )
     top.add_argument("--once", action="store_true", help="show it once, and end")
     top.add_argument(

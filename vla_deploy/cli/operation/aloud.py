@@ -18,7 +18,7 @@ _DOUBTED: Final = "doubted"
 _HEARD_WITHIN_S: Final = 5.0
 _LISTENS_WITHIN_S: Final = 10.0
 _STATUS_AGE_S: Final = 2.0
-_MAX_REPETITIONS: Final = 3
+_MAX_TIMES_SAID: Final = 3
 _MOVING_M_S: Final = 0.01
 _MOVING_RAD_S: Final = 0.06  # a servo's speed has steps of 0.024
 Event = dict[str, Any]
@@ -200,7 +200,7 @@ class SpokenCommand:
 
     @property
     def _may_repeat(self) -> bool:
-        return self._times_said < _MAX_REPETITIONS
+        return self._times_said < _MAX_TIMES_SAID
 
     def _say(self, text: str, snr_db: float | None) -> Hearing:
         """Speak, once the robot has finished speaking."""

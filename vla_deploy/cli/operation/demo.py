@@ -47,7 +47,9 @@ ARM_TIMEOUT_S = 20.0
 
 def register(commands: Any) -> None:
     """Add the command."""
-    demo = add_top_command(commands, "demo", EXAMPLES, run, json="print only the outcome, as JSON")
+    demo = add_top_command(
+        commands, "demo", EXAMPLES, run, json_help="print only the outcome, as JSON"
+    )
     add_robot_arguments(demo)
     add_twin_arguments(
         demo,

@@ -20,7 +20,7 @@ def register(commands: Any) -> None:
     """Add the commands."""
     for act in REACHED:
         command = add_top_command(
-            commands, act, f"  vla-deploy {act}\n", run, json="print control's status as JSON"
+            commands, act, f"  vla-deploy {act}\n", run, json_help="print control's status as JSON"
         )
         command.add_argument("--reason", default="", help="why, for the log")
         command.set_defaults(act=act)

@@ -34,7 +34,7 @@ _SIGNS: Final[Mapping[str, str]] = {
 
 def register(commands: Any) -> None:
     """Add the command."""
-    say = add_top_command(commands, "say", EXAMPLES, run, json="print the outcome as JSON")
+    say = add_top_command(commands, "say", EXAMPLES, run, json_help="print the outcome as JSON")
     what = say.add_mutually_exclusive_group(required=True)
     what.add_argument("text", nargs="?", help="the command in words")
     what.add_argument("--plan", type=Path, help="a plan as JSON, in any of the known dialects")

@@ -32,7 +32,7 @@ def register(commands: Any) -> None:
     flight = add_top_command(commands, "flight", EXAMPLES)
     acts = flight.add_subparsers(dest="act", required=True, metavar="ACT")
     listing, show, judge, save = (
-        add_command(acts, name, summary, EXAMPLES, run, json="print it as JSON")
+        add_command(acts, name, summary, EXAMPLES, run, json_help="print it as JSON")
         for name, summary, run in (
             ("list", "list the flights, the oldest first", run_list),
             ("show", "show what happened in a flight, line by line", run_show),

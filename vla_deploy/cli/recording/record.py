@@ -51,7 +51,7 @@ def register(commands: Any) -> None:
     ):
         example = f"  vla-deploy record {name}"
         examples = EXAMPLES if example in EXAMPLES else f"{example}\n"
-        added[name] = add_command(acts, name, summary, examples, run, json="print it as JSON")
+        added[name] = add_command(acts, name, summary, examples, run, json_help="print it as JSON")
     for name in ("start", "once"):
         add_topic_arguments(added[name], "record")
         added[name].add_argument("--duration", type=float, metavar="S", help="end after so long")

@@ -31,7 +31,7 @@ EXAMPLES = """  vla-deploy replay latest                 the newest recording, w
 def register(commands: Any) -> None:
     """Add the command."""
     replay = add_top_command(
-        commands, "replay", EXAMPLES, run, json="print the state of the replay as JSON"
+        commands, "replay", EXAMPLES, run, json_help="print the state of the replay as JSON"
     )
     replay.add_argument(
         "file", nargs="?", help="a file, the number of a recording, or: latest; none: the one shown"
