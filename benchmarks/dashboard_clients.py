@@ -24,7 +24,7 @@ import psutil
 from benchmarks.core import REALTIME_PRIORITY, realtime
 from benchmarks.live_robot import arm, live_robot
 from drivers.clock import NS_PER_S
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 
 CLIENTS: Final = 50
 FROZEN: Final = 1
@@ -63,7 +63,7 @@ def measure(seconds: float = 60.0) -> dict[str, Any]:
         return {"realtime": permitted, **_measure(session, seconds / _ROUNDS)}
 
 
-def _measure(session: Session, seconds: float) -> dict[str, Any]:
+def _measure(session: RobotSession, seconds: float) -> dict[str, Any]:
     process, address = _dashboard(session)
     spans: dict[str, list[dict[str, float]]] = {view: [] for view in VIEWS}
     for _ in range(_ROUNDS):
@@ -81,7 +81,7 @@ def _measure(session: Session, seconds: float) -> dict[str, Any]:
     return report
 
 
-def _span(session: Session, process: psutil.Process, seconds: float) -> dict[str, float]:
+def _span(session: RobotSession, process: psutil.Process, seconds: float) -> dict[str, float]:
     before, cpu = _ticks(session), process.cpu_times()
     began_ns = session.clock.now_ns()
     session.pause(seconds)
@@ -96,12 +96,12 @@ def _span(session: Session, process: psutil.Process, seconds: float) -> dict[str
     }
 
 
-def _ticks(session: Session) -> tuple[int, int]:
+def _ticks(session: RobotSession) -> tuple[int, int]:
     status = session.document("control_status") or {}
     return int(status["tick"]), int(status["late_ticks"])
 
 
-def _dashboard(session: Session) -> tuple[psutil.Process, tuple[str, str]]:
+def _dashboard(session: RobotSession) -> tuple[psutil.Process, tuple[str, str]]:
     deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
     while (sample := session.fresh("dashboard_status", age_limit_s=5.0)) is None:
         if session.clock.now_ns() > deadline_ns:

@@ -25,7 +25,7 @@ from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
 from benchmarks.live_robot import NotReached, arm, await_change, live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 
 CLIENTS: Final = 20
 BOTH: Final = ("page", "door")
@@ -80,7 +80,7 @@ def _figures(way: str, times_ms: list[float]) -> dict[str, Any]:
 class _Presser:
     """Arm, press by some doors, and see when the wire tells."""
 
-    def __init__(self, session: Session, draw: random.Random) -> None:
+    def __init__(self, session: RobotSession, draw: random.Random) -> None:
         self.session = session
         self._draw = draw
         self._witness = StopWitness(session.run_dir)
@@ -182,7 +182,7 @@ def _after_kills(presser: _Presser) -> list[float]:
     return times_ms
 
 
-def _pid(session: Session) -> int:
+def _pid(session: RobotSession) -> int:
     """Return the running dashboard's pid."""
     deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
     while session.clock.now_ns() < deadline_ns:

@@ -29,7 +29,7 @@ from platforms import load_profile
 from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
 from sim_twin.harness.stack import LockstepControl
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 
@@ -70,7 +70,7 @@ def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
     }
 
 
-def _ask_again_and_again(session: Session, requests: int, draw: random.Random) -> list[float]:
+def _ask_again_and_again(session: RobotSession, requests: int, draw: random.Random) -> list[float]:
     """Return, in control ticks, how long each request took to the wire.
 
     The busy machine itself may stop the robot before it is asked to: such a request is left out.

@@ -7,7 +7,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 
 PROFILE_FILE: Final = "bench.toml"
 _ARM_S: Final = 30.0
@@ -21,7 +21,9 @@ class NotReached(Exception):
 
 
 @contextmanager
-def live_stack(folder: Path, profile: str, *options: str) -> Iterator[tuple[ProcessStack, Session]]:
+def live_stack(
+    folder: Path, profile: str, *options: str
+) -> Iterator[tuple[ProcessStack, RobotSession]]:
     """Give the processes of a robot by the text of a profile, which lies in `PROFILE_FILE`.
 
     `options` are further words for `vla-deploy run`.
@@ -34,14 +36,14 @@ def live_stack(folder: Path, profile: str, *options: str) -> Iterator[tuple[Proc
     stack = ProcessStack(folder / "run", *chosen)
     try:
         stack.wait_until_ready()
-        with closing(Session(stack.run_dir)) as session:
+        with closing(RobotSession(stack.run_dir)) as session:
             yield stack, session
     finally:
         stack.close()
 
 
 @contextmanager
-def live_robot(folder: Path, realtime_priority: int) -> Iterator[Session]:
+def live_robot(folder: Path, realtime_priority: int) -> Iterator[RobotSession]:
     """Give a session with a desktop's robot whose control has this priority; 0 is none.
 
     Raises:
@@ -52,7 +54,7 @@ def live_robot(folder: Path, realtime_priority: int) -> Iterator[Session]:
         yield session
 
 
-def arm(session: Session) -> None:
+def arm(session: RobotSession) -> None:
     """Lead control to where it is armed, from wherever it is: a busy machine may stop the robot.
 
     Raises:
@@ -67,7 +69,7 @@ def arm(session: Session) -> None:
         await_change(session, state)
 
 
-def await_change(session: Session, state: str) -> None:
+def await_change(session: RobotSession, state: str) -> None:
     """Return once control is not in this state any more, or after half a second."""
     for _ in range(_LOOKS_PER_TRY):
         if _state(session) != state:
@@ -75,6 +77,6 @@ def await_change(session: Session, state: str) -> None:
         session.pause()
 
 
-def _state(session: Session) -> str:
+def _state(session: RobotSession) -> str:
     status = session.document("control_status", age_limit_s=0.5)
     return "silent" if status is None else str(status["state"])

@@ -22,7 +22,7 @@ from benchmarks.command import parser, show
 from benchmarks.live_robot import PROFILE_FILE, arm, live_stack
 from drivers.clock import NS_PER_S
 from platforms import Profile, load_profile
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 
 PROFILE: Final = "jetson_orin_nano"
 PROCESS: Final = "perception"
@@ -53,7 +53,7 @@ class _Seen:
     sight: dict[str, Any] = field(default_factory=dict)
     image: dict[str, Any] = field(default_factory=dict)
 
-    def look(self, session: Session) -> None:
+    def look(self, session: RobotSession) -> None:
         obstacles, sample = session.fresh("near_obstacles"), session.fresh("scene")
         if obstacles is not None:
             self.obstacles_ns.add(obstacles.stamp_ns)
@@ -83,7 +83,7 @@ def measure(seconds: float = 40.0, profile: str = PROFILE) -> dict[str, Any]:
             return _report(*_watch(session, seconds), used, profile)
 
 
-def _watch(session: Session, seconds: float) -> tuple[_Seen, float, float]:
+def _watch(session: RobotSession, seconds: float) -> tuple[_Seen, float, float]:
     """Let the robot work; return what was seen, and CPU and wall seconds of the span."""
     events = session.command(text=_COMMAND)
     next(events, None)
@@ -121,7 +121,7 @@ def _report(
     }
 
 
-def _row(session: Session) -> dict[str, Any] | None:
+def _row(session: RobotSession) -> dict[str, Any] | None:
     table = session.document("process_table") or {"processes": []}
     return next((row for row in table["processes"] if row["name"] == PROCESS), None)
 

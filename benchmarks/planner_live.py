@@ -23,7 +23,7 @@ from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import RingReader, SharedSpace
 
 PROFILE: Final = "jetson_orin_nano"
@@ -43,7 +43,7 @@ _LOOK_S: Final = 0.004
 class _Robot:
     """Watch a running robot from outside: its plans, and whether it moves."""
 
-    def __init__(self, stack: ProcessStack, session: Session, space: SharedSpace) -> None:
+    def __init__(self, stack: ProcessStack, session: RobotSession, space: SharedSpace) -> None:
         self.stack = stack
         self.session = session
         self._plans: RingReader = space.ring_reader("plan", from_start=False)

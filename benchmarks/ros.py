@@ -25,7 +25,7 @@ from benchmarks.live_robot import arm, live_stack
 from benchmarks.percentiles import percentile
 from platforms import load_profile
 from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import RosSettings
@@ -65,7 +65,7 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def _with_gateway(
-    stack: ProcessStack, session: Session, folder: Path, seconds: float
+    stack: ProcessStack, session: RobotSession, folder: Path, seconds: float
 ) -> dict[str, Any]:
     python, variables = _environment(folder)
     session.pause(_SETTLE_S)
@@ -97,7 +97,7 @@ def _with_gateway(
     }
 
 
-def _late_ratio(session: Session, seconds: float, wait: Any) -> float:
+def _late_ratio(session: RobotSession, seconds: float, wait: Any) -> float:
     before = session.document("control_status") or {}
     wait()
     after = session.document("control_status") or {}

@@ -19,7 +19,7 @@ from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
 from benchmarks.live_robot import arm, live_robot
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.control.reporting.telemetry import TickClock
 
 _PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
@@ -56,7 +56,7 @@ def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str
     }
 
 
-def _late_ratios(session: Session, seconds: float) -> tuple[float, float]:
+def _late_ratios(session: RobotSession, seconds: float) -> tuple[float, float]:
     """Return the shares of control's late ticks and of the bare loop's."""
     session.pause(_SETTLE_S)
     before = session.document("control_status") or {}

@@ -15,8 +15,7 @@ from sim_twin.campaigns.pressing import pressure
 from sim_twin.campaigns.report import CampaignReport, make_room
 from sim_twin.campaigns.selection import NothingChosen
 from sim_twin.campaigns.switching import switches
-from vla_deploy.cli.example import OneLineParser
-from vla_deploy.cli.validate import duration_h, whole_number
+from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_number
 
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
@@ -90,10 +89,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
-    parser.add_argument("--count", type=whole_number, help="how many injections or switches")
-    parser.add_argument("--hours", type=duration_h, default=1.0, help="how long to soak")
+    parser.add_argument("--count", type=whole_number(), help="how many injections or switches")
+    parser.add_argument(
+        "--hours", type=number_above_zero("hours"), default=1.0, help="how long to soak"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=whole_number, default=2, help="how many cases at a time")
+    parser.add_argument(
+        "--workers", type=whole_number(), default=2, help="how many cases at a time"
+    )
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     return parser

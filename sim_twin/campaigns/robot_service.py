@@ -12,7 +12,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.campaigns.strays import MARK, strays
 from sim_twin.harness.service_runner import RunnerState, ServiceRunner
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import running
@@ -40,7 +40,7 @@ class RobotService:
         base.mkdir(parents=True, exist_ok=True)
         self._base = base
         self._clock = clock
-        self._session: Session | None = None
+        self._session: RobotSession | None = None
         words = ("--runtime-base", str(base), "run", "--devices-dir", str(devices_dir))
         self._command = [*_COMMAND, *words]
         self._runner = self._started()
@@ -49,7 +49,7 @@ class RobotService:
         """Start the service if it has ended, wait for every process, then reset and arm.
 
         Raises:
-            NotReady: it does not come up, or control does not arm.
+            ServiceNotReady: it does not come up, or control does not arm.
         """
         if self.has_ended():
             self._runner.stop()  # what it holds of an ended service goes too
@@ -96,7 +96,7 @@ class RobotService:
         """Send a signal to one process, and return who got it.
 
         Raises:
-            NotReady: it does not run.
+            ServiceNotReady: it does not run.
         """
         pid = self.pid_of(process)
         if not pid:  # kill(2) would take 0 for everyone in our own process group
@@ -182,7 +182,7 @@ class RobotService:
         except (ServiceNotReady, IpcError, OSError):
             return None  # the run is about to come or to go
 
-    def _attached(self) -> Session:
+    def _attached(self) -> RobotSession:
         """Return a session with the run that goes on now."""
         owner = running(self._base)
         if owner is None:
@@ -191,7 +191,7 @@ class RobotService:
         run_dir = Path(owner.run_dir)
         if self._session is None or self._session.run_dir != run_dir:
             self._detach()
-            self._session = Session(run_dir, self._clock)
+            self._session = RobotSession(run_dir, self._clock)
         return self._session
 
     def _detach(self) -> None:

@@ -14,7 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.referee import ask, told_hazards
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import running
@@ -61,7 +61,7 @@ class WorkingRobot:
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,
             )
-        self._session: Session | None = None
+        self._session: RobotSession | None = None
         self._motions = itertools.count(_FIRST_MOTION)
         try:
             self._come_up()
@@ -185,7 +185,7 @@ class WorkingRobot:
     # --- within -------------------------------------------------------------------------------
 
     @property
-    def _attached(self) -> Session:
+    def _attached(self) -> RobotSession:
         if self._session is None:
             raise RobotFailed("the run is over")
         return self._session
@@ -202,7 +202,7 @@ class WorkingRobot:
         owner = running(self.base)
         if owner is None or not (Path(owner.run_dir) / "ipc").exists():
             return False
-        self._session = Session(Path(owner.run_dir), self.clock)
+        self._session = RobotSession(Path(owner.run_dir), self.clock)
         self._space = SharedSpace(Path(owner.run_dir) / "ipc", self.clock)
         self._goals = self._space.ring_writer("motion_command")
         self._requests = self._space.ring_writer("profile_request")

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.cli.twin_link import ask_twin
+from vla_deploy.cli.twin import ask_twin
 
 
 class RemoteFault:

@@ -20,7 +20,7 @@ from sim_twin.faults.remote import RemoteFaults
 from sim_twin.physics.truth import fastest_joint
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.supervisor.runs.orphans import end_leftovers, run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
@@ -49,7 +49,7 @@ class ProcessStack:
         self.run_dir = base
         self.clock: Clock = MonotonicClock()
         """The clock of the run, once it is ready."""
-        self._session: Session | None = None
+        self._session: RobotSession | None = None
         self._begun: list[subprocess.Popen[str]] = []
         self.process = subprocess.Popen(
             self._words("run", "--twin", *options),
@@ -134,10 +134,10 @@ class ProcessStack:
         return self.session.document(topic, age_limit_s) or {}
 
     @property
-    def session(self) -> Session:
+    def session(self) -> RobotSession:
         """Return the way to the run's shared memory."""
         if self._session is None:
-            self._session = Session(self.run_dir, self.clock)
+            self._session = RobotSession(self.run_dir, self.clock)
         return self._session
 
     def speak(self, text: str, voice: str = "en-gb", snr_db: float | None = None) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from sim_twin.harness.stack import LockstepStack
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import Feasible
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.cli.analyse import ask
-from vla_deploy.cli.session import Session
+from vla_deploy.cli.observation.analyse import ask
+from vla_deploy.cli.session import RobotSession
 
 pytestmark = pytest.mark.gl
 
@@ -19,7 +19,7 @@ def test_what_was_found_can_be_taken_and_what_was_not_is_unknown(
     stack: LockstepStack, tmp_path: Path
 ) -> None:
     assert stack.say("find the red cup")["success"]
-    session = Session(tmp_path / "run0", stack.lockstep.clock)
+    session = RobotSession(tmp_path / "run0", stack.lockstep.clock)
     measuring = GeometricAnalyser(Abilities.of(stack.robot))
     analysis = measuring.analyse(ask(session, "pick up the red cup"))
     cup = next(one for one in analysis.objects if one.id == "cup_1")

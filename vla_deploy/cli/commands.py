@@ -1,73 +1,223 @@
-"""List the commands: which module has each, and what it is for.
+"""Declare the commands: their table, and what their parsers are built of.
 
 A module is loaded when one of its commands is used: all of them together take a second to load.
 """
 
-from collections.abc import Mapping
+import argparse
+import json
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, NoReturn
+
+Run = Callable[[argparse.Namespace], int]
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandEntry:
     """Name the module that registers a command, and say what the command is for."""
 
     module: str
     summary: str
 
 
-COMMANDS: Final[Mapping[str, Command]] = {
-    "run": Command("run", "run the robot until Ctrl-C"),
-    "demo": Command("demo", "do the main job on the twin"),
-    "say": Command("say", "give the robot a command and follow it"),
-    "hear": Command("hear", "tell what is understood of a recording, or of what you say now"),
-    "plan": Command("plan", "tell what would be done for a command, and who planned it"),
-    "status": Command("status", "tell what runs and how the robot is"),
-    "dashboard": Command("dashboard", "tell where the robot's page is, and who may use it"),
-    "top": Command("top", "show processes, budgets, control and topics on one screen, for ssh"),
-    "metrics": Command(
-        "metrics", "list what is measured; print alert rules or a Grafana dashboard"
+COMMANDS: Final[Mapping[str, CommandEntry]] = {
+    "run": CommandEntry("operation.run", "run the robot until Ctrl-C"),
+    "demo": CommandEntry("operation.demo", "do the main job on the twin"),
+    "say": CommandEntry("operation.say", "give the robot a command and follow it"),
+    "hear": CommandEntry(
+        "observation.hear", "show what is understood of a recording, or of live speech"
     ),
-    "scene": Command("scene", "tell what the robot knows of the things around it"),
-    "memory": Command("memory", "tell what the robot remembers, and have it forget"),
-    "budget": Command(
-        "budget", "tell what the robot uses of its budgets, and what is done about an excess"
+    "plan": CommandEntry(
+        "observation.plan", "show the plan for a command, and which back end made it"
     ),
-    "logs": Command("logs", "show what the processes log"),
-    "crashes": Command("crashes", "list and show crash reports"),
-    "estop": Command("operate", "stop the robot now and latch the stop (a software stop)"),
-    "reset": Command("operate", "release a latched stop; nothing moves, arm the robot next"),
-    "arm": Command(
-        "operate", "put power on the joints where they are, so that commands may move them"
+    "status": CommandEntry("observation.status", "show what runs and the state of the robot"),
+    "dashboard": CommandEntry(
+        "maintenance.dashboard", "show where the robot's page is, and who may use it"
     ),
-    "disarm": Command("operate", "take power off the joints"),
-    "stop": Command("operate", "stop what the robot does; it stays ready"),
-    "shutdown": Command(
-        "operate", "end the run in order, as Ctrl-C does; power goes off, so support the arms"
+    "top": CommandEntry(
+        "observation.top", "show processes, budgets, control and topics on one screen, for ssh"
     ),
-    "joint": Command("joint", "show where the joints are, and move one of them"),
-    "profile": Command("profile", "choose how the stack uses this computer"),
-    "robot": Command("robot", "write the robot's description as URDF, for ROS"),
-    "servo": Command("servo", "find, look at, set up and calibrate servos"),
-    "camera": Command("camera", "calibrate the camera: its lens, and how it sits on the head"),
-    "can": Command("can", "find CAN nodes and watch the traffic"),
-    "fault": Command("fault", "make the twin's devices fail"),
-    "flight": Command("flight", "look into what the flight recorder saved"),
-    "record": Command("record", "record what the robot does: rolling files, or one of your own"),
-    "replay": Command("replay", "show a recording or a flight as if it were happening; no robot"),
-    "foxglove": Command("foxglove", "let viewers such as Foxglove watch the run live, read-only"),
-    "rerun": Command("rerun", "look at a recording, a flight or the run live in Rerun"),
-    "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
-    "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
-    "map": Command("map", "record, look at, check and convert maps in the ROS format"),
-    "models": Command("models", "add, fetch, list, measure, quantise and verify models"),
-    "analyse": Command("analyse", "tell what the scene holds, and whether a goal can be reached"),
-    "servers": Command("servers", "see and try the model servers that the robot may ask"),
-    "doctor": Command("doctor", "examine this computer, and say how to mend what is wrong"),
-    "probes": Command("doctor", "print load, memory, power, heat and throttling of this computer"),
-    "bench": Command("bench", "measure beside a peer or a limit, in the same run"),
-    "validate": Command("validate", "run a campaign against the twin"),
-    "install": Command("install", "install the robot as a service of this computer"),
-    "uninstall": Command("install", "remove exactly what install wrote"),
-    "release": Command("release", "add releases, switch between them, go back"),
+    "metrics": CommandEntry(
+        "observation.metrics", "list what is measured; print alert rules or a Grafana dashboard"
+    ),
+    "scene": CommandEntry(
+        "observation.scene", "show what the robot knows about the things around it"
+    ),
+    "memory": CommandEntry("observation.memory", "show what the robot remembers, and delete it"),
+    "budget": CommandEntry(
+        "observation.budget",
+        "show what the robot uses of its budgets, and what is done about an excess",
+    ),
+    "logs": CommandEntry("observation.logs", "show what the processes log"),
+    "crashes": CommandEntry("observation.logs", "list and show crash reports"),
+    "estop": CommandEntry(
+        "operation.operate", "stop the robot now and latch the stop (a software stop)"
+    ),
+    "reset": CommandEntry(
+        "operation.operate", "release a latched stop; nothing moves, arm the robot next"
+    ),
+    "arm": CommandEntry(
+        "operation.operate",
+        "put power on the joints where they are, so that commands may move them",
+    ),
+    "disarm": CommandEntry("operation.operate", "take power off the joints"),
+    "stop": CommandEntry("operation.operate", "stop what the robot does; it stays ready"),
+    "shutdown": CommandEntry(
+        "operation.operate",
+        "end the run in order, as Ctrl-C does; power goes off, so support the arms",
+    ),
+    "joint": CommandEntry("operation.joint", "show where the joints are, and move one of them"),
+    "profile": CommandEntry("maintenance.profile", "choose how the stack uses this computer"),
+    "robot": CommandEntry("devices.robot", "write the robot's description as URDF, for ROS"),
+    "servo": CommandEntry("devices.servo", "find, look at, set up and calibrate servos"),
+    "camera": CommandEntry(
+        "devices.camera", "calibrate the camera: its lens, and how it sits on the head"
+    ),
+    "can": CommandEntry("devices.can", "find CAN nodes and watch the traffic"),
+    "fault": CommandEntry("devices.fault", "make the twin's devices fail"),
+    "flight": CommandEntry("recording.flight", "show what the flight recorder saved"),
+    "record": CommandEntry(
+        "recording.record", "record what the robot does: rolling files, or one of your own"
+    ),
+    "replay": CommandEntry(
+        "recording.replay", "replay a recording or a flight on the dashboard; no robot"
+    ),
+    "foxglove": CommandEntry(
+        "recording.viewers", "serve the run live to viewers such as Foxglove, read-only"
+    ),
+    "rerun": CommandEntry(
+        "recording.viewers", "show a recording, a flight or the live run in Rerun"
+    ),
+    "check": CommandEntry(
+        "maintenance.check", "check a robot, a profile or a plan, and report all faults"
+    ),
+    "schema": CommandEntry(
+        "maintenance.check", "print the JSON Schema of a plan or of an analysis"
+    ),
+    "map": CommandEntry(
+        "maintenance.map", "record, look at, check and convert maps in the ROS format"
+    ),
+    "models": CommandEntry(
+        "models.commands", "add, fetch, list, measure, quantise and verify models"
+    ),
+    "analyse": CommandEntry(
+        "observation.analyse", "analyse the scene, and whether a goal can be reached"
+    ),
+    "servers": CommandEntry(
+        "models.servers", "see and try the model servers that the robot may ask"
+    ),
+    "doctor": CommandEntry(
+        "maintenance.doctor", "examine this computer, and say how to repair what is wrong"
+    ),
+    "probes": CommandEntry(
+        "maintenance.doctor", "print load, memory, power, heat and throttling of this computer"
+    ),
+    "bench": CommandEntry(
+        "maintenance.measure", "measure against a peer or a limit, in the same run"
+    ),
+    "validate": CommandEntry("maintenance.measure", "run a campaign against the twin"),
+    "install": CommandEntry(
+        "maintenance.install", "install the robot as a service of this computer"
+    ),
+    "uninstall": CommandEntry("maintenance.install", "remove exactly what install wrote"),
+    "release": CommandEntry("maintenance.release", "add releases, switch between them, go back"),
 }
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Report a bad argument in one line; the parsers of subcommands do the same."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with code 2."""
+        self.exit(2, f"{self.prog}: {message}; see: {self.prog} --help\n")
+
+
+def add_command(
+    commands: Any,
+    name: str,
+    summary: str,
+    examples: str,
+    run: Run | None = None,
+    json_help: str = "",
+) -> argparse.ArgumentParser:
+    """Add a command that `run` carries out and whose `--help` ends with examples.
+
+    `json_help` is the help text of its option `--json`; without one it has no such option.
+    """
+    added: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog=f"examples:\n{examples}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if json_help:
+        added.add_argument("--json", action="store_true", help=json_help)
+    if run is not None:
+        added.set_defaults(run=run)
+    return added
+
+
+def add_top_command(
+    commands: Any, name: str, examples: str, run: Run | None = None, json_help: str = ""
+) -> argparse.ArgumentParser:
+    """Add a command of the table `COMMANDS`, which has its summary."""
+    return add_command(commands, name, COMMANDS[name].summary, examples, run, json_help)
+
+
+def number_within(low: float, high: float, expected: str) -> Callable[[str], float]:
+    """Return an argparse `type` for finite numbers from `low` to `high`, both included.
+
+    `expected` names the range in the error message.
+    """
+    return _number_type(lambda value: low <= value <= high, expected)
+
+
+def number_above_zero(what: str) -> Callable[[str], float]:
+    """Return an argparse `type` for finite numbers above 0; `what` names the quantity."""
+    return _number_type(lambda value: 0.0 < value < math.inf, f"{what} above 0")
+
+
+def _number_type(is_valid: Callable[[float], bool], expected: str) -> Callable[[str], float]:
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not is_valid(value):
+            raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+        return value
+
+    return parse
+
+
+def whole_number(low: int = 1) -> Callable[[str], int]:
+    """Return an argparse `type` for whole numbers from `low`."""
+
+    def parse(text: str) -> int:
+        if not text.isdecimal() or int(text) < low:
+            raise argparse.ArgumentTypeError(f"expected a whole number from {low}, got {text!r}")
+        return int(text)
+
+    return parse
+
+
+def emit(
+    arguments: argparse.Namespace,
+    document: object,
+    text: str | Callable[[], str],
+    indent: int | None = 2,
+) -> int:
+    """Print a result, as JSON where `--json` is given; return exit code 0.
+
+    A text that is composed from another process's document is passed as a function: whatever is
+    wrong with it, the document itself can be printed.
+    """
+    if arguments.json:
+        print(json.dumps(document, indent=indent))
+        return 0
+    text = text if isinstance(text, str) else text()
+    if text:
+        print(text)
+    return 0

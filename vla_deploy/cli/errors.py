@@ -1,4 +1,4 @@
-"""Map what may go wrong to what the shell is told.
+"""Map errors to exit codes.
 
 CommandFailed   the robot tried and did not succeed: exit code 1
 UsageError      the request cannot be carried out as it is: exit code 2
@@ -17,7 +17,7 @@ class CommandFailed(Exception):
     """Say in one line why the robot did not succeed."""
 
 
-# Everything a person can mend: told in one line, exit code 2, no traceback.
+# What a person can mend: reported in one line without a traceback, exit code 2.
 USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.cli.errors": "UsageError",
     "drivers.errors": "DriverError",
@@ -41,7 +41,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
 
 
 def user_errors() -> tuple[type[Exception], ...]:
-    """Return those of them that can have been raised: the others' modules are not even loaded."""
+    """Return those user errors that can have been raised: those whose modules are loaded."""
     return tuple(
         getattr(sys.modules[module], name)
         for module, name in USER_ERRORS.items()

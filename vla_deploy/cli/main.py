@@ -8,12 +8,11 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from vla_deploy.cli.commands import COMMANDS
+from vla_deploy.cli.commands import COMMANDS, OneLineParser
 from vla_deploy.cli.errors import CommandFailed, user_errors
-from vla_deploy.cli.example import OneLineParser
 
-EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
-# The service is started anew after 1, never after 2; a disk that was full may have room again.
+EXIT_BROKEN_PIPE = 141  # a shell's exit code for SIGPIPE
+# systemd restarts the service after 1, never after 2; a full disk may have room again later.
 EXIT_OF_OS_ERROR = {"run": 1}
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin
@@ -23,7 +22,7 @@ EPILOG = """examples:
 
 
 def parser(words: Iterable[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
-    """Return the parser of the commands among `words`; of the others it knows what they are for."""
+    """Return a parser: with arguments for the commands in `words`, with summaries for others."""
     top = OneLineParser(
         prog="vla-deploy",
         description="Run a language-commanded robot, or its digital twin.",
@@ -63,16 +62,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # whoever reads, such as head, has seen enough
+    except BrokenPipeError:  # the reader, such as head, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_BROKEN_PIPE
     except OSError as error:
-        print(f"vla-deploy: {_told(error)}", file=sys.stderr)
+        print(f"vla-deploy: {_reason(error)}", file=sys.stderr)
         return EXIT_OF_OS_ERROR.get(arguments.command, 2)
 
 
-def _told(error: OSError) -> str:
-    """Return which file could not be used and why, in one line."""
+def _reason(error: OSError) -> str:
+    """Return in one line which file could not be used, and why."""
     if error.filename is None or not error.strerror:
         return str(error) or type(error).__name__
     return f"{os.fsdecode(error.filename)}: {error.strerror}"

@@ -1,37 +1,56 @@
-"""Attach to the run that is going on: its shared memory, its commands, its events."""
+"""Attach to the run on this machine: its shared memory, its commands, its events."""
 
+import argparse
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import RingReader
 from vla_deploy.supervisor.runs.runtime import default_base, running
 
-POLL_NS = NS_PER_S // 50
+if TYPE_CHECKING:  # loads NumPy: an emergency stop must not wait for it
+    from vla_deploy.robots import RobotDescription
+
+POLL_S: Final = 0.02
+FRESH_S: Final = 5.0
+T = TypeVar("T")
 
 
-class Session(RobotLink):
-    """Talk to a running robot through its topics, and wait for what it says."""
+class RobotSession(RobotLink):
+    """Talk to a running robot through its topics, and wait for its answers."""
 
     def __init__(self, run_dir: Path, clock: Clock | None = None) -> None:
         super().__init__(run_dir, clock, source="cli")
 
-    def pause(self, duration_s: float = POLL_NS / NS_PER_S) -> None:
-        """Wait a moment; a poll's worth unless told otherwise."""
+    def pause(self, duration_s: float = POLL_S) -> None:
+        """Wait for a moment."""
         self.clock.sleep_until(self.clock.now_ns() + round(duration_s * NS_PER_S))
+
+    def wait_for(
+        self, look: Callable[[], T | None], timeout_s: float, poll_s: float = POLL_S
+    ) -> T | None:
+        """Call `look` until it returns a value; return that, or None after the time limit."""
+        end_ns = self.clock.now_ns() + round(timeout_s * NS_PER_S)
+        while self.clock.now_ns() < end_ns:
+            found = look()
+            if found is not None:
+                return found
+            self.pause(poll_s)
+        return None
 
     def command(
         self, pause: Callable[[], None] | None = None, **utterance: Any
     ) -> Iterator[dict[str, Any]]:
         """Give a command and return its events, up to and including the last one.
 
-        `pause` waits for a moment between two looks at the events.
+        `pause` waits between two reads of the events.
 
         Raises:
-            CommandFailed: nobody answers; raised by the iterator.
+            CommandFailed: planner and executor do not answer; raised by the iterator.
         """
         events = self.events("task_event")
         return self.follow(self.utter(**utterance), events, pause)
@@ -39,53 +58,92 @@ class Session(RobotLink):
     def follow(
         self, command_id: str, events: RingReader, pause: Callable[[], None] | None = None
     ) -> Iterator[dict[str, Any]]:
-        """Return the task events of a command that was given, up to and including the last one.
+        """Return the task events of a given command; the last is `finished` or `rejected`.
+
+        Where the command answers a question, the command that asked is followed from then on.
 
         Raises:
-            CommandFailed: nobody answers; raised by the iterator.
+            CommandFailed: planner and executor do not answer; raised by the iterator.
         """
-        from vla_deploy.cli.follow import follow_command  # loads pydantic: not on an estop's way
-
-        return follow_command(
+        following = Following(
             command_id,
-            events=lambda: [event.payload for event in events.drain()],
-            planner=lambda: self.fresh("planner_status", age_limit_s=2.0),
-            executor=lambda: self.fresh("executor_status", age_limit_s=1.0),
-            clock=self.clock,
-            pause=pause or self.pause,
+            lambda: self.fresh("planner_status", age_limit_s=2.0),
+            lambda: self.fresh("executor_status", age_limit_s=1.0),
+            self.clock,
         )
-
-    def save_flight(self, reason: str, timeout_s: float) -> dict[str, Any] | None:
-        """Ask the flight recorder for a flight; return what it says, None when it is silent."""
-        answers = self.events("flight_event")
-        self.publish("flight_request", {"source": self.source, "reason": reason})
-        end_ns = self.clock.now_ns() + round(timeout_s * NS_PER_S)
-        while self.clock.now_ns() < end_ns:
-            for event in answers.drain():
-                if "request" in event.payload["causes"]:
-                    return event.payload
-            self.pause()
-        return None
+        return _events_of(following, events, pause or self.pause)
 
     def cancel(self) -> None:
         """Ask the executor to stop what it does; the robot stays ready.
 
         Raises:
-            CommandFailed: nobody answers.
+            CommandFailed: planner and executor do not answer.
         """
         for _ in self.command(cancel=True):
             pass
 
+    def scene(self) -> dict[str, Any]:
+        """Return the document of the topic `scene`.
 
-def attach(runtime_base: Path | None) -> Session:
+        Raises:
+            UsageError: perception is silent.
+        """
+        document = self.document("scene", age_limit_s=FRESH_S)
+        if document is None:
+            raise UsageError("perception tells no scene; see: vla-deploy status")
+        return document
+
+    def running_robot(self) -> "RobotDescription":
+        """Return the description of the robot that runs.
+
+        Raises:
+            UsageError: the supervisor is silent.
+        """
+        from vla_deploy.robots import load_robot
+
+        table = self.document("process_table", age_limit_s=FRESH_S)
+        if table is None:
+            raise UsageError(
+                "the supervisor does not tell which robot this is; see: vla-deploy status"
+            )
+        return load_robot(table["robot"])
+
+
+def _events_of(
+    following: Following, events: RingReader, pause: Callable[[], None]
+) -> Iterator[dict[str, Any]]:
+    while True:
+        why = following.why_lost()
+        yield from following.take([event.payload for event in events.drain()])
+        concluded = following.conclude(why)
+        if concluded is not None:
+            yield concluded
+        if following.has_ended:
+            return
+        if following.is_unanswered:
+            raise CommandFailed(
+                f"no answer from planner or executor within {ANSWER_TIMEOUT_S:g} s, the command is "
+                "not carried out; see: vla-deploy status, and to stop the robot at once: "
+                "vla-deploy estop"
+            )
+        pause()
+
+
+def base_of(arguments: argparse.Namespace) -> Path:
+    """Return the runtime directory that the arguments name, or the default one."""
+    base: Path = arguments.runtime_base or default_base()
+    return base
+
+
+def attach(runtime_base: Path | None) -> RobotSession:
     """Return a session with the robot that runs on this machine.
 
     Raises:
         UsageError: none runs.
-        RuntimeUnavailable: the runtime directory belongs to someone else.
+        RuntimeUnavailable: the runtime directory belongs to another user.
     """
     base = runtime_base or default_base()
     owner = running(base)
     if owner is None:
         raise UsageError(f"no robot runs in {base}; start one: vla-deploy run --twin")
-    return Session(Path(owner.run_dir))
+    return RobotSession(Path(owner.run_dir))

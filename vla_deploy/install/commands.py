@@ -53,7 +53,7 @@ def run_command(command: Sequence[str]) -> str:
     """Run one command and return what it printed.
 
     Raises:
-        CommandFailed: it is missing, failed or took too long.
+        SystemCommandFailed: it is missing, failed or took too long.
     """
     try:
         done = subprocess.run(

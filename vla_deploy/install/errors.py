@@ -1,13 +1,13 @@
 """Say what keeps the robot's service from being installed or updated.
 
 InstallError
-├── TemplateBroken    a template of ours names what nobody fills in
-├── ArgumentRefused   a name or path cannot stand in a unit
-├── NotPermitted      writing there needs another user
-├── ReleaseRefused    the release cannot be added, used or removed as asked; nothing was changed
-├── ToolMissing       a program of the system is not there, or reaches nobody; nothing was changed
-├── CommandFailed     a program of the system did not do what it was asked
-└── SwitchFailed      the new release did not prove itself; the one before is back in use
+├── TemplateBroken       a template of ours names what nobody fills in
+├── ArgumentRefused      a name or path cannot stand in a unit
+├── NotPermitted         writing there needs another user
+├── ReleaseRefused       the release cannot be added, used or removed; nothing was changed
+├── ToolMissing          a program of the system is not there, or does not answer; nothing changed
+├── SystemCommandFailed  a program of the system did not do what it was asked
+└── SwitchFailed         the new release did not prove itself; the one before is back in use
 """
 
 

@@ -57,7 +57,7 @@ def add_release(store: ReleaseStore, release_id: str, source: ReleaseSource) -> 
 
     Raises:
         ReleaseRefused: the id is taken or no name.
-        CommandFailed: the environment cannot be made.
+        SystemCommandFailed: the environment cannot be made.
     """
     folder = store.incoming(release_id)
     venv = folder / "venv"

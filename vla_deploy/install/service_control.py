@@ -32,14 +32,14 @@ class ServiceControl(Protocol):
         """Restart it; return when it is ready.
 
         Raises:
-            CommandFailed: it did not become ready.
+            SystemCommandFailed: it did not become ready.
         """
 
     def state(self) -> ServiceState:
         """Return its state.
 
         Raises:
-            CommandFailed: the service manager does not answer.
+            SystemCommandFailed: the service manager does not answer.
         """
 
 
@@ -79,7 +79,7 @@ def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float, know
     the robot that fails or is late is one, too, unless the trouble was `known` before.
 
     Raises:
-        CommandFailed: the service manager does not answer.
+        SystemCommandFailed: the service manager does not answer.
     """
     first = now = service.state()
     if first.active != "active":

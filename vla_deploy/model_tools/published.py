@@ -1,6 +1,8 @@
 """Fetch published Whispers and language models from the Hugging Face hub."""
 
-from collections.abc import Callable, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
@@ -8,6 +10,7 @@ from typing import Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelUnknown
 from vla_deploy.inference.language_schema import GENAI_CONFIG
+from vla_deploy.inference.store import ModelStore
 from vla_deploy.inference.whisper_schema import NEEDED_PARTS
 from vla_deploy.model_tools.hub import HubCommit, HubPlace
 from vla_deploy.model_tools.language_models import is_part
@@ -139,6 +142,22 @@ LANGUAGE_MODELS: Final[Mapping[str, PublishedModel]] = MappingProxyType(
     }
 )
 """Where models are published; the hub alone knows their hashes."""
+
+
+@contextmanager
+def fetched(
+    published: PublishedModel,
+    store: ModelStore,
+    report: Callable[[str], None],
+    endpoint: str | None = None,
+) -> Iterator[tuple[Path, str]]:
+    """Fetch a model for a `with` block, as `fetch` does, into a folder that goes afterwards.
+
+    The folder is next to the added models: a folder in memory has no room for gigabytes.
+    """
+    store.user.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=store.user) as directory:
+        yield fetch(published, Path(directory), report, endpoint)
 
 
 def fetch(

@@ -4,7 +4,7 @@ All servos are asked at once first. Where that gives damaged answers, each id is
 of two servos with one id neither is understood.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +19,7 @@ from drivers.dynamixel.tools.bench_link import (
     BenchLink,
     FoundServo,
 )
+from drivers.errors import NoReply, ProtocolError
 
 ALL_IDS: Final = range(MAX_SERVO_ID + 1)
 _SLOT_S: Final = 0.003
@@ -44,6 +45,75 @@ class SpeedReport:
     """Ids that answer in Protocol 1.0 (AX, MX, and other makes), which is not spoken here."""
     noise_bytes: int = 0
     """Received bytes that made no packet, as from servos at another speed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoScan:
+    """Hold what was found on a port at several speeds, the bus' own first.
+
+    `declared` has joint and model of the servos that a robot file puts on the bus, by id;
+    `is_complete` says that all ids were asked.
+    """
+
+    port: str
+    reports: Sequence[SpeedReport]
+    declared: Mapping[int, tuple[str, str]]
+    is_complete: bool
+
+    @property
+    def missing(self) -> list[int]:
+        """Return the declared servos that do not answer at the bus' own speed."""
+        if not self.is_complete:
+            return []
+        own = self.reports[0]
+        answered = {one.servo_id for one in own.servos} | set(own.clashes)
+        return sorted(self.declared.keys() - answered)
+
+    def fault(self) -> str:
+        """Return what is wrong with the bus and what to try; "" where nothing is."""
+        for report in self.reports:
+            if report.clashes:
+                ids = ", ".join(map(str, report.clashes))
+                return (
+                    f"{self.port} at {report.baud} baud: the answers of id {ids} are damaged: more "
+                    "than one servo has it, or the cable is bad. Connect one of them alone and "
+                    "give it a free id: vla-deploy servo set-id"
+                )
+        if not any(report.servos for report in self.reports):
+            return self._nothing_found()
+        if self.missing:
+            names = ", ".join(map(self._label, self.missing))
+            return (
+                f"{self.port} at {self.reports[0].baud} baud: no answer from {names}; check power, "
+                "cable and speed (see the table for servos at another speed)"
+            )
+        wrong = [
+            f"{self._label(one.servo_id)} is {one.model_name}, the robot file says "
+            f"{self.declared[one.servo_id][1]}"
+            for one in self.reports[0].servos
+            if one.servo_id in self.declared and self.declared[one.servo_id][1] != one.model_name
+        ]
+        return f"{'; '.join(wrong)}; correct the robot file or the wiring" if wrong else ""
+
+    def _label(self, servo_id: int) -> str:
+        return f"servo {servo_id} ({self.declared[servo_id][0]})"
+
+    def _nothing_found(self) -> str:
+        for report in self.reports:
+            if report.protocol_1_ids:
+                ids = ", ".join(map(str, report.protocol_1_ids))
+                return (
+                    f"{self.port} at {report.baud} baud: id {ids} answers in Protocol 1.0, only "
+                    "2.0 is spoken here; set the servo's protocol_type to 2, if it has one"
+                )
+        for report in self.reports:
+            if report.noise_bytes:
+                return (
+                    f"{self.port}: bytes came at {report.baud} baud, but no packet: another speed, "
+                    "an adapter that echoes, or another device; check the adapter's mode"
+                )
+        asked = ", ".join(str(report.baud) for report in self.reports)
+        return f"{self.port}: no servo answers at {asked} baud; check power, cable and port"
 
 
 def scan_speed(
@@ -84,6 +154,21 @@ def is_clash(link: BenchLink, servo_id: int) -> bool:
         packets, junk_bytes = link.listen(servo_id, Instruction.READ, params, _PROBED_BYTES)
         if len(packets) < 2 and not junk_bytes:
             return False
+    return True
+
+
+def is_taken(link: BenchLink, servo_id: int) -> bool:
+    """Return whether anything answers to an id; a damaged answer counts.
+
+    Raises:
+        LinkLost: the adapter is gone.
+    """
+    try:
+        link.ping(servo_id)
+    except NoReply:
+        return False
+    except ProtocolError:
+        return True
     return True
 
 

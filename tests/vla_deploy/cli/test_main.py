@@ -5,17 +5,18 @@ import errno
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from vla_deploy.cli import demo
-from vla_deploy.cli.commands import COMMANDS
+from vla_deploy.cli.commands import COMMANDS, emit
 from vla_deploy.cli.errors import USER_ERRORS
 from vla_deploy.cli.main import main, parser
+from vla_deploy.cli.operation import demo
 
-BUTLER = Path(demo.__file__).parents[1] / "robots" / "butler"
+BUTLER = Path(demo.__file__).parents[2] / "robots" / "butler"
 CYCLE = {
     "goal": "wait for ever",
     "actions": [
@@ -42,9 +43,19 @@ def commands() -> dict[str, argparse.ArgumentParser]:
     return sub.choices
 
 
-@pytest.mark.parametrize("name", sorted(commands()))
-def test_the_help_of_every_command_ends_with_an_example(name):
-    assert f"  vla-deploy {name}" in commands()[name].format_help().split("examples:")[1]
+def every_parser(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for one in action.choices.values():
+                yield one
+                yield from every_parser(one)
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param(one, id=one.prog) for one in every_parser(parser())]
+)
+def test_the_help_of_every_command_ends_with_an_example(command):
+    assert f"  {command.prog}" in command.format_help().split("examples:")[1]
 
 
 def test_the_list_of_commands_tells_of_each_what_it_tells_of_itself():
@@ -233,6 +244,11 @@ def test_the_service_tries_again_after_a_fault_of_the_system(capsys, monkeypatch
     def fill_up(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("vla_deploy.cli.run.main", fill_up)
+    monkeypatch.setattr("vla_deploy.cli.operation.run.main", fill_up)
     assert main(["run", "--twin"]) == 1
     assert capsys.readouterr().err == "vla-deploy: [Errno 28] No space left on device\n"
+
+
+def test_a_document_is_printed_even_where_no_text_can_be_made_of_it(capsys):
+    assert emit(argparse.Namespace(json=True), {"state": 7}, lambda: 1 // 0) == 0
+    assert json.loads(capsys.readouterr().out) == {"state": 7}

@@ -189,7 +189,7 @@ def test_an_install_cut_off_before_any_file_is_taken_up_again(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as cut:
-        cut.setattr("vla_deploy.cli.install.apply_changes", power_cut)
+        cut.setattr("vla_deploy.cli.maintenance.install.apply_changes", power_cut)
         assert main(["install", "--root", str(tmp_path), "--twin"]) == 130
     capsys.readouterr()
     report = kinds(run(capsys, "install", "--root", str(tmp_path), "--twin"))

@@ -28,7 +28,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def here(bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vla_deploy.cli.install.layout_of", lambda _: Here(root=bare))
+    monkeypatch.setattr("vla_deploy.cli.maintenance.install.layout_of", lambda _: Here(root=bare))
 
 
 def files(root: Path) -> list[Path]:
@@ -55,7 +55,7 @@ def test_uninstall_skips_what_cannot_run_and_removes_every_file(
     state = bare / "var/lib/vla-deploy/profile.json"
     state.parent.mkdir(parents=True)
     state.write_text("{}")
-    monkeypatch.setattr("vla_deploy.cli.install.layout_of", lambda _: Here(root=bare))
+    monkeypatch.setattr("vla_deploy.cli.maintenance.install.layout_of", lambda _: Here(root=bare))
     assert main(["uninstall", "--purge"]) == 0
     skipped = capsys.readouterr().err.splitlines()
     assert [line.split()[2] for line in skipped] == [

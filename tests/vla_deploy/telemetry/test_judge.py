@@ -120,7 +120,7 @@ def test_the_command_judges_flights_and_its_exit_code_tells(
     assert main(["flight", "judge", path]) == 1
     out = capsys.readouterr().out
     assert "differs: Verdict.reaction: recorded <Reaction.GROUP_STOP" in out
-    monkeypatch.setattr("vla_deploy.cli.flight.rules_digest", lambda: "of tomorrow")
+    monkeypatch.setattr("vla_deploy.cli.recording.flight.rules_digest", lambda: "of tomorrow")
     assert main(["flight", "judge", path]) == 1
     assert "recorded by other rules than these" in capsys.readouterr().out
 

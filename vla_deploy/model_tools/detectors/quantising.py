@@ -85,6 +85,21 @@ def quantise(
     return Quantised(model=name, accuracy=accuracy, drop_points=drop_points)
 
 
+def require_disjoint(calibration: Sequence[Path], labelled: Sequence[LabelledImage]) -> None:
+    """Check that no labelled image is one to calibrate with: on those a file sees better.
+
+    Raises:
+        ImagesInvalid: some are.
+    """
+    known = {path.resolve() for path in calibration}
+    shared = [one.path for one in labelled if one.path.resolve() in known]
+    if shared:
+        raise ImagesInvalid(
+            f"--labelled: {len(shared)} of its {len(labelled)} images, such as {shared[0]}, are "
+            "among those of --images; expected others, which it was not calibrated with"
+        )
+
+
 def _copy_original(model: StoredModel, source: Path, draft: Path, name: str) -> None:
     shutil.copyfile(source, draft / f"{name}.onnx")
     if model.manifest.card:

@@ -14,7 +14,7 @@ body would hit above or below it. To every other reader of the format both are o
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -77,6 +77,23 @@ class MapFile:
         percent[np.isnan(probability)] = UNKNOWN
         return percent.astype(np.int8)[np.flipud(self.shades)]
 
+    def as_trinary(self) -> "MapFile":
+        """Return the map in the shades that map_server writes; low cells keep their dark grey."""
+        if self.mode is MapMode.TRINARY and not self.negate:
+            return self
+        probability = np.flipud(self.probability())
+        shades = np.full(probability.shape, UNKNOWN_SHADE, dtype=np.uint8)
+        shades[probability > self.occupied_thresh] = OCCUPIED_SHADE
+        shades[probability < self.free_thresh] = FREE_SHADE
+        return replace(
+            self,
+            shades=shades,
+            mode=MapMode.TRINARY,
+            negate=False,
+            occupied_thresh=0.65,
+            free_thresh=0.196,
+        )
+
     def _probability_of_shades(self) -> NDArray[np.float64]:
         shades = np.arange(256, dtype=np.float64)
         if self.mode is MapMode.RAW:
@@ -122,13 +139,31 @@ def image_of(yaml_path: Path) -> Path:
     return yaml_path.parent / _text(_whole_entries(yaml_path)["image"])
 
 
+def files_of(yaml_path: Path) -> tuple[Path, Path]:
+    """Return the two files that `write_map_file` writes."""
+    return yaml_path, yaml_path.with_suffix(".pgm")
+
+
+def require_free(yaml_path: Path) -> None:
+    """Check that writing a map overwrites nothing.
+
+    Raises:
+        MapInvalid: one of its files exists.
+    """
+    existing = [str(one) for one in files_of(yaml_path) if one.exists()]
+    if existing:
+        raise MapInvalid(
+            f"{' and '.join(existing)} is there already; choose another, or: --replace"
+        )
+
+
 def write_map_file(yaml_path: Path, file: MapFile, *, comment: str = "") -> None:
     """Write a map: `<name>.yaml` and `<name>.pgm` beside it; readers see the old or the new one.
 
     Raises:
         MapInvalid: the files cannot be written.
     """
-    image_path = yaml_path.with_suffix(".pgm")
+    _, image_path = files_of(yaml_path)
     height, width = file.shades.shape
     header = f"P5\n{width} {height}\n255\n".encode("ascii")
     try:

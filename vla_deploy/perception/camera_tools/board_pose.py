@@ -1,6 +1,8 @@
-"""Tell where a board is in the camera's frame, and how well a lens explains what is seen of it."""
+"""Find the pose of a board in the camera's frame, and check lens and depth against it."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 import cv2
 import numpy as np
@@ -10,6 +12,9 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages
 from vla_deploy.perception.geometry.lens import matrix_of, project
+
+MAX_CHECK_ERROR_PX: Final = 0.8
+MAX_DEPTH_ERROR_RATIO: Final = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,3 +71,40 @@ def depth_ratio(view: BoardView, pose: BoardPose, depth_m: NDArray[np.float32]) 
     if np.count_nonzero(there) < len(view.pixels) // 2:
         return None
     return float(np.median(told[there] / expected[there]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraCheck:
+    """Hold the errors of views by name, and measured over expected depth where it is known."""
+
+    view_errors_px: dict[str, float]
+    depth_ratio: float | None
+
+    @property
+    def lens_ok(self) -> bool:
+        """Return whether the lens explains every view."""
+        return max(self.view_errors_px.values()) <= MAX_CHECK_ERROR_PX
+
+    @property
+    def depth_ok(self) -> bool:
+        """Return whether depth fits the lens, as far as it is known."""
+        return self.depth_ratio is None or abs(self.depth_ratio - 1.0) <= MAX_DEPTH_ERROR_RATIO
+
+
+def check_camera(
+    views: Iterable[BoardView], depths_m: Mapping[str, NDArray[np.float32]], camera: Intrinsics
+) -> CameraCheck:
+    """Compare views of a board, and the depth images of some, with what the lens expects.
+
+    Raises:
+        BadImages: a view fits no pose of the board.
+    """
+    errors_px, ratios = {}, []
+    for view in views:
+        pose = board_pose(view, camera)
+        errors_px[view.name] = round(pose.error_px, 3)
+        if view.name in depths_m:
+            ratio = depth_ratio(view, pose, depths_m[view.name])
+            ratios += [] if ratio is None else [ratio]
+    median = float(np.median(ratios)) if ratios else None
+    return CameraCheck(view_errors_px=errors_px, depth_ratio=median)

@@ -17,6 +17,8 @@ from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.board_pose import board_pose, placed, rms
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.geometry.lens import project
+from vla_deploy.perception.geometry.rotation import angle_rad
+from vla_deploy.robots.description import CameraDescription, CameraMounting
 
 MIN_VIEWS: Final = 6
 # Turns about one axis alone leave the place along it open.
@@ -60,6 +62,23 @@ class HandEye:
         angle = float(np.linalg.norm(turn))
         x, y, z = math.sin(angle / 2) * turn / max(angle, 1e-12)
         return (float(x), float(y), float(z), math.cos(angle / 2))
+
+    def turn_rad(self) -> float:
+        """Return by how much the camera is turned against its site."""
+        return angle_rad(self.site_from_camera[:3, :3])
+
+    def mounting(self, camera: CameraDescription, made_at: str) -> CameraMounting:
+        """Return the camera's place as the robot's folder stores it."""
+        x, y, z = (round(float(value), 6) for value in self.site_from_camera[:3, 3])
+        return CameraMounting(
+            site=camera.site,
+            model=camera.model,
+            focal_px=camera.intrinsics.fx,
+            translation_m=(x, y, z),
+            quaternion_xyzw=self.quaternion_xyzw(),
+            residual_m=round(self.residual_m, 6),
+            made_at=made_at,
+        )
 
 
 def fit_hand_eye(views: Sequence[HeadView], camera: Intrinsics) -> HandEye:

@@ -12,6 +12,7 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.selecting import MIN_VIEWS, require_variety
+from vla_deploy.robots.description import LensCalibration
 from vla_deploy.runtime.one_line import one_line
 
 MODELS: Final = {"plumb_bob": 5, "rational_polynomial": 8}
@@ -35,6 +36,17 @@ class LensFit:
     view_errors_px: dict[str, float]
     outliers: dict[str, float]
     sigma_px: tuple[float, float, float, float]
+
+    def calibration(self, tool: str, made_at: str) -> LensCalibration:
+        """Return the lens as the robot's folder stores it."""
+        return LensCalibration(
+            intrinsics=self.intrinsics,
+            distortion_model=self.distortion_model,
+            reprojection_error_px=round(self.error_px, 4),
+            views=len(self.view_errors_px),
+            made_at=made_at,
+            tool=tool,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

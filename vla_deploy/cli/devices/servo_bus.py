@@ -1,0 +1,181 @@
+"""Open a servo bus for a command: by port and speed, or as a robot file declares it."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivers.base import ByteTransport
+from drivers.clock import Clock, MonotonicClock
+from drivers.dynamixel.codec import MAX_SERVO_ID
+from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.tools import BenchLink
+from drivers.errors import DeviceMissing
+from drivers.serial_port import SerialPort
+from drivers.wire_recorder import RecordingTransport, WireRecorder
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.robots import RobotDescription, load_robot
+
+SPEEDS = tuple(sorted(rate for rate in BAUD_RATES.values() if rate != 4_500_000))
+"""The speeds of servos that a tty offers too."""
+DEFAULT_BAUD = 1_000_000
+FACTORY_BAUD = 57_600
+SERIAL_NAMES = ("ttyUSB*", "ttyACM*", "ttyTHS*")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoBusPort:
+    """Describe the port of a servo bus, and the robot file that declares its servos."""
+
+    port: Path
+    baud: int
+    baud_given: bool = True
+    robot: RobotDescription | None = None
+    record: Path | None = None
+    clock: Clock = field(default_factory=MonotonicClock)
+
+    @property
+    def is_pseudo_terminal(self) -> bool:
+        """Return whether the port is a pseudo-terminal, such as the twin's, which has no speed."""
+        return str(self.port.resolve()).startswith("/dev/pts/")
+
+    @contextmanager
+    def open(self, baud: int | None = None) -> Iterator[BenchLink]:
+        """Open the bus for a `with` block.
+
+        Raises:
+            DeviceMissing: the port is not there.
+            DeviceBusy: another process holds it.
+        """
+        baud = baud or self.baud
+        try:
+            transport: ByteTransport = SerialPort(self.port, baud, self.clock)
+        except DeviceMissing as error:
+            raise DeviceMissing(f"{error}; choose one by --port: {_ports_here()}") from error
+        if self.record is not None:
+            transport = RecordingTransport(transport, self._recorder(self.record, baud))
+        link = BenchLink(transport, self.clock, baud)
+        try:
+            link.detect_echo()
+            yield link
+        finally:
+            link.close()
+
+    def _recorder(self, file: Path, baud: int) -> WireRecorder:
+        """Return a recorder; each speed other than that of the bus gets its own file."""
+        if baud != self.baud:
+            file = file.with_name(f"{file.stem}-{baud}{file.suffix}")
+        return WireRecorder(file, self.clock, note=f"{self.port} at {baud} baud")
+
+    @property
+    def declared(self) -> dict[int, tuple[str, str]]:
+        """Return joint and model of the servos in the robot file, by id; none without a file."""
+        servos = self.robot.servo_bus.servos if self.robot else ()
+        return {servo.id: (servo.joint, servo.model) for servo in servos}
+
+    @property
+    def joints(self) -> dict[int, str]:
+        """Return the joint of each declared servo."""
+        return {servo_id: joint for servo_id, (joint, _) in self.declared.items()}
+
+    def joint(self, servo_id: int) -> str:
+        """Return the joint that a servo drives, "" without a robot file."""
+        return self.joints.get(servo_id, "")
+
+    def label(self, servo_id: int) -> str:
+        """Return how messages name a servo."""
+        joint = self.joint(servo_id)
+        return f"servo {servo_id} ({joint})" if joint else f"servo {servo_id}"
+
+
+def _ports_here() -> str:
+    """Return the serial ports of this machine, those with a persistent name first."""
+    by_id = Path("/dev/serial/by-id")
+    found = sorted(by_id.iterdir()) if by_id.is_dir() else []
+    found += sorted(one for kind in SERIAL_NAMES for one in Path("/dev").glob(kind))
+    return ", ".join(map(str, found)) or "this machine has none"
+
+
+def add_bus_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that choose the bus."""
+    command.add_argument("--robot", help="work on this robot's servo bus (default: butler)")
+    command.add_argument("--port", type=Path, help="work on this port, such as /dev/ttyUSB0")
+    command.add_argument(
+        "--baud",
+        type=int,
+        choices=SPEEDS,
+        metavar="N",
+        help=f"speed in bit/s: {', '.join(map(str, SPEEDS))} "
+        f"(default: the robot's, or {DEFAULT_BAUD} with --port)",
+    )
+    command.add_argument("--record", type=Path, metavar="FILE", help="record the wire to this file")
+    command.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
+    """Return the bus that the arguments name.
+
+    Raises:
+        RobotFileError: the robot file has faults.
+    """
+    is_port_alone = arguments.port is not None and arguments.robot is None
+    robot = None if is_port_alone else load_robot(arguments.robot or "butler")
+    bus = None if robot is None else robot.servo_bus
+    return ServoBusPort(
+        port=arguments.port or Path(bus.path if bus else ""),
+        baud=arguments.baud or (bus.baud if bus else DEFAULT_BAUD),
+        baud_given=arguments.baud is not None,
+        robot=robot,
+        record=arguments.record,
+    )
+
+
+def servo_id(text: str) -> int:
+    """Read one id.
+
+    Raises:
+        argparse.ArgumentTypeError: it is no id that a servo can have.
+    """
+    if not text.isdecimal() or int(text) > MAX_SERVO_ID:
+        raise argparse.ArgumentTypeError(f"expected an id in 0..{MAX_SERVO_ID}, got {text!r}")
+    return int(text)
+
+
+def confirm(
+    arguments: argparse.Namespace, question: str, ask: Callable[[str], str] = input
+) -> None:
+    """Ask for confirmation before something that can hurt; `--yes` confirms it.
+
+    Raises:
+        UsageError: there is no terminal to ask at.
+        CommandFailed: the answer is not yes.
+    """
+    if arguments.yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(f"{question} Nobody can be asked here: repeat it with --yes")
+    if ask(f"{question} Type yes to go on: ").strip().lower() != "yes":
+        raise CommandFailed("nothing was changed")
+
+
+def add_yes_argument(command: argparse.ArgumentParser) -> None:
+    """Add the option that confirms every question."""
+    command.add_argument("--yes", action="store_true", help="do not ask")
+
+
+class ProgressLine:
+    """Show progress at a terminal, on one line that is cleared at the end."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._shown = not quiet and sys.stderr.isatty()
+
+    def __call__(self, text: str) -> None:
+        """Replace the text."""
+        if self._shown:
+            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        """Clear the line."""
+        self("")

@@ -1,0 +1,265 @@
+"""`vla-deploy servo calibrate`: measure the mounting of servos on joints; nothing is driven."""
+
+import argparse
+import os
+import select
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.dynamixel.control_table import PULSES_PER_REV
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tools import BenchLink
+from drivers.dynamixel.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
+from drivers.dynamixel.tools.travel import ServoMounting, TravelRefused
+from vla_deploy.cli.commands import add_command, emit
+from vla_deploy.cli.devices.servo_bus import (
+    ServoBusPort,
+    add_bus_arguments,
+    add_yes_argument,
+    bus_of,
+    confirm,
+)
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.calibration.calibration import CALIBRATION_FILE
+from vla_deploy.robots.joint_calibration import (
+    CalibrationRecord,
+    answering_servos,
+    guided_joints,
+)
+
+_POLL_S: Final = 0.02
+_TRIES: Final = 3
+EXAMPLES = """  vla-deploy servo calibrate --robot butler --joint left_elbow
+  vla-deploy servo calibrate --robot butler --method mark --at 0
+  vla-deploy servo calibrate --robot butler --from-pose rest --yes
+  vla-deploy servo calibrate --robot butler --from-pose head_pan=0,head_tilt=0.3 --yes
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    calibrate = add_command(
+        commands, "calibrate", "measure sign and offset of joints by hand", EXAMPLES, run
+    )
+    add_bus_arguments(calibrate)
+    add_yes_argument(calibrate)
+    calibrate.add_argument("--joint", action="append", help="this joint (repeat it; default: all)")
+    calibrate.add_argument(
+        "--method",
+        choices=("ends", "mark"),
+        default="ends",
+        help="ends: move each joint from its lower to its upper end; mark: to one mark",
+    )
+    calibrate.add_argument("--at", type=float, default=0.0, help="the mark's value (default: 0)")
+    calibrate.add_argument(
+        "--from-pose", help="the joints stand at these values now: a pose, or joint=value,..."
+    )
+    calibrate.add_argument(
+        "--accept-sign", action="store_true", help="take a sign other than the robot file's"
+    )
+    calibrate.add_argument(
+        "--output", type=Path, help=f"write here (default: {CALIBRATION_FILE} at the robot file)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate, and write each joint as soon as it is measured.
+
+    Raises:
+        UsageError: a joint, pose or value is not the robot's.
+        CommandFailed: a joint could not be measured; those before it are written.
+        DriverError: a servo is silent, or the bus is lost.
+    """
+    bus = bus_of(arguments)
+    if bus.robot is None:
+        raise UsageError("--port alone is no robot: add --robot, whose joints are calibrated")
+    console = Console(quiet=arguments.json)
+    with bus.open() as link:
+        return calibrate(arguments, bus, bus.robot, link, console)
+
+
+def calibrate(
+    arguments: argparse.Namespace,
+    bus: ServoBusPort,
+    robot: RobotDescription,
+    link: BenchLink,
+    person: Person,
+) -> int:
+    """Do the work of `run` on an open bus.
+
+    Raises:
+        UsageError: a joint, pose or value is not the robot's.
+        CommandFailed: a joint could not be measured; those before it are written.
+        DriverError: a servo is silent, or the bus is lost.
+    """
+    pose = _read_pose(robot, arguments.from_pose) if arguments.from_pose else {}
+    names = _chosen_joints(robot, arguments.joint or list(pose))
+    joints = guided_joints(robot, names)
+    _require_values(joints, pose, arguments)
+    watched = answering_servos(robot, link, names)
+    _release(arguments, link, watched)
+    record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
+    guide = CalibrationGuide(
+        link.registers, watched, person, bus.clock, accept_sign=arguments.accept_sign
+    )
+    failures = []
+    if pose:
+        stands = guide.as_it_stands({joint: pose[joint.name] for joint in joints})
+        _store(record, joints, stands, "pose", person)
+    else:
+        failures = _calibrate_one_by_one(arguments, guide, joints, record, person)
+    _warn_of_turns(link, joints, person)
+    report = {"file": str(record.file), "joints": record.changes, "failed": failures}
+    emit(arguments, report, "")
+    if failures:
+        raise CommandFailed(f"not calibrated: {', '.join(failures)}; see above, then try again")
+    return 0
+
+
+def _calibrate_one_by_one(
+    arguments: argparse.Namespace,
+    guide: CalibrationGuide,
+    joints: Sequence[GuidedJoint],
+    record: CalibrationRecord,
+    person: Person,
+) -> list[str]:
+    """Return the joints that could not be measured."""
+    failures = []
+    for joint in joints:
+        for _ in range(_TRIES):
+            try:
+                by_ends = arguments.method == "ends"
+                found = guide.by_ends(joint) if by_ends else guide.by_mark(joint, arguments.at)
+            except TravelRefused as refusal:
+                person.tell(f"refused: {refusal}")
+                continue
+            _store(record, [joint], {joint.name: found}, arguments.method, person)
+            break
+        else:
+            failures.append(joint.name)
+    return failures
+
+
+def _store(
+    record: CalibrationRecord,
+    joints: Sequence[GuidedJoint],
+    found: Mapping[str, ServoMounting],
+    method: str,
+    person: Person,
+) -> None:
+    record.store(joints, found, method)
+    for joint in joints:
+        person.tell(_words(joint, found[joint.name]))
+    person.tell(f"written to {record.file}")
+
+
+def _warn_of_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Person) -> None:
+    """Warn of servos that were turned by hand beyond the range in which they take goals."""
+    for joint in joints:
+        position = link.read(joint.servo, "present_position")
+        if not 0 <= position < PULSES_PER_REV:
+            person.tell(
+                f"{joint.servo} counts {position} pulses, beyond one turn; restart it before the "
+                f"robot runs: vla-deploy servo reboot {joint.servo.id}"
+            )
+
+
+def _release(arguments: argparse.Namespace, link: BenchLink, servos: Sequence[ServoSpec]) -> None:
+    powered = [servo for servo in servos if link.read(servo, "torque_enable")]
+    if not powered:
+        return
+    joints = ", ".join(servo.joint for servo in powered)
+    confirm(arguments, f"The torque of {joints} goes off: hold what would fall.")
+    for servo in powered:
+        link.write(servo, "torque_enable", 0)
+
+
+def _read_pose(robot: RobotDescription, text: str) -> dict[str, float]:
+    """Return the joints' values of a pose of the robot, or of `joint=value,...`.
+
+    Raises:
+        UsageError: it is neither.
+    """
+    if text in robot.poses:
+        return dict(robot.poses[text])
+    values = {}
+    for part in text.split(","):
+        joint, equals, value = part.partition("=")
+        try:
+            values[joint.strip()] = float(value)
+        except ValueError:
+            known = ", ".join(robot.poses)
+            expected = f"expected joint=value,... or a pose of the robot: {known}"
+            raise UsageError(f"--from-pose {text}: {expected}") from None
+        if not equals:
+            raise UsageError(f"--from-pose {text}: expected joint=value, got {part!r}")
+    return values
+
+
+def _chosen_joints(robot: RobotDescription, names: Sequence[str]) -> list[str]:
+    """Return the named joints, all of them when none is named.
+
+    Raises:
+        UsageError: the robot has no such joint.
+    """
+    unknown = [name for name in names if name not in robot.joint_index]
+    if unknown:
+        known = ", ".join(robot.joint_names)
+        raise UsageError(f"{robot.name} has no servo joint {', '.join(unknown)}; it has {known}")
+    return list(names) or list(robot.joint_names)
+
+
+def _require_values(
+    joints: Sequence[GuidedJoint], pose: Mapping[str, float], arguments: argparse.Namespace
+) -> None:
+    """Check that every joint can have the value that it is said to have.
+
+    Raises:
+        UsageError: a value is missing or outside of the joint's range.
+    """
+    if not pose and arguments.method != "mark":
+        return
+    missing = [joint.name for joint in joints if pose and joint.name not in pose]
+    if missing:
+        raise UsageError(f"--from-pose gives no value for {', '.join(missing)}")
+    for joint in joints:
+        value, low, high = pose.get(joint.name, arguments.at), joint.range.low, joint.range.high
+        if not low <= value <= high:
+            raise UsageError(f"{joint.name}: {value:g} is outside of its range {low:g}..{high:g}")
+
+
+def _words(joint: GuidedJoint, after: ServoMounting) -> str:
+    """Return what a calibration changes."""
+    before = joint.present
+    change = after.offset - before.offset
+    sign = f"sign {before.sign:+d}"
+    if after.sign != before.sign:
+        sign += f" -> {after.sign:+d}"
+    return f"{joint.name}: {sign}, offset {before.offset:.4f} -> {after.offset:.4f} ({change:+.4f})"
+
+
+class Console:
+    """Guide the person at the terminal, or a script at the other end of a pipe."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._stream = sys.stderr if quiet else sys.stdout
+
+    def tell(self, text: str) -> None:
+        """Print a message."""
+        print(text, file=self._stream, flush=True)
+
+    def wait(self, text: str, meanwhile: Callable[[], None]) -> None:
+        """Print what to do and wait for Enter.
+
+        Raises:
+            CommandFailed: the input ended.
+        """
+        print(f"{text}, then press Enter", file=self._stream, flush=True)
+        while not select.select([sys.stdin], [], [], _POLL_S)[0]:
+            meanwhile()
+        while (byte := os.read(sys.stdin.fileno(), 1)) != b"\n":
+            if not byte:
+                raise CommandFailed("the input ended; what was written before stays")

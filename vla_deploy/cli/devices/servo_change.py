@@ -1,0 +1,201 @@
+"""`vla-deploy servo set-id | set-baud | reboot | factory-reset`: change one servo at the bench."""
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tools import BenchLink
+from drivers.dynamixel.tools.bench_link import Keep
+from drivers.dynamixel.tools.scan import is_clash, is_taken
+from drivers.errors import DriverError, NoReply, ProtocolError
+from vla_deploy.cli.commands import Run, add_command, emit
+from vla_deploy.cli.devices.servo_bus import (
+    FACTORY_BAUD,
+    SPEEDS,
+    ServoBusPort,
+    add_bus_arguments,
+    add_yes_argument,
+    bus_of,
+    confirm,
+    servo_id,
+)
+from vla_deploy.cli.errors import CommandFailed, UsageError
+
+BAUD_CODES = {rate: code for code, rate in BAUD_RATES.items()}
+KEEP = {"id": Keep.ID, "id-and-baud": Keep.ID_AND_BAUD, "nothing": Keep.NOTHING}
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    set_id = _add(commands, "set-id", "give a servo another id", "set-id 1 7", run_set_id)
+    set_id.add_argument("id", type=servo_id, help="the id it has")
+    set_id.add_argument("new_id", type=servo_id, help="the id it is to have")
+    set_baud = _add(
+        commands,
+        "set-baud",
+        "give servos another speed; all servos of a bus need the same",
+        "set-baud 3000000 1 2 3",
+        run_set_baud,
+    )
+    set_baud.add_argument("new_baud", type=int, choices=SPEEDS, metavar="NEW_BAUD")
+    set_baud.add_argument("ids", type=servo_id, nargs="+", metavar="ID")
+    reboot = _add(commands, "reboot", "restart a servo; it forgets its RAM", "reboot 3", run_reboot)
+    reboot.add_argument("id", type=servo_id)
+    reset = _add(
+        commands,
+        "factory-reset",
+        "give a servo its factory settings; it keeps its id",
+        "factory-reset 3 --keep id-and-baud",
+        run_factory_reset,
+    )
+    reset.add_argument("id", type=servo_id)
+    reset.add_argument("--keep", choices=KEEP, default="id", help="what stays (default: id)")
+
+
+def _add(commands: Any, name: str, summary: str, example: str, run: Run) -> argparse.ArgumentParser:
+    examples = f"  vla-deploy servo {example} --port /dev/ttyUSB0\n"
+    command = add_command(commands, name, summary, examples, run)
+    add_bus_arguments(command)
+    add_yes_argument(command)
+    return command
+
+
+def run_set_id(arguments: argparse.Namespace) -> int:
+    """Change an id, and read it back.
+
+    Raises:
+        UsageError: the new id is taken, or the old one belongs to two servos.
+        CommandFailed: the servo does not answer to its new id.
+        DriverError: the servo is silent or refuses.
+    """
+    bus, old, new = bus_of(arguments), arguments.id, arguments.new_id
+    with bus.open() as link:
+        servo = link.servo(old, bus.joint(old))
+        _require_alone(link, bus, old)
+        if new == old or is_taken(link, new):
+            raise UsageError(f"{bus.port}: id {new} is taken; see: vla-deploy servo scan")
+        torque = _torque_question(link, [servo])
+        confirm(arguments, f"{servo} gets the id {new}.{torque}")
+        link.write(servo, "torque_enable", 0)
+        link.write(servo, "id", new)
+        moved = link.servo(new, bus.joint(new))
+        if link.read(moved, "id") != new or is_taken(link, old):
+            raise CommandFailed(f"{servo}: did not take the id {new}; see: vla-deploy servo scan")
+    document = {"id": new, "old_id": old}
+    return emit(arguments, document, f"{servo} has the id {new} now", indent=None)
+
+
+def _require_alone(link: BenchLink, bus: ServoBusPort, one: int) -> None:
+    if is_clash(link, one):
+        raise UsageError(
+            f"{bus.port}: more than one servo has the id {one}, both would change; connect one of "
+            "them alone"
+        )
+
+
+def _torque_question(link: BenchLink, servos: Sequence[ServoSpec]) -> str:
+    powered = [servo for servo in servos if link.read(servo, "torque_enable")]
+    if not powered:
+        return ""
+    names = ", ".join(map(str, powered))
+    return f" The torque of {names} goes off: what it carries falls."
+
+
+def run_set_baud(arguments: argparse.Namespace) -> int:
+    """Change the speed of servos, and read it back at the new one.
+
+    Raises:
+        CommandFailed: a servo does not answer at the new speed; the message says how to recover.
+        DriverError: a servo is silent or refuses.
+    """
+    bus, new = bus_of(arguments), arguments.new_baud
+    with bus.open() as link:
+        servos = [link.servo(one, bus.joint(one)) for one in arguments.ids]
+        for servo in servos:
+            _require_speed(servo, new)
+            _require_alone(link, bus, servo.id)
+        names = ", ".join(map(str, servos))
+        torque = _torque_question(link, servos)
+        confirm(arguments, f"{names}: {bus.baud} baud becomes {new} baud.{torque}")
+        for servo in servos:
+            link.write(servo, "torque_enable", 0)
+            link.write(servo, "baud_rate", BAUD_CODES[new])
+    with bus.open(new) as link:
+        for servo in servos:
+            _require_new_speed(link, bus, servo, new)
+    document = {"ids": [servo.id for servo in servos], "baud": new, "old_baud": bus.baud}
+    return emit(arguments, document, f"{names}: {new} baud", indent=None)
+
+
+def _require_speed(servo: ServoSpec, baud: int) -> None:
+    fastest = servo.model.registers["baud_rate"].maximum
+    if fastest is not None and BAUD_CODES[baud] > fastest:
+        raise UsageError(f"{servo}: at most {BAUD_RATES[fastest]} baud, got {baud}")
+
+
+def _require_new_speed(link: BenchLink, bus: ServoBusPort, servo: ServoSpec, baud: int) -> None:
+    try:
+        got = link.read(servo, "baud_rate")
+    except (NoReply, ProtocolError) as error:
+        raise CommandFailed(
+            f"{servo} took {baud} baud, but does not answer at it; the adapter may be too slow. "
+            f"Find it: vla-deploy servo scan --port {bus.port}; go back: vla-deploy servo "
+            f"set-baud {bus.baud} {servo.id} --port {bus.port} --baud {baud}"
+        ) from error
+    if got != BAUD_CODES[baud]:
+        raise CommandFailed(f"{servo}: baud_rate is {got}, expected {BAUD_CODES[baud]}")
+
+
+def run_reboot(arguments: argparse.Namespace) -> int:
+    """Restart a servo and wait until it is back.
+
+    Raises:
+        DriverError: the servo is silent or does not come back.
+    """
+    bus = bus_of(arguments)
+    with bus.open() as link:
+        servo = link.servo(arguments.id, bus.joint(arguments.id))
+        torque = _torque_question(link, [servo])
+        if torque:
+            confirm(arguments, f"{servo} restarts.{torque}")
+        before = link.read(servo, "hardware_error_status")
+        link.reboot(servo)
+        after = link.read(servo, "hardware_error_status")
+    document = {"id": servo.id, "hardware_error_before": before, "hardware_error": after}
+    text = f"{servo} is back, torque off; hardware error {before} before, {after} now"
+    return emit(arguments, document, text, indent=None)
+
+
+def run_factory_reset(arguments: argparse.Namespace) -> int:
+    """Reset a servo and find it again.
+
+    Raises:
+        UsageError: it would get an id that is taken.
+        CommandFailed: it does not come back; the message says where to look.
+        DriverError: the servo is silent or refuses.
+    """
+    bus, keep = bus_of(arguments), KEEP[arguments.keep]
+    new_id = 1 if keep is Keep.NOTHING else arguments.id
+    new_baud = bus.baud if keep is Keep.ID_AND_BAUD else FACTORY_BAUD
+    with bus.open() as link:
+        servo = link.servo(arguments.id, bus.joint(arguments.id))
+        _require_alone(link, bus, servo.id)
+        if new_id != servo.id and is_taken(link, new_id):
+            raise UsageError(f"{servo} would get the id {new_id}, which is taken; use --keep id")
+        torque = _torque_question(link, [servo])
+        confirm(arguments, f"{servo} forgets all settings but {arguments.keep}.{torque}")
+        link.write(servo, "torque_enable", 0)
+        link.factory_reset(servo, keep)
+    try:
+        with bus.open(new_baud) as link:
+            link.await_boot(new_id)
+    except DriverError as error:
+        raise CommandFailed(
+            f"{servo}: was reset, but does not answer as id {new_id} at {new_baud} baud ({error}); "
+            f"find it: vla-deploy servo scan --port {bus.port}"
+        ) from error
+    document = {"id": new_id, "old_id": servo.id, "baud": new_baud, "kept": arguments.keep}
+    text = f"{servo}: factory settings; it answers as id {new_id} at {new_baud} baud"
+    return emit(arguments, document, text, indent=None)

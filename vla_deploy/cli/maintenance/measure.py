@@ -1,0 +1,96 @@
+"""`vla-deploy bench | validate`: start a benchmark, or a campaign against the twin.
+
+Both are started by name: the robot's code never imports benchmarks or twin.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from vla_deploy.cli.commands import add_top_command, number_above_zero, whole_number
+
+BENCHMARKS: Final = {
+    "bus": "16-servo cycle against dynamixel-sdk on the same emulated bus",
+    "contact": "torque that no contact explains while the robot works, against its limits",
+    "control": "CPU time of a control tick by stage: at rest, driving, arms moving",
+    "dashboard": "what clients cost control, one of them frozen; its stop to the wire; --part",
+    "estop": "emergency stop: from the request to the wire under load, and to standstill",
+    "perception": "how well, how fast and at what cost the robot sees; int8 against fp32; --part",
+    "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
+    "recorder": "what the flight recorder costs: per control tick, per look, per flight",
+    "ros": "the ROS gateway: its share of a core, its latency, late ticks with and without it",
+    "serial": "a serial port's bytes on busy cores, with the kernel's workers raised and not",
+    "speech": "words understood by voice and noise, from speech to text, what it costs; --part",
+    "ticks": "late control ticks, idle and under load, with and without SCHED_FIFO",
+    "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
+}
+CAMPAIGNS: Final = {
+    "faults": "every fault in every phase of the work, on the lock-step twin",
+    "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
+    "load": "the main job repeatedly, with eight busy loops: only its duration may change",
+    "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
+    "switches": "hot profile switches under motion, and bad profiles",
+    "soak": "hours of work in lock-step: memory, files and threads must not grow",
+}
+_BENCH_EXAMPLES: Final = "  vla-deploy bench bus --json\n  vla-deploy bench twin\n"
+_VALIDATE_EXAMPLES: Final = """  vla-deploy validate faults --only servo_bus --json
+  vla-deploy validate kills --count 20 --junit out/kills.xml
+"""
+_PASSED_ON: Final = ("only", "count", "hours", "seed", "workers", "junit")
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    bench = add_top_command(
+        commands, "bench", _BENCH_EXAMPLES, run_bench, json_help="print the figures as JSON"
+    )
+    bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=_listed(BENCHMARKS))
+    bench.add_argument(
+        "--part",
+        action="append",
+        help="of dashboard, perception, planner, speech: only this, repeatable",
+    )
+    validate = add_top_command(
+        commands, "validate", _VALIDATE_EXAMPLES, run_campaign, json_help="print the report as JSON"
+    )
+    validate.add_argument("campaign", choices=tuple(CAMPAIGNS), help=_listed(CAMPAIGNS))
+    validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")
+    validate.add_argument("--count", type=whole_number(), help="how many injections or switches")
+    validate.add_argument(
+        "--hours", type=number_above_zero("hours"), help="how long to soak (default: 1)"
+    )
+    validate.add_argument(
+        "--workers", type=whole_number(), help="how many cases at a time (default: 2)"
+    )
+    validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
+    validate.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
+
+
+def _listed(summaries: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}: {summary}" for name, summary in summaries.items())
+
+
+def run_bench(arguments: argparse.Namespace) -> int:
+    """Run one benchmark in a process of its own."""
+    command = [sys.executable, "-m", f"benchmarks.{arguments.benchmark}"]
+    if arguments.json:
+        command.append("--json")
+    for part in arguments.part or ():
+        command += ["--part", part]
+    return subprocess.run(command, check=False).returncode
+
+
+def run_campaign(arguments: argparse.Namespace) -> int:
+    """Replace this process by the campaign, so that it gets the signals; 1 where a case failed."""
+    command = [sys.executable, "-m", "sim_twin.campaigns", arguments.campaign]
+    for name in _PASSED_ON:
+        value = vars(arguments)[name]
+        if value is not None:
+            command += [f"--{name}", str(value)]
+    if arguments.json:
+        command.append("--json")
+    os.execv(sys.executable, command)

@@ -1,0 +1,141 @@
+"""`vla-deploy plan`: show the plan for a command and the back end that made it; nothing moves."""
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from vla_deploy.cli.commands import add_top_command, emit
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.operation.say import EXIT_ASKED, read_json
+from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
+from vla_deploy.client.action_words import action_words
+from vla_deploy.planning.assembly import planner_for
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.dialogue.confirmation import confirmation_of
+from vla_deploy.planning.dialogue.situation import Situation
+from vla_deploy.planning.errors import Ambiguous
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.understanding import Conversation
+from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.world import Snapshot, read_snapshot
+from vla_deploy.world.report import read_report
+
+EXAMPLES: Final = """  vla-deploy plan "pick up the red cup and put it in the box"
+  vla-deploy plan "bring me the bottle" --scene scene.json --json
+  vla-deploy scene --json > scene.json            a scene to plan in later
+
+exit code 3: the robot would ask back
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    plan = add_top_command(
+        commands, "plan", EXAMPLES, run, json_help="print plan and attempts as JSON"
+    )
+    plan.add_argument("text", help="the command in words")
+    plan.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="plan in this scene (JSON) instead of what a running robot sees",
+    )
+    plan.add_argument("--robot", help="name or folder of a robot (default: the one that runs)")
+    plan.add_argument("--profile", help="name or file of a profile (default: the one in force)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan the command and print the plan; exit code 2 where it is refused."""
+    session = _session(arguments)
+    table, status = (
+        {} if session is None else session.document(topic, FRESH_S) or {}
+        for topic in ("process_table", "profile_status")
+    )
+    robot = load_robot(arguments.robot or table.get("robot", "butler"))
+    profile = load_profile(arguments.profile or status.get("profile", "desktop"))
+    planner = planner_for(robot, profile, MonotonicClock(), base_of(arguments))
+    request = _request(arguments, robot, session)
+    result = planner.plan(request)
+    asks = confirmation_of(result.plan, request, result.proposal) if result.plan else ""
+    document = document_of(result, asks, planner.away)
+    emit(arguments, document, lambda: as_text(result, asks, planner.away))
+    if isinstance(result.error, Ambiguous):
+        return EXIT_ASKED
+    if result.error is not None:
+        raise result.error
+    return 0
+
+
+def document_of(result: PlanningResult, asks: str, away: Mapping[str, str]) -> dict[str, Any]:
+    """Return a result for JSON, with the confirmation it asks for and unavailable back ends."""
+    proposal = result.proposal
+    is_asked = isinstance(result.error, Ambiguous)
+    return {
+        "plan": None if result.plan is None else result.plan.model_dump(mode="json"),
+        "rung": None if proposal is None else proposal.back_end,
+        "confidence": None if proposal is None else round(proposal.confidence, 3),
+        "read_back": asks or None,
+        "question": str(result.error) if is_asked else None,
+        "refused": None if result.error is None or is_asked else str(result.error),
+        "attempts": [one.document() for one in result.attempts],
+        "away": dict(away),
+    }
+
+
+def as_text(result: PlanningResult, asks: str, away: Mapping[str, str]) -> str:
+    """Return a result as lines for a person."""
+    lines = [_attempt_line(one) for one in result.attempts]
+    lines += [f"{name} away: {why}" for name, why in away.items()]
+    if result.plan is not None:
+        lines += [
+            f"  {one.id:<14} {action_words(one.skill, one.parameters)}"
+            for one in result.plan.actions
+        ]
+    question = result.error if isinstance(result.error, Ambiguous) else asks
+    if question:
+        lines.append(f"robot would ask: {question}")
+    return "\n".join(lines)
+
+
+def _attempt_line(attempt: Attempt) -> str:
+    why = f": {attempt.reason}" if attempt.reason else ""
+    return f"{attempt.back_end} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
+
+
+def _session(arguments: argparse.Namespace) -> RobotSession | None:
+    try:
+        return attach(arguments.runtime_base)
+    except UsageError:  # none runs, and none is needed
+        return None
+
+
+def _request(
+    arguments: argparse.Namespace, robot: RobotDescription, session: RobotSession | None
+) -> PlanRequest:
+    command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
+    if session is None:
+        request = PlanRequest(command_id="plan", text=command.text, world=world_of(robot, {}))
+    else:
+        situation = Situation(session.space, session.clock, robot)
+        request = situation.request(command, Conversation())
+    if arguments.scene is None:
+        return request
+    return replace(request, scene=read_scene(arguments.scene))
+
+
+def read_scene(path: Path) -> Snapshot:
+    """Read a scene: the topic's document, or what `vla-deploy scene --json` prints.
+
+    Raises:
+        UsageError: it cannot be read, or is no JSON.
+        SceneUnreadable: it is no scene.
+    """
+    document = read_json(path, "scene")
+    if isinstance(document, dict) and "things" in document:
+        return read_report(document)
+    return read_snapshot(document)
