@@ -9,12 +9,11 @@ from typing import Any, Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Analyser, Question
+from vla_deploy.analysis.question import Analyser, Question, question_about
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.known_world import FRESH_S, running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.dashboard.analysing import question_about
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.supervisor.runtime import default_base

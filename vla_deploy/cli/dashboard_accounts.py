@@ -9,10 +9,8 @@ from typing import Any, Final
 from vla_deploy.cli.dashboard_audit import base_of, note
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import LONGEST, SHORTEST, generated, stored_form
+from vla_deploy.client.access.accounts import Accounts, AccountsFile, Role, User, wall_s
+from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generated, stored_form
 
 ROLES: Final = tuple(role.value for role in Role if role is not Role.ANYONE)
 _FIRST_USER: Final = "admin"

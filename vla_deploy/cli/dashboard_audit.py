@@ -11,9 +11,8 @@ from typing import Any
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome
-from vla_deploy.dashboard.access.identity import Role
+from vla_deploy.client.access.accounts import Role
+from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, Outcome
 from vla_deploy.supervisor.runtime import default_base
 
 

@@ -8,8 +8,7 @@ from vla_deploy.cli.dashboard_accounts import ROLES, accounts_of, date, table, t
 from vla_deploy.cli.dashboard_audit import note
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.dashboard.access.accounts import new_token, wall_s
-from vla_deploy.dashboard.access.identity import Role
+from vla_deploy.client.access.accounts import Role, new_token, wall_s
 
 _DAY_S: Final = 86_400.0
 _MOST_DAYS: Final = 3650

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
-from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profile_change import Outcome
+from vla_deploy.telemetry.robot_state import collect
 
 KEEPS_UP: Final = 0.95
 """Of real time: a twin that is slower is held by somebody."""

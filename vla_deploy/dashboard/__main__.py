@@ -4,10 +4,9 @@ import sys
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from vla_deploy.dashboard.errors import DashboardError
 from vla_deploy.dashboard.node import DashboardNode
 from vla_deploy.dashboard.serving import serve
-from vla_deploy.dashboard.settings import read_settings
+from vla_deploy.runtime.net import NetError, read_settings
 from vla_deploy.runtime.node import Node, NodeContext
 from vla_deploy.runtime.process_main import main
 
@@ -38,4 +37,4 @@ class Dashboard:
 
 if __name__ == "__main__":
     dashboard = Dashboard()
-    sys.exit(main("dashboard", dashboard.build, run=dashboard.run, mendable=(DashboardError,)))
+    sys.exit(main("dashboard", dashboard.build, run=dashboard.run, mendable=(NetError,)))

@@ -6,20 +6,17 @@ costs memory that a dashboard which nobody asks can do without.
 
 from http import HTTPStatus
 from threading import Lock
-from typing import Any, Final
+from typing import Final
 
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.analysis.question import FRESH_S, Analyser, question_about
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.robots import load_robot
-from vla_deploy.world import SceneUnreadable, Viewpoint
+from vla_deploy.world import SceneUnreadable
 
-FRESH_S: Final = 5.0
-_POSE_AGE_S: Final = 1.0
 # One question at a time: threads that wait for their turn are those that other answers need.
 _TURN_WITHIN_S: Final = 2.0
 # A room full of things takes half a second of a core; the dashboard's budget is a fifth of one.
@@ -63,34 +60,6 @@ class Analyst:
             raise _unavailable("no_map", str(error), "vla-deploy map check") from error
         finally:
             self._turn.release()
-
-
-def question_about(
-    link: RobotLink, scene: dict[str, Any], goal: str, image: Image | None = None
-) -> Question:
-    """Return a question about a scene, with where the robot is and what it holds now.
-
-    Raises:
-        SceneUnreadable: the document is no scene.
-    """
-    executor = link.document("executor_status", age_limit_s=FRESH_S) or {}
-    return question_of(
-        scene,
-        now_ns=link.clock.now_ns(),
-        robot=_pose(link),
-        holding=executor.get("holding", {}),
-        image=image,
-        goal=goal,
-    )
-
-
-def _pose(link: RobotLink) -> Viewpoint | None:
-    """Return where the robot is; one that is lost is nowhere."""
-    sample = link.fresh("pose", age_limit_s=_POSE_AGE_S)
-    if sample is None or PlaceState(int(sample.data["state"])) is PlaceState.LOST:
-        return None
-    x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
-    return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
 def _measuring(robot: str) -> Analyser:

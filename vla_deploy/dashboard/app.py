@@ -10,7 +10,7 @@ from vla_deploy.dashboard.headers import SafeHeaders
 from vla_deploy.dashboard.page import add_page_files
 from vla_deploy.dashboard.parts import PARTS
 from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.runtime.net import DashboardSettings
 
 
 def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> FastAPI:

@@ -14,22 +14,6 @@ class DashboardError(Exception):
     """Base of everything that the dashboard raises."""
 
 
-class SettingsInvalid(DashboardError):
-    """List every fault of the settings file."""
-
-    def __init__(self, faults: tuple[str, ...]) -> None:
-        super().__init__("\n".join(faults))
-        self.faults = faults
-
-
-class PortTaken(DashboardError):
-    """Say that no connection can be taken at the wanted address."""
-
-
-class TlsUnusable(DashboardError):
-    """Say what is wrong with certificate or key, and what to try."""
-
-
 class Refused(DashboardError):
     """Refuse a request: an HTTP status, a word for programs, what is wrong, what to try."""
 

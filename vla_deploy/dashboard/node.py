@@ -9,12 +9,11 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
+from vla_deploy.dashboard.doors import SOCKET_NAME, open_socket
 from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import Door
-from vla_deploy.dashboard.settings import DashboardSettings
-from vla_deploy.dashboard.tls import server_context
 from vla_deploy.ipc import CellWriter
+from vla_deploy.runtime.net import DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 

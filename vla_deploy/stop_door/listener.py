@@ -4,10 +4,13 @@ import socket
 import ssl
 from typing import Final
 
-from vla_deploy.dashboard.doors import open_port
-from vla_deploy.dashboard.errors import PortTaken, TlsUnusable
-from vla_deploy.dashboard.settings import DashboardSettings
-from vla_deploy.dashboard.tls import server_context
+from vla_deploy.runtime.net import (
+    DashboardSettings,
+    PortTaken,
+    TlsUnusable,
+    open_port,
+    server_context,
+)
 from vla_deploy.stop_door.errors import DoorClosed
 
 _MAPPED: Final = "::ffff:"

@@ -5,9 +5,8 @@ from collections.abc import Callable
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.dashboard.errors import SettingsInvalid
-from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import SharedSpace, StopButton
+from vla_deploy.runtime.net import DashboardSettings, DashboardSettingsInvalid
 from vla_deploy.stop_door.answering import Answering
 from vla_deploy.stop_door.control_word import ControlWords
 from vla_deploy.stop_door.door import Door
@@ -99,7 +98,7 @@ class StopDoorNode:
         """Read the settings; with a spoilt file the door opens on loopback all the same."""
         try:
             self._settings, self._unsettled = self._read_settings(), ""
-        except SettingsInvalid as error:
+        except DashboardSettingsInvalid as error:
             self._settings, self._unsettled = DEFAULTS, str(error)
             _log.error("%s", error)
 

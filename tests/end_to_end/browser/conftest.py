@@ -25,11 +25,10 @@ from playwright.sync_api import (
 )
 
 from sim_twin.process_stack import ProcessStack
+from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
+from vla_deploy.client.access.passwords import stored_form
 from vla_deploy.dashboard.access import Role
-from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.passwords import stored_form
-from vla_deploy.dashboard.settings import SETTINGS_FILE
+from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.speech.voice.tts import EspeakEngine
 

@@ -6,11 +6,9 @@ import pytest
 
 from vla_deploy.cli import dashboard_accounts, dashboard_audit, dashboard_tokens
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.dashboard.access.accounts import wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.errors import AccountRefused, AccountsUnusable
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import Cost, fits, stored_form
+from vla_deploy.client.access.accounts import AccountsFile, Role, wall_s
+from vla_deploy.client.access.errors import AccountRefused, AccountsUnusable
+from vla_deploy.client.access.passwords import Cost, fits, stored_form
 
 CHEAP = Cost(log2_rounds=10, block=1, parallel=1)
 

@@ -9,14 +9,13 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.access.accounts import AccountsFile
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, AccessRules
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import RingReader, SharedSpace
+from vla_deploy.runtime.net import DashboardSettings
 
 
 class HandClock:

@@ -2,9 +2,8 @@
 
 import pytest
 
-from vla_deploy.dashboard.errors import PortTaken
 from vla_deploy.dashboard.node import DashboardNode
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.runtime.net import DashboardSettings, PortTaken
 from vla_deploy.runtime.node import NodeContext
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.net import DashboardSettings
 from vla_deploy.stop_door.node import StopDoorNode
 
 MOST_STEPS = 40

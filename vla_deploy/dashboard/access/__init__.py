@@ -1,8 +1,10 @@
 """Decide who may see the robot, command it, and change it; anyone may stop it."""
 
+from vla_deploy.client.access.accounts import Role
+from vla_deploy.client.access.errors import AccessError
 from vla_deploy.dashboard.access.access import Access
-from vla_deploy.dashboard.access.errors import AccessError, RequestRefused
-from vla_deploy.dashboard.access.identity import Identity, Role, Way
+from vla_deploy.dashboard.access.errors import RequestRefused
+from vla_deploy.dashboard.access.identity import Identity, Way
 from vla_deploy.dashboard.access.requiring import (
     Admin,
     Anyone,

@@ -12,19 +12,19 @@ from starlette.requests import cookie_parser
 from starlette.types import Receive, Send
 
 from drivers.clock import Clock, MonotonicClock
-from vla_deploy.dashboard.access.accounts import Accounts, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.client.access.accounts import Accounts, AccountsFile, Role, wall_s
+from vla_deploy.client.access.audit_log import AuditLog
+from vla_deploy.client.access.errors import AccountsUnusable
+from vla_deploy.client.access.passwords import DEFAULT_COST, Cost
 from vla_deploy.dashboard.access.asked import Asked
-from vla_deploy.dashboard.access.audit import AuditLog
 from vla_deploy.dashboard.access.errors import (
     AccountsAway,
-    AccountsUnusable,
     CsrfRefused,
     RequestRefused,
     TokenRefused,
     TooMany,
 )
-from vla_deploy.dashboard.access.identity import Identity, Role, Way, nobody
+from vla_deploy.dashboard.access.identity import Identity, Way, nobody
 from vla_deploy.dashboard.access.logins import Logins
 from vla_deploy.dashboard.access.origin import (
     FORWARDED,
@@ -33,7 +33,6 @@ from vla_deploy.dashboard.access.origin import (
     host_name,
     is_loopback_name,
 )
-from vla_deploy.dashboard.access.passwords import DEFAULT_COST, Cost
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.access.rules import AccessRules
 from vla_deploy.dashboard.access.sessions import Sessions

@@ -23,23 +23,7 @@ AccessError
 from typing import ClassVar
 
 
-class AccessError(Exception):
-    """Base of everything that access raises."""
-
-
-class AccountsUnusable(AccessError):
-    """Say what is wrong with the file of accounts."""
-
-
-class AccountRefused(AccessError):
-    """Say why an act on a user or a token cannot be carried out."""
-
-
-class AuditUnusable(AccessError):
-    """Say why the audit log cannot be read."""
-
-
-class RequestRefused(AccessError):
+class RequestRefused(Exception):
     """Say why a request is refused, and what to try; `wait_s` where only time helps."""
 
     status: ClassVar[int] = 403

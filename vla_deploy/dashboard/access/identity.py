@@ -4,28 +4,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from vla_deploy.client.access.accounts import Role
+
 IDENTITY: Final = "identity"
 """The name under which a request's state holds who asks."""
-
-
-class Role(StrEnum):
-    """Name what somebody may do; each may do what those before it may."""
-
-    ANYONE = "anyone"
-    """Whoever reaches the page: press stop, log in."""
-    VIEWER = "viewer"
-    """See everything: state, camera, map, logs, recordings."""
-    OPERATOR = "operator"
-    """Give commands, reset, arm, disarm, acknowledge, record."""
-    ADMIN = "admin"
-    """Change the profile, read the audit log."""
-
-    def allows(self, needed: "Role") -> bool:
-        """Tell whether this role may do what `needed` may."""
-        return _ORDER.index(self) >= _ORDER.index(needed)
-
-
-_ORDER: Final = tuple(Role)
 
 
 class Way(StrEnum):

@@ -4,10 +4,9 @@ import asyncio
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.client.access.accounts import AccountsFile, Role
+from vla_deploy.client.access.passwords import DEFAULT_COST, Cost, fits, nobodys
 from vla_deploy.dashboard.access.errors import LoginFailed, TooMany
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import DEFAULT_COST, Cost, fits, nobodys
 from vla_deploy.dashboard.access.rates import BackOff, BackOffRule
 from vla_deploy.dashboard.access.sessions import Session, Sessions
 

@@ -6,11 +6,12 @@ from typing import Annotated, Final
 from fastapi import Depends, FastAPI
 from starlette.requests import HTTPConnection
 
+from vla_deploy.client.access.accounts import Role
 from vla_deploy.dashboard.access.access import Access
 from vla_deploy.dashboard.access.answers import answer
 from vla_deploy.dashboard.access.errors import LoginNeeded, RequestRefused, RoleTooLow
 from vla_deploy.dashboard.access.guard import AccessGuard
-from vla_deploy.dashboard.access.identity import IDENTITY, Identity, Role
+from vla_deploy.dashboard.access.identity import IDENTITY, Identity
 from vla_deploy.dashboard.access.witness import note_required
 
 Required = Callable[[HTTPConnection], Identity]

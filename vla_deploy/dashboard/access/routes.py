@@ -5,16 +5,12 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from vla_deploy.client.access.accounts import Role
+from vla_deploy.client.access.errors import AccountsUnusable, AuditUnusable
+from vla_deploy.client.access.passwords import LONGEST
 from vla_deploy.dashboard.access.access import Access
 from vla_deploy.dashboard.access.asked import asked_of
-from vla_deploy.dashboard.access.errors import (
-    AccountsAway,
-    AccountsUnusable,
-    AuditAway,
-    AuditUnusable,
-)
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import LONGEST
+from vla_deploy.dashboard.access.errors import AccountsAway, AuditAway
 from vla_deploy.dashboard.access.requiring import Anyone, require
 from vla_deploy.dashboard.access.witness import note
 

@@ -6,7 +6,7 @@ from typing import Final
 from starlette.types import Message, Receive, Send
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.dashboard.access.identity import Role
+from vla_deploy.client.access.accounts import Role
 
 LOOK_NS: Final = 5 * NS_PER_S
 _POLICY_VIOLATION: Final = 1008

@@ -6,10 +6,16 @@ from typing import Any, Final
 from starlette.requests import HTTPConnection
 from starlette.types import Message, Scope, Send
 
+from vla_deploy.client.access.accounts import Role
+from vla_deploy.client.access.audit_log import (
+    STOP_FOLD_S,
+    AuditEntry,
+    AuditLog,
+    Outcome,
+    outcome_of,
+)
 from vla_deploy.dashboard.access.asked import API_PREFIX, WEBSOCKET, Asked
-from vla_deploy.dashboard.access.audit import STOP_FOLD_S, AuditLog
-from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome, outcome_of
-from vla_deploy.dashboard.access.identity import IDENTITY, Identity, Role
+from vla_deploy.dashboard.access.identity import IDENTITY, Identity
 
 NO_ROUTE: Final = "(no route)"
 _DETAILS: Final = "audit_details"

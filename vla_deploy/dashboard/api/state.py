@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter, Depends, Request
 
 from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.robot_state import collect
+from vla_deploy.telemetry.robot_state import collect
 
 router = APIRouter(tags=["state"])
 health = APIRouter(tags=["state"])

@@ -8,6 +8,9 @@ import pytest
 from fastapi import Depends, FastAPI, WebSocket, WebSocketDisconnect
 from starlette.testclient import TestClient
 
+from vla_deploy.client.access.accounts import AccountsFile, User, new_token
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
+from vla_deploy.client.access.passwords import Cost, stored_form
 from vla_deploy.dashboard.access import (
     Access,
     AccessRules,
@@ -18,11 +21,6 @@ from vla_deploy.dashboard.access import (
     guard,
     require,
 )
-from vla_deploy.dashboard.access.accounts import User, new_token
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
-from vla_deploy.dashboard.access.passwords import Cost, stored_form
 from vla_deploy.dashboard.access.routes import router
 
 HERE = "127.0.0.1"

@@ -23,17 +23,15 @@ from schemathesis import GenerationMode
 from starlette.testclient import TestClient
 
 from drivers.clock import MonotonicClock
+from vla_deploy.client.access.accounts import AccountsFile, User, new_token, wall_s
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
+from vla_deploy.client.access.passwords import Cost, stored_form
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, AccessRules, Role
-from vla_deploy.dashboard.access.accounts import User, new_token, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
-from vla_deploy.dashboard.access.passwords import Cost, stored_form
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import RingReader, SharedSpace
 from vla_deploy.ipc.topics import TOPICS, Kind
+from vla_deploy.runtime.net import DashboardSettings
 
 PASSWORD = "the robot wears blue socks"
 BAIT = "what no route may ever show"

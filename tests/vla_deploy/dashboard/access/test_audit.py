@@ -2,10 +2,8 @@ import json
 
 import pytest
 
+from vla_deploy.client.access.audit_log import AuditEntry, AuditFile, AuditLog, Outcome
 from vla_deploy.dashboard.access import Role
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome
-from vla_deploy.dashboard.access.audit_file import AuditFile
 
 ELSEWHERE = "192.168.1.7"
 

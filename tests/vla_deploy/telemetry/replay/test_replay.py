@@ -11,7 +11,6 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.ipc import ReplayOnly, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.telemetry.errors import FlightUnreadable, ReplayRefused
@@ -23,6 +22,7 @@ from vla_deploy.telemetry.replay.feeder import Feeder
 from vla_deploy.telemetry.replay.node import ReplayNode
 from vla_deploy.telemetry.replay.pace import Pace
 from vla_deploy.telemetry.replay.source import Recorded, Source
+from vla_deploy.telemetry.robot_state import collect
 
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 

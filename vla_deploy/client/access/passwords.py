@@ -1,4 +1,4 @@
-"""Turn passwords into what may be stored, and judge them by it."""
+"""Hash passwords with scrypt, and compare passwords with the hash."""
 
 import hashlib
 import hmac

@@ -1,4 +1,4 @@
-"""Collect what the processes of the run tell of themselves."""
+"""Collect what the processes of the run publish about themselves."""
 
 from typing import Any
 
