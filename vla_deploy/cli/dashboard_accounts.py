@@ -9,10 +9,10 @@ from typing import Any, Final
 from vla_deploy.cli.dashboard_audit import base_of, note
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.client.access.accounts import Accounts, AccountsFile, Role, User, wall_s
-from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generated, stored_form
+from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, UserRole, wall_s
+from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generate_password, hash_password
 
-ROLES: Final = tuple(role.value for role in Role if role is not Role.ANYONE)
+ROLES: Final = tuple(role.value for role in UserRole if role is not UserRole.ANYONE)
 _FIRST_USER: Final = "admin"
 
 
@@ -46,12 +46,14 @@ def set_password(arguments: argparse.Namespace) -> int:
         UsageError: the given password is too short or too long.
         AccountRefused: the name is none.
     """
-    password = _given() if arguments.stdin else generated()
-    stored = stored_form(password)
+    password = _given() if arguments.stdin else generate_password()
+    stored = hash_password(password)
 
-    def change(held: Accounts) -> tuple[Accounts, Role]:
+    def change(held: Accounts) -> tuple[Accounts, UserRole]:
         known = held.users.get(arguments.user)
-        role = Role(arguments.role) if arguments.role else known.role if known else Role.ADMIN
+        role = (
+            UserRole(arguments.role) if arguments.role else known.role if known else UserRole.ADMIN
+        )
         user = User(role=role, password=stored, changed_s=wall_s())
         return held.with_user(arguments.user, user), role
 

@@ -11,8 +11,8 @@ from typing import Any
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.client.access.accounts import Role
-from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, Outcome
+from vla_deploy.client.access.accounts import UserRole
+from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
 from vla_deploy.supervisor.runtime import default_base
 
 
@@ -55,14 +55,14 @@ def note(arguments: argparse.Namespace, act: str, **details: Any) -> None:
     user = pwd.getpwuid(os.getuid()).pw_name
     entry = AuditEntry(
         user=f"cli:{user}",
-        role=Role.ADMIN,
+        role=UserRole.ADMIN,
         way="cli",
         address="terminal",
         act=f"dashboard {act}",
-        outcome=Outcome.DONE,
+        outcome=AuditOutcome.DONE,
         details=details,
     )
-    _audit(arguments).tell(entry)
+    _audit(arguments).record(entry)
 
 
 def base_of(arguments: argparse.Namespace) -> Path:

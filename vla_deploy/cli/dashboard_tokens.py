@@ -8,7 +8,7 @@ from vla_deploy.cli.dashboard_accounts import ROLES, accounts_of, date, table, t
 from vla_deploy.cli.dashboard_audit import note
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
-from vla_deploy.client.access.accounts import Role, new_token, wall_s
+from vla_deploy.client.access.accounts import UserRole, new_token, wall_s
 
 _DAY_S: Final = 86_400.0
 _MOST_DAYS: Final = 3650
@@ -56,7 +56,7 @@ def add_token(arguments: argparse.Namespace) -> int:
     if days is not None and not 0.0 < days <= _MOST_DAYS:
         raise UsageError(f"--days {days:g}: expected more than 0, at most {_MOST_DAYS}")
     lasts_s = None if days is None else days * _DAY_S
-    token_id, text, token = new_token(arguments.name, Role(arguments.role), wall_s(), lasts_s)
+    token_id, text, token = new_token(arguments.name, UserRole(arguments.role), wall_s(), lasts_s)
     accounts_of(arguments).change(lambda held: (held.with_token(token_id, token), None))
     note(arguments, "token add", name=arguments.name, role=arguments.role, days=days or "for ever")
     print(f"token {arguments.name} ({arguments.role}); this is shown once:", file=sys.stderr)

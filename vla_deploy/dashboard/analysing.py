@@ -11,8 +11,8 @@ from typing import Final
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.question import FRESH_S, Analyser, question_about
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access.rates import Buckets
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access.rates import TokenBuckets
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.robots import load_robot
 from vla_deploy.world import SceneUnreadable
@@ -30,20 +30,20 @@ class Analyst:
     def __init__(self, link: RobotLink) -> None:
         self._link = link
         self._turn = Lock()
-        self._asked = Buckets(_RATE_HZ, _BURST, link.clock)
+        self._asked = TokenBuckets(_RATE_HZ, _BURST, link.clock)
         self._analyser: Analyser | None = None
 
     def analyse(self, goal: str) -> SceneAnalysis:
         """Return what the geometric analyser makes of the scene, and of a goal in words.
 
         Raises:
-            Refused: nothing is seen, the robot's map cannot be used, or too many ask.
+            ApiError: nothing is seen, the robot's map cannot be used, or too many ask.
         """
         scene = self._link.document("scene", age_limit_s=FRESH_S)
         if scene is None:
             raise _unavailable("no_scene", "perception tells no scene")
         if self._asked.take("") > 0.0:
-            raise Refused(
+            raise ApiError(
                 HTTPStatus.TOO_MANY_REQUESTS,
                 "too_often",
                 "analyses are asked for too often",
@@ -69,5 +69,5 @@ def _measuring(robot: str) -> Analyser:
     return GeometricAnalyser(Abilities.of(load_robot(robot)))
 
 
-def _unavailable(code: str, what: str, try_: str = "vla-deploy status") -> Refused:
-    return Refused(HTTPStatus.SERVICE_UNAVAILABLE, code, what, try_)
+def _unavailable(code: str, what: str, try_: str = "vla-deploy status") -> ApiError:
+    return ApiError(HTTPStatus.SERVICE_UNAVAILABLE, code, what, try_)

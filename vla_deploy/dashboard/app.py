@@ -3,9 +3,9 @@
 from fastapi import FastAPI
 
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, guard
+from vla_deploy.dashboard.access import AccessControl, guard
 from vla_deploy.dashboard.analysing import Analyst
-from vla_deploy.dashboard.answers import add_error_answers
+from vla_deploy.dashboard.errors import add_error_handlers
 from vla_deploy.dashboard.headers import SafeHeaders
 from vla_deploy.dashboard.page import add_page_files
 from vla_deploy.dashboard.parts import PARTS
@@ -13,7 +13,7 @@ from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
 from vla_deploy.runtime.net import DashboardSettings
 
 
-def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> FastAPI:
+def create_app(link: RobotLink, settings: DashboardSettings, access: AccessControl) -> FastAPI:
     """Return the application; `app.state` holds what is given, and what the parts put there.
 
     Whoever serves it steps `app.state.parts`.
@@ -28,7 +28,7 @@ def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> 
     app.state.analyst = Analyst(link)
     app.state.parts = [make(app) for make in PARTS]
     guard(app, access)
-    add_error_answers(app)
+    add_error_handlers(app)
     for router in API_ROUTERS:
         app.include_router(router, prefix=API_PREFIX)
     for router in ROOT_ROUTERS:

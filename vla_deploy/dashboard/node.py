@@ -7,7 +7,7 @@ from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, AccessRules
+from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.doors import SOCKET_NAME, open_socket
 from vla_deploy.dashboard.parts import Part
@@ -39,7 +39,7 @@ class DashboardNode:
         self.doors: tuple[Door, ...] = ()
         self._parts: list[Part] = []
         self._guard = PartGuard(_log)
-        self._access: Access | None = None
+        self._access: AccessControl | None = None
         self._status: CellWriter
         self._due_ns = 0
         self._url = ""
@@ -62,7 +62,7 @@ class DashboardNode:
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
         # People log in, and are kept from guessing, by the wall clock.
         base, rules = self._context.run_dir.parent, _rules(settings)
-        self._access = Access.of_base(base, rules, MonotonicClock())
+        self._access = AccessControl.of_base(base, rules, MonotonicClock())
         self.app = create_app(self.link, settings, self._access)
         self._parts = self.app.state.parts
         self._port = tcp.getsockname()[1]

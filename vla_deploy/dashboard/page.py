@@ -8,13 +8,13 @@ from fastapi.responses import FileResponse, HTMLResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.responses import Response
 
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.stop_address import stop_door_url
 
 STATIC: Final = Path(__file__).with_name("static")
 _STOP_META: Final = 'name="stop-door" content=""'
 
-router = APIRouter(include_in_schema=False, dependencies=[Depends(require(Role.ANYONE))])
+router = APIRouter(include_in_schema=False, dependencies=[Depends(require(UserRole.ANYONE))])
 
 
 class _PageFiles(StaticFiles):

@@ -1,6 +1,6 @@
 """Read where the robot's HTTP servers listen, open their ports, load their certificate.
 
-The standard library alone: the stop door needs it, too.
+It imports the standard library alone, for the stop door.
 """
 
 import errno
@@ -17,7 +17,7 @@ from vla_deploy.runtime.state_dir import config_dir_of
 
 
 class NetError(Exception):
-    """Base of everything that keeps a server of the robot from listening; a person can mend it."""
+    """Base of the errors that keep a server from listening; a person can mend them."""
 
 
 class DashboardSettingsInvalid(NetError):
@@ -38,17 +38,18 @@ class TlsUnusable(NetError):
 
 SETTINGS_FILE: Final = "dashboard.toml"
 _LAST_PORT: Final = 65535
+_BEYOND_GROUP_READ: Final = 0o037
 _ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardSettings:
-    """Say where the dashboard and the stop door listen, and whom they trust.
+    """Configure where the dashboard and the stop door listen, and whom they trust.
 
-    On loopback a request counts as the admin's unless `trust_loopback` is off: switch it off behind
-    a reverse proxy, whose every request comes from there. `allowed_hosts` are names, beside the
-    loopback ones and `host`, by which the page may be called: others are taken for DNS rebinding.
-    `allowed_origins` are those of pages that a proxy serves for the robot: `https://robot.example`.
+    A request from loopback is the admin's unless `trust_loopback` is off: switch it off behind a
+    reverse proxy on this computer. `allowed_hosts` are further names of the robot, besides loopback
+    and `host`; all others are refused as DNS rebinding. `allowed_origins` are those of pages that a
+    proxy serves for the robot, such as `https://robot.example`.
     """
 
     host: str = "127.0.0.1"
@@ -62,13 +63,13 @@ class DashboardSettings:
 
     @property
     def scheme(self) -> str:
-        """Return how both doors are spoken to."""
+        """Return the scheme of both servers' addresses."""
         return "https" if self.tls_certificate else "http"
 
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """Say in words what a key may be, whether a TOML value is, and what it becomes."""
+    """Describe a key: the accepted values in words, the check, and the conversion."""
 
     words: str
     allows: Callable[[Any], bool]
@@ -108,7 +109,7 @@ _RULES: Final[Mapping[str, _Rule]] = {
 
 
 def read_settings(base: Path) -> DashboardSettings:
-    """Return the settings for the runs of a runtime directory; the defaults where there is no file.
+    """Return the settings for the runs of a runtime directory, the defaults without a file.
 
     Raises:
         DashboardSettingsInvalid: the file is no TOML, or has faults; all of them are listed.
@@ -154,9 +155,10 @@ _PAIRS: Final = 200
 
 
 def open_port(host: str, port: int, *, search: bool, before: int | None = None) -> socket.socket:
-    """Listen at a TCP port; where it is taken, `search` on, two by two.
+    """Listen at a TCP port; with `search`, at the next free one in steps of two.
 
-    `before` is the port that an earlier instance had: pages that are open look for it there.
+    `before` is the port of an earlier instance, at which open pages look for this one; it is tried
+    first.
 
     Raises:
         PortTaken: another program listens there, or the address is not this computer's.
@@ -186,18 +188,15 @@ def _listen(host: str, port: int) -> socket.socket:
     family, kind, _, _, address = socket.getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]
-    door = socket.socket(family, kind)
+    listening = socket.socket(family, kind)
     try:
-        door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        door.bind(address)
-        door.listen(BACKLOG)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(BACKLOG)
     except OSError:
-        door.close()
+        listening.close()
         raise
-    return door
-
-
-_OTHERS: int = 0o077
+    return listening
 
 
 def server_context(certificate: str, key: str) -> ssl.SSLContext:
@@ -216,7 +215,7 @@ def server_context(certificate: str, key: str) -> ssl.SSLContext:
                 f"{setting} {path}: {error.strerror}; the robot's user has to be able to read it, "
                 "below /etc/vla-deploy for the service"
             ) from error
-    if Path(key).stat().st_mode & _OTHERS & ~0o040:
+    if Path(key).stat().st_mode & _BEYOND_GROUP_READ:
         raise TlsUnusable(f"tls_key {key}: others may read it, expected: chmod 640 {key}, or 600")
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -231,7 +230,7 @@ def server_context(certificate: str, key: str) -> ssl.SSLContext:
 
 
 def _refuse_password(key: str) -> NoReturn:
-    """Refuse rather than ask: nobody sits at the robot when it starts."""
+    """Refuse instead of asking for it: nobody sits at the robot when it starts."""
     raise TlsUnusable(
         f"tls_key {key}: it needs a password, expected a key without: openssl pkey -in {key}"
     )

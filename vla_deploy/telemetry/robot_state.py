@@ -1,4 +1,4 @@
-"""Collect what the processes of the run publish about themselves."""
+"""Collect the status that the processes of a run publish."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from vla_deploy.navigation.place_judge import Doubt, PlaceState
 
 
 def collect(link: RobotLink) -> dict[str, Any]:
-    """Return everything that the processes tell of themselves; what is silent is null."""
+    """Return the status of every process; null where one is silent."""
     pose = link.fresh("pose", age_limit_s=1.0)
     dashboard = link.document("dashboard_status", age_limit_s=3.0)
     return {

@@ -12,7 +12,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.access.accounts import AccountsFile
 from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, AccessRules
+from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.ipc import RingReader, SharedSpace
 from vla_deploy.runtime.net import DashboardSettings
@@ -96,7 +96,7 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
     clock = MonotonicClock()
     accounts = AccountsFile(tmp_path / "access" / "accounts.json")
     audit = AuditLog(AuditFile(tmp_path / "access" / "audit.jsonl"), clock, now_s=time.monotonic)
-    access = Access(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
+    access = AccessControl(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
     link = RobotLink(run_dir, clock)
     app = create_app(link, DashboardSettings(), access)
     client = TestClient(app, "http://127.0.0.1:8088", client=("127.0.0.1", 50_000))

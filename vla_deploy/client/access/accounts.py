@@ -19,16 +19,16 @@ from typing import Annotated, Final, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from vla_deploy.client.access.errors import AccountRefused, AccountsUnusable
-from vla_deploy.client.access.passwords import is_stored_form
+from vla_deploy.client.access.passwords import is_password_hash
 from vla_deploy.client.access.private_file import give, turn
 from vla_deploy.runtime.state_dir import access_dir_of
 
 
-class Role(StrEnum):
-    """Name what somebody may do; each may do what those before it may."""
+class UserRole(StrEnum):
+    """Name what a user may do; each role includes the roles before it."""
 
     ANYONE = "anyone"
-    """Whoever reaches the page: press stop, log in."""
+    """Without a login: press stop, log in."""
     VIEWER = "viewer"
     """See everything: state, camera, map, logs, recordings."""
     OPERATOR = "operator"
@@ -36,12 +36,12 @@ class Role(StrEnum):
     ADMIN = "admin"
     """Change the profile, read the audit log."""
 
-    def allows(self, needed: "Role") -> bool:
-        """Tell whether this role may do what `needed` may."""
+    def allows(self, needed: "UserRole") -> bool:
+        """Return whether this role includes `needed`."""
         return _ORDER.index(self) >= _ORDER.index(needed)
 
 
-_ORDER: Final = tuple(Role)
+_ORDER: Final = tuple(UserRole)
 
 
 NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
@@ -50,30 +50,30 @@ MOST_TOKENS: Final = 256
 _TOKEN: Final = re.compile(r"vla_([0-9a-f]{8})_([0-9a-f]{64})")
 _ID_BYTES: Final = 4
 _SECRET_BYTES: Final = 32
-# A clock that was set back by less is only corrected; by more, it cannot tell what has expired.
+# A clock that is set back by more than this cannot judge what has expired.
 _CLOCK_SLACK_S: Final = 600.0
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 _STRICT: Final = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-def may_log_in(role: Role) -> Role:
+def may_log_in(role: UserRole) -> UserRole:
     """Return the role of an account or token.
 
     Raises:
-        ValueError: it is that of anyone, which needs neither.
+        ValueError: it is ANYONE, which needs neither.
     """
-    if role is Role.ANYONE:
+    if role is UserRole.ANYONE:
         raise ValueError("expected viewer, operator or admin")
     return role
 
 
 class User(BaseModel):
-    """Hold one account; `password` is what is stored of it, `changed_s` wall-clock seconds."""
+    """Hold one account; `password` is a hash, `changed_s` wall-clock seconds."""
 
     model_config = _STRICT
 
-    role: Annotated[Role, Field(strict=False)]
+    role: Annotated[UserRole, Field(strict=False)]
     password: str
     changed_s: float
 
@@ -82,26 +82,26 @@ class User(BaseModel):
     @field_validator("password")
     @classmethod
     def _is_hashed(cls, text: str) -> str:
-        if not is_stored_form(text):
+        if not is_password_hash(text):
             raise ValueError("expected scrypt$...; set it by: vla-deploy dashboard password")
         return text
 
 
 class Token(BaseModel):
-    """Hold one token; `digest` is all that is stored of its secret, times are wall-clock s."""
+    """Hold one token; `digest` is the hash of its secret, times are wall-clock seconds."""
 
     model_config = _STRICT
 
     name: Name
-    role: Annotated[Role, Field(strict=False)]
+    role: Annotated[UserRole, Field(strict=False)]
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     made_s: float
     expires_s: float | None
 
     _role = field_validator("role")(may_log_in)
 
-    def counts(self, secret: str, now_s: float) -> bool:
-        """Tell whether a secret is this token's, and whether it counts now."""
+    def is_valid(self, secret: str, now_s: float) -> bool:
+        """Return whether a secret is this token's, and the token is valid now."""
         is_own = hmac.compare_digest(_digest(secret), self.digest)
         begun = now_s > self.made_s - _CLOCK_SLACK_S
         return is_own and begun and (self.expires_s is None or now_s < self.expires_s)
@@ -116,22 +116,22 @@ class Accounts(BaseModel):
     tokens: Annotated[dict[str, Token], Field(max_length=MOST_TOKENS)] = {}
 
     def token_of(self, text: str, now_s: float) -> Token | None:
-        """Return the token that a text is, or None when there is none such that counts."""
+        """Return the valid token of a text, or None where there is none."""
         parts = _TOKEN.fullmatch(text)
         token = self.tokens.get(parts[1]) if parts else None
-        return token if parts and token is not None and token.counts(parts[2], now_s) else None
+        return token if parts and token is not None and token.is_valid(parts[2], now_s) else None
 
     def with_user(self, name: str, user: User) -> "Accounts":
-        """Return the accounts with one more, or with one changed.
+        """Return the accounts with one user added or changed.
 
         Raises:
-            AccountRefused: the name is none, or there are as many as there may be.
+            AccountRefused: the name is invalid, or there are too many users.
         """
         _check_name(name)
         return self._with(users={**self.users, name: user})
 
     def without_user(self, name: str) -> "Accounts":
-        """Return the accounts without one.
+        """Return the accounts without one user.
 
         Raises:
             AccountRefused: there is none of that name.
@@ -142,17 +142,17 @@ class Accounts(BaseModel):
         return self._with(users={key: one for key, one in self.users.items() if key != name})
 
     def with_token(self, token_id: str, token: Token) -> "Accounts":
-        """Return the accounts with one more token.
+        """Return the accounts with one token added.
 
         Raises:
-            AccountRefused: another has its name, or there are as many as there may be.
+            AccountRefused: the name is in use, or there are too many tokens.
         """
         if any(one.name == token.name for one in self.tokens.values()):
             raise AccountRefused(f"a token {token.name!r} is there; revoke it, or name another")
         return self._with(tokens={**self.tokens, token_id: token})
 
     def without_token(self, name: str) -> "Accounts":
-        """Return the accounts without a token, which counts no more.
+        """Return the accounts without a token, which is invalid from now on.
 
         Raises:
             AccountRefused: there is none of that name.
@@ -178,11 +178,13 @@ class Accounts(BaseModel):
         )
 
 
-def new_token(name: str, role: Role, now_s: float, lasts_s: float | None) -> tuple[str, str, Token]:
-    """Return a token's id, the text that counts as it and is stored nowhere, and what is stored.
+def new_token(
+    name: str, role: UserRole, now_s: float, lasts_s: float | None
+) -> tuple[str, str, Token]:
+    """Return a token's id, its text, which is stored nowhere, and what is stored.
 
     Raises:
-        AccountRefused: the name is none.
+        AccountRefused: the name is invalid.
     """
     _check_name(name)
     token_id, secret = secrets.token_hex(_ID_BYTES), secrets.token_hex(_SECRET_BYTES)
@@ -197,7 +199,7 @@ def new_token(name: str, role: Role, now_s: float, lasts_s: float | None) -> tup
 
 
 def wall_s() -> float:
-    """Return the wall clock in seconds since 1970: what outlives a boot is dated by it."""
+    """Return the wall clock in seconds since 1970, which dates what outlives a boot."""
     return datetime.now(UTC).timestamp()
 
 
@@ -236,7 +238,7 @@ class AccountsFile:
         Raises:
             AccountsUnusable: it cannot be read, others may read it, or it has faults.
         """
-        with self._told():
+        with self._translated_errors():
             try:
                 found = self.path.stat()
             except FileNotFoundError:
@@ -250,18 +252,18 @@ class AccountsFile:
             return self._accounts
 
     def change(self, act: Callable[[Accounts], tuple[Accounts, T]]) -> T:
-        """Replace the accounts by what `act` makes of them, and return what else it returns.
+        """Replace the accounts by the first value that `act` returns; return its second value.
 
         Raises:
             AccountsUnusable: the file cannot be read or written; it is as it was.
         """
-        with self._told(), turn(self.path.with_suffix(".lock")):
-            accounts, told = act(self.read())
+        with self._translated_errors(), turn(self.path.with_suffix(".lock")):
+            accounts, result = act(self.read())
             _write(self.path, accounts)
-            return told
+            return result
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _translated_errors(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
@@ -285,9 +287,11 @@ def _parse(path: Path) -> Accounts:
         return Accounts.model_validate_json(path.read_bytes())
     except ValidationError as error:
         faults = error.errors(include_url=False, include_input=False)  # the input is secret
-        told = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in faults[:8])
+        faults_text = "; ".join(
+            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in faults[:8]
+        )
         raise AccountsUnusable(
-            f"{path}: {told}; mend it, or delete it and set passwords anew"
+            f"{path}: {faults_text}; mend it, or delete it and set passwords anew"
         ) from None
 
 

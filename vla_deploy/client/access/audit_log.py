@@ -1,4 +1,4 @@
-"""Write every change that was requested to a bounded file of JSON lines."""
+"""Record requested changes in bounded files of JSON lines: who, from where, what, outcome."""
 
 import json
 import logging
@@ -25,19 +25,19 @@ _MOST_LETTERS: Final = 400
 _MOST_DETAILS: Final = 12
 
 
-class Outcome(StrEnum):
-    """Say what became of an act."""
+class AuditOutcome(StrEnum):
+    """Name how an act ended."""
 
     DONE = "done"
     REFUSED = "refused"
     FAILED = "failed"
 
 
-def outcome_of(status: int) -> Outcome:
-    """Return what a status of HTTP means for whoever asked."""
+def outcome_of(status: int) -> AuditOutcome:
+    """Return the outcome of an act by the HTTP status of its answer."""
     if status < 400:
-        return Outcome.DONE
-    return Outcome.REFUSED if status < 500 else Outcome.FAILED
+        return AuditOutcome.DONE
+    return AuditOutcome.REFUSED if status < 500 else AuditOutcome.FAILED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,18 +49,18 @@ class AuditEntry:
     way: str
     address: str
     act: str
-    outcome: Outcome
+    outcome: AuditOutcome
     code: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def kind(self) -> tuple[str, ...]:
-        """Return what entries share that are told once with their number."""
+        """Return what repeated entries have in common, which are recorded once with their count."""
         return (self.user, self.address, self.act, self.outcome, self.code)
 
     def document(self, now_s: float, repeated: int = 0) -> dict[str, Any]:
-        """Return what is written; `repeated` like it came since the last one that was."""
-        told: dict[str, Any] = {
+        """Return the entry as JSON; `repeated` entries like it were left out before."""
+        document: dict[str, Any] = {
             "time": datetime.fromtimestamp(now_s, UTC).isoformat(timespec="milliseconds"),
             "user": self.user,
             "role": self.role,
@@ -70,11 +70,11 @@ class AuditEntry:
             "outcome": str(self.outcome),
         }
         optional = {"code": self.code, "details": _bounded(self.details), "repeated": repeated}
-        return told | {name: value for name, value in optional.items() if value}
+        return document | {name: value for name, value in optional.items() if value}
 
 
 def _bounded(details: Mapping[str, Any]) -> dict[str, Any]:
-    """Return details that fit on a line; numbers stay numbers, everything else becomes text."""
+    """Return details of bounded length; numbers stay numbers, all else becomes text."""
     kept = [one for one in details.items() if one[1] not in ("", None)][:_MOST_DETAILS]
     return {str(name)[:40]: _short(value) for name, value in kept}
 
@@ -98,10 +98,10 @@ class AuditFile:
         self._most_files = most_files
 
     def append(self, document: Mapping[str, Any]) -> None:
-        """Write one line, in one piece.
+        """Append one line by one write.
 
         Raises:
-            OSError: it cannot be written, such as for a full disk.
+            OSError: it cannot be written, as on a full disk.
         """
         line = json.dumps(document, separators=(",", ":")).encode() + b"\n"
         with turn(self.path.with_suffix(".lock")):
@@ -154,7 +154,7 @@ class AuditFile:
 
 AUDIT_FILE: Final = "audit.jsonl"
 FOLD_S: Final = 60.0
-"""Refusals of the same act to the same address are told once in this time, with their number."""
+"""Refusals of one act to one address are recorded once within this time, with their count."""
 STOP_FOLD_S: Final = 1.0
 _MOST_KINDS: Final = 1024
 _MOST_WAITING: Final = 256
@@ -162,7 +162,7 @@ _log = logging.getLogger(__name__)
 
 
 class AuditLog:
-    """Tell who did what; a full or slow disk holds nobody up, and what it cost is counted."""
+    """Record acts without waiting for the disk; entries that a full disk loses are counted."""
 
     def __init__(
         self,
@@ -185,9 +185,9 @@ class AuditLog:
         """Return the audit log of the robot that runs in a runtime directory."""
         return cls(AuditFile(access_dir_of(base) / AUDIT_FILE), clock, executor)
 
-    def tell(self, entry: AuditEntry, fold_s: float = 0.0) -> None:
-        """Write one entry, or count it where one like it was written less than `fold_s` ago."""
-        fold_s = FOLD_S if entry.outcome is Outcome.REFUSED else fold_s
+    def record(self, entry: AuditEntry, fold_s: float = 0.0) -> None:
+        """Write one entry, or count it where one like it was written within `fold_s`."""
+        fold_s = FOLD_S if entry.outcome is AuditOutcome.REFUSED else fold_s
         with self._lock:
             repeated = self._fold(entry, fold_s) if fold_s else 0
             if repeated is None:
@@ -208,15 +208,15 @@ class AuditLog:
         return self._file.newest(count)
 
     def close(self) -> None:
-        """Write what waits."""
+        """Write the entries that wait."""
         self._executor.shutdown()
 
     def _fold(self, entry: AuditEntry, fold_s: float) -> int | None:
-        """Return how many like it were left out before, None where this one is left out."""
+        """Return how many like it were left out before, None to leave this one out."""
         now_ns = self._clock.now_ns()
-        told_ns, left_out = self._folded.pop(entry.kind, (0, 0))
-        is_first = not told_ns or now_ns - told_ns > fold_s * NS_PER_S
-        self._folded[entry.kind] = (now_ns, 0) if is_first else (told_ns, left_out + 1)
+        recorded_ns, left_out = self._folded.pop(entry.kind, (0, 0))
+        is_first = not recorded_ns or now_ns - recorded_ns > fold_s * NS_PER_S
+        self._folded[entry.kind] = (now_ns, 0) if is_first else (recorded_ns, left_out + 1)
         while len(self._folded) > _MOST_KINDS:
             self._folded.popitem(last=False)
         return left_out if is_first else None

@@ -17,7 +17,7 @@ _MOST_BYTES: Final = 64 * 2**20
 _STORED: Final = re.compile(
     r"scrypt\$(1[0-7])\$([1-9]|1[0-6])\$([1-9]|1[0-6])\$([A-Za-z0-9+/=]+)\$([A-Za-z0-9+/=]+)"
 )
-_LETTERS: Final = "abcdefghijkmnpqrstuvwxyz23456789"  # none that is read as another
+_LETTERS: Final = "abcdefghijkmnpqrstuvwxyz23456789"  # without look-alikes
 _GROUPS: Final = 5
 _GROUP_LETTERS: Final = 4
 _one_at_a_time = threading.Lock()
@@ -25,7 +25,7 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """Say what trying a password costs: 2 to the power of `log2_rounds`, blocks, repetitions.
+    """Set the cost of one password hash: log2 of scrypt's N, its r and its p.
 
     The default is OWASP's for little memory: 16 MiB and a quarter of a second on a small board.
     """
@@ -38,7 +38,7 @@ class Cost:
 DEFAULT_COST: Final = Cost()
 
 
-def generated() -> str:
+def generate_password() -> str:
     """Return a password of 100 random bits that a person can read out and type."""
     groups = (
         "".join(secrets.choice(_LETTERS) for _ in range(_GROUP_LETTERS)) for _ in range(_GROUPS)
@@ -46,19 +46,19 @@ def generated() -> str:
     return "-".join(groups)
 
 
-def stored_form(password: str, cost: Cost = DEFAULT_COST) -> str:
-    """Return what is stored of a password: cost, salt and key, from which it cannot be found."""
+def hash_password(password: str, cost: Cost = DEFAULT_COST) -> str:
+    """Return the hash of a password: cost, salt and key as text."""
     salt = secrets.token_bytes(_SALT_BYTES)
     return _written(cost, salt, _key(password, salt, cost))
 
 
-def nobodys(cost: Cost = DEFAULT_COST) -> str:
-    """Return the stored form of a password that nobody knows."""
+def unmatchable_hash(cost: Cost = DEFAULT_COST) -> str:
+    """Return a hash that no password matches, at the same cost."""
     return _written(cost, secrets.token_bytes(_SALT_BYTES), secrets.token_bytes(_KEY_BYTES))
 
 
-def fits(password: str, stored: str) -> bool:
-    """Tell whether a password is the one of a stored form; takes a quarter of a second."""
+def matches(password: str, stored: str) -> bool:
+    """Return whether a password has this hash; takes a quarter of a second."""
     parts = _parts(stored)
     if parts is None:
         return False
@@ -66,8 +66,8 @@ def fits(password: str, stored: str) -> bool:
     return hmac.compare_digest(_key(password, salt, cost), key)
 
 
-def is_stored_form(text: str) -> bool:
-    """Tell whether a text is like what `stored_form` returns, and may be computed here."""
+def is_password_hash(text: str) -> bool:
+    """Return whether a text is a hash of `hash_password` at an acceptable cost."""
     return _parts(text) is not None
 
 
@@ -83,7 +83,7 @@ def _parts(text: str) -> tuple[Cost, bytes, bytes] | None:
     log2_rounds, block, parallel = (int(found[number]) for number in (1, 2, 3))
     try:
         salt, key = b64decode(found[4], validate=True), b64decode(found[5], validate=True)
-    except ValueError:  # letters of that alphabet, but not so many
+    except ValueError:  # the right alphabet, the wrong length
         return None
     is_small = 128 * block * (2**log2_rounds + parallel + 2) < _MOST_BYTES
     is_whole = len(key) == _KEY_BYTES and len(salt) >= _SALT_BYTES
@@ -92,7 +92,7 @@ def _parts(text: str) -> tuple[Cost, bytes, bytes] | None:
 
 
 def _key(password: str, salt: bytes, cost: Cost) -> bytes:
-    with _one_at_a_time:  # many logins at once take time, not memory
+    with _one_at_a_time:  # parallel logins take time, not memory
         return hashlib.scrypt(
             password.encode(errors="surrogatepass"),
             salt=salt,

@@ -13,7 +13,7 @@ _SAFE: Final = os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 def open_private(path: Path, flags: int) -> int:
-    """Open a file that only its owner may read, made where it is missing; return its handle.
+    """Open a file that only its owner may read, create it where it is missing; return its handle.
 
     Raises:
         OSError: it cannot be opened, or is a link.
@@ -40,14 +40,14 @@ def turn(lock: Path) -> Iterator[None]:
 
 
 def give(handle: int, folder: Path) -> None:
-    """Leave a file that root writes to whom its folder belongs: the robot reads it."""
+    """Give a file that root writes to the folder's owner, as whom the robot reads it."""
     owner = folder.stat()
     if os.getuid() == 0 and owner.st_uid != 0:
         os.fchown(handle, owner.st_uid, owner.st_gid)
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder that only its owner may open, who is that of the folder above.
+    """Make a folder that only its owner may open, who is the owner of the folder above.
 
     Raises:
         OSError: it cannot be made.

@@ -5,14 +5,14 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Query, Request
 
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import UserRole, require
 
 router = APIRouter(tags=["state"])
 
 _LONGEST_GOAL: Final = 500
 
 
-@router.get("/analysis", dependencies=[Depends(require(Role.VIEWER))])
+@router.get("/analysis", dependencies=[Depends(require(UserRole.VIEWER))])
 def get_analysis(
     request: Request,
     goal: Annotated[

@@ -8,14 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import CommandRecord
-from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, note, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 
-_Viewer: Final = Depends(require(Role.VIEWER))
-_Operator: Final = Depends(require(Role.OPERATOR))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
+_Operator: Final = Depends(require(UserRole.OPERATOR))
 CommandId = Annotated[str, Path(max_length=128)]
 _Words = Annotated[str, Field(min_length=1, max_length=MOST_CHARACTERS)]
 
@@ -80,7 +80,7 @@ async def cancel(command_id: CommandId, request: Request) -> Given:
     """Cancel a command that has not ended: the robot comes to rest, and drops all that waits."""
     standing = _found(request, command_id).standing
     if standing.is_final:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.CONFLICT,
             "ended",
             f"command {command_id} has already ended: {standing}",
@@ -103,7 +103,7 @@ def _history(request: Request) -> CommandHistory:
 def _found(request: Request, command_id: str) -> CommandRecord:
     record = _history(request).find(command_id)
     if record is None:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_command",
             f"no command {command_id!r} among the newest {MOST_COMMANDS}",

@@ -9,11 +9,11 @@ from typing import Any, Final
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import FileResponse
 
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 
-router = APIRouter(tags=["recordings"], dependencies=[Depends(require(Role.VIEWER))])
+router = APIRouter(tags=["recordings"], dependencies=[Depends(require(UserRole.VIEWER))])
 
 MCAP: Final = "application/octet-stream"
 
@@ -48,12 +48,12 @@ def handed_out(name: str, known: Iterable[Path], where: str) -> FileResponse:
     """Return the file of that name among the known ones: a name is compared, never followed.
 
     Raises:
-        Refused: there is none.
+        ApiError: there is none.
     """
     for path in known:
         if path.name == name and path.is_file() and not path.is_symlink():
             return FileResponse(path, filename=path.name, media_type=MCAP)
-    raise Refused(HTTPStatus.NOT_FOUND, "no_such_file", f"no file {name!r:.120}", where)
+    raise ApiError(HTTPStatus.NOT_FOUND, "no_such_file", f"no file {name!r:.120}", where)
 
 
 def _flights(request: Request) -> list[Path]:

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Query, Request
 
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.supervisor.log_files import newest_lines, processes_in
 
-router = APIRouter(tags=["logs"], dependencies=[Depends(require(Role.VIEWER))])
+router = APIRouter(tags=["logs"], dependencies=[Depends(require(UserRole.VIEWER))])
 
 MOST_LINES: Final = 1000
 
@@ -37,12 +37,12 @@ def logs(
     """Return the newest lines, older than `before`; of one process, or of all by time.
 
     Raises:
-        Refused: no process of that name has logged.
+        ApiError: no process of that name has logged.
     """
     folder = request.app.state.link.run_dir / LOGS_DIR
     names = processes_in(folder)
     if process and process not in names:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_process",
             f"no log of {process!r}; there are {', '.join(names)}",

@@ -7,15 +7,15 @@ from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from vla_deploy.client.acts import why_not
-from vla_deploy.dashboard.access import Role, note, require
+from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.acts import carried_out
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.ipc.stop_button import ESTOP
 
 router = APIRouter(tags=["operate"])
 
 _WITHIN_S: Final = 3.0
-_Operator: Final = Depends(require(Role.OPERATOR))
+_Operator: Final = Depends(require(UserRole.OPERATOR))
 
 
 class Why(BaseModel):
@@ -32,7 +32,7 @@ class Pressed(BaseModel):
     pressed: bool = True
 
 
-@router.post("/stop", dependencies=[Depends(require(Role.ANYONE))])
+@router.post("/stop", dependencies=[Depends(require(UserRole.ANYONE))])
 async def stop(request: Request, why: Why | None = None) -> Pressed:
     """Press the software stop, which latches; it needs no login, and no body."""
     reason = why.reason if why else ""
@@ -66,5 +66,5 @@ async def _act(request: Request, act: str, why: Why | None) -> dict[str, Any]:
     note(request, reason=reason)
     is_done, status = await carried_out(link, act, _WITHIN_S)
     if not is_done:
-        raise Refused(HTTPStatus.CONFLICT, f"no_{act}", why_not(status), "see the robot's state")
+        raise ApiError(HTTPStatus.CONFLICT, f"no_{act}", why_not(status), "see the robot's state")
     return {"act": act, "control": status}

@@ -10,13 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from platforms.errors import ProfileError
 from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
-from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, note, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.supervisor.profile_choice import detect
 
 router = APIRouter(prefix="/profile", tags=["profile"])
 
-_Viewer: Final = Depends(require(Role.VIEWER))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
 _TO_INHERIT_FROM: Final = "base"
 
 
@@ -55,13 +55,13 @@ def difference(name: str, request: Request) -> dict[str, Any]:
     """Return per key what is in force and what the named profile says, where they differ.
 
     Raises:
-        Refused: there is no such profile, nobody tells which one is in force, or a file of theirs
+        ApiError: there is no such profile, nobody tells which one is in force, or a file of theirs
             cannot be read, as that of an own profile that was moved meanwhile.
     """
     told = _told(request)
     _check(name, told)
     if told is None:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.SERVICE_UNAVAILABLE,
             "no_profile",
             "the supervisor does not tell which profile is in force",
@@ -76,7 +76,7 @@ def difference(name: str, request: Request) -> dict[str, Any]:
     }
 
 
-@router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[Depends(require(Role.ADMIN))])
+@router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[Depends(require(UserRole.ADMIN))])
 async def use(wanted: Wanted, request: Request) -> Asked:
     """Take the robot to another profile; it goes back by itself when that does not work."""
     _check(wanted.name, _told(request))
@@ -110,7 +110,7 @@ def _values(name: str) -> dict[str, Any]:
     try:
         return dict(flat(read_source(name).values))
     except ProfileError as error:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.CONFLICT, "profile_unreadable", str(error), f"vla-deploy profile show {name}"
         ) from error
 
@@ -126,7 +126,7 @@ def _check(name: str, told: dict[str, Any] | None) -> None:
     """Accept what is offered: any other path would read any file."""
     names = _names(told)
     if name not in names:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_profile",
             f"no profile {name!r:.120}; there are {', '.join(names)}",

@@ -7,9 +7,9 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.api.files import described, handed_out
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
@@ -18,8 +18,8 @@ from vla_deploy.telemetry.recording.request import LONGEST_S, STOP, RecordingWis
 router = APIRouter(tags=["recordings"])
 
 _STATUS_AGE_S: Final = 3.0
-_Viewer: Final = Depends(require(Role.VIEWER))
-_Operator: Final = Depends(require(Role.OPERATOR))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
+_Operator: Final = Depends(require(UserRole.OPERATOR))
 _Pattern = Annotated[str, Field(min_length=1, max_length=60)]
 
 
@@ -76,7 +76,7 @@ def start(request: Request, wanted: Wanted | None = None) -> Asked:
             [channel.topic for channel in ALL_CHANNELS],
         )
     except RecordingRefused as refusal:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.UNPROCESSABLE_ENTITY,
             "no_such_topic",
             str(refusal),

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
 
 router = APIRouter(tags=["replay"])
 
@@ -30,12 +30,12 @@ class Asked(BaseModel):
     asked: bool = True
 
 
-@router.post("/replay", dependencies=[Depends(require(Role.OPERATOR))])
+@router.post("/replay", dependencies=[Depends(require(UserRole.OPERATOR))])
 def replay(request: Request, asked: ReplayAct) -> Asked:
     """Ask the replay; 409 where a robot runs."""
     link: Any = request.app.state.link
     if link.document("replay_status", _STATUS_AGE_S) is None:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.CONFLICT,
             "no_replay",
             "nothing is replayed here",

@@ -6,14 +6,14 @@ from typing import Any
 
 from fastapi import APIRouter, Depends, Request
 
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.telemetry.robot_state import collect
 
 router = APIRouter(tags=["state"])
 health = APIRouter(tags=["state"])
 
 
-@router.get("/state", dependencies=[Depends(require(Role.VIEWER))])
+@router.get("/state", dependencies=[Depends(require(UserRole.VIEWER))])
 async def get_state(request: Request) -> dict[str, Any]:
     """Return what every process tells of itself; what is silent is null."""
     told = collect(request.app.state.link)
@@ -24,7 +24,7 @@ async def get_state(request: Request) -> dict[str, Any]:
     }
 
 
-@health.get("/healthz", dependencies=[Depends(require(Role.ANYONE))])
+@health.get("/healthz", dependencies=[Depends(require(UserRole.ANYONE))])
 async def get_health() -> dict[str, bool]:
     """Say that the dashboard answers; of the robot it says nothing."""
     return {"answers": True}

@@ -5,13 +5,13 @@ from typing import Any, Final
 
 from fastapi import APIRouter, Depends, Request, Response
 
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.dashboard.live.camera import CameraFeed
 from vla_deploy.dashboard.live.still import Still
 from vla_deploy.navigation.errors import MapInvalid
 
-router = APIRouter(tags=["robot"], dependencies=[Depends(require(Role.VIEWER))])
+router = APIRouter(tags=["robot"], dependencies=[Depends(require(UserRole.VIEWER))])
 
 _UNCHANGED_S: Final = 60
 _KEPT: Final = {"cache-control": f"private, max-age={_UNCHANGED_S}"}
@@ -52,7 +52,7 @@ async def camera(request: Request) -> Response:
     picture = feed.newest()
     if picture is None:
         what = "the camera has given no picture yet"
-        raise Refused(HTTPStatus.NOT_FOUND, "no_picture", what, "vla-deploy status")
+        raise ApiError(HTTPStatus.NOT_FOUND, "no_picture", what, "vla-deploy status")
     headers = {"cache-control": "no-store"}
     return Response(picture.jpeg, media_type="image/jpeg", headers=headers)
 
@@ -62,5 +62,5 @@ def _still(request: Request) -> Still:
     return still
 
 
-def _no_map(error: MapInvalid) -> Refused:
-    return Refused(HTTPStatus.NOT_FOUND, "no_map", str(error), "vla-deploy map check")
+def _no_map(error: MapInvalid) -> ApiError:
+    return ApiError(HTTPStatus.NOT_FOUND, "no_map", str(error), "vla-deploy map check")

@@ -11,13 +11,13 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response, StreamingResponse
 from numpy.typing import NDArray
 
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.telemetry.diagnostics import diagnostics
 from vla_deploy.telemetry.metrics import METRICS, METRICS_BY_NAME, Readings, expose
 from vla_deploy.telemetry.trends import KEPT, LEVELS, Trends, TrendStore, level_for, unit_of
 
-_Viewer: Final = Depends(require(Role.VIEWER))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
 router = APIRouter(tags=["metrics"], dependencies=[_Viewer])
 scraped = APIRouter(tags=["metrics"], dependencies=[_Viewer])
 
@@ -117,7 +117,7 @@ async def _told(head: dict[str, Any], names: list[str], trends: Trends) -> Async
 def _store(request: Request) -> TrendStore:
     part = request.app.state.metering
     if part.store is None:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.SERVICE_UNAVAILABLE,
             "no_history",
             part.why_not or "the dashboard is being stopped",
@@ -132,7 +132,7 @@ def _chosen(store: TrendStore, asked: str) -> list[str]:
     wanted = list(dict.fromkeys(name.strip() for name in asked.split(",")))
     unknown = [name for name in wanted if name.partition("/")[0] not in KEPT]
     if unknown or len(wanted) > _MOST_NAMES:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_series",
             f"no history of {unknown[0][:80]!r}" if unknown else f"more than {_MOST_NAMES} names",

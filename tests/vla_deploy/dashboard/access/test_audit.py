@@ -2,13 +2,13 @@ import json
 
 import pytest
 
-from vla_deploy.client.access.audit_log import AuditEntry, AuditFile, AuditLog, Outcome
-from vla_deploy.dashboard.access import Role
+from vla_deploy.client.access.audit_log import AuditEntry, AuditFile, AuditLog, AuditOutcome
+from vla_deploy.dashboard.access import UserRole
 
 ELSEWHERE = "192.168.1.7"
 
 
-def entry(act="POST /x", outcome=Outcome.DONE, **changes):
+def entry(act="POST /x", outcome=AuditOutcome.DONE, **changes):
     told = {"user": "ann", "role": "admin", "way": "session", "address": ELSEWHERE}
     return AuditEntry(act=act, outcome=outcome, **{**told, **changes})
 
@@ -88,7 +88,7 @@ def test_nothing_that_somebody_sends_makes_a_line_of_its_own(tmp_path, text):
 def test_the_files_stay_small_and_few_and_the_newest_stay(tmp_path, hand_clock):
     log = AuditLog(AuditFile(tmp_path / "audit.jsonl", 2000, 3), hand_clock, now_s=lambda: 0.0)
     for number in range(100):
-        log.tell(entry(act=f"POST /{number}"))
+        log.record(entry(act=f"POST /{number}"))
     files = list(tmp_path.glob("audit.jsonl*"))
     assert len(files) == 3
     assert sum(file.stat().st_size for file in files) <= 6000
@@ -108,11 +108,11 @@ def test_what_could_not_be_written_is_counted(tmp_path, hand_clock, caplog):
     file = AuditFile(tmp_path / "audit.jsonl")
     log = AuditLog(file, hand_clock, now_s=lambda: 0.0)
     file.path.mkdir()
-    log.tell(entry())
-    log.tell(entry())
+    log.record(entry())
+    log.record(entry())
     assert "missing in the audit log" in caplog.text
     file.path.rmdir()
-    log.tell(entry())
+    log.record(entry())
     (told,) = log.newest(10)
     assert told["lost"] == 2
 
@@ -122,7 +122,7 @@ def test_a_link_in_its_place_is_not_followed(tmp_path, hand_clock, caplog):
     aim.write_text("")
     file = AuditFile(tmp_path / "audit.jsonl")
     file.path.symlink_to(aim)
-    AuditLog(file, hand_clock, now_s=lambda: 0.0).tell(entry())
+    AuditLog(file, hand_clock, now_s=lambda: 0.0).record(entry())
     assert aim.read_text() == ""
     assert "missing in the audit log" in caplog.text
 
@@ -136,6 +136,6 @@ def test_an_admin_reads_it(world):
 
 def test_nobody_else_does(world):
     made = world()
-    token = made.add_token("eyes", Role.OPERATOR)
+    token = made.add_token("eyes", UserRole.OPERATOR)
     asked = {"authorization": f"Bearer {token}"}
     assert made.client(ELSEWHERE).get("/api/v1/audit", headers=asked).status_code == 403

@@ -13,10 +13,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from drivers.clock import MonotonicClock
-from vla_deploy.dashboard.access import Role, connections
+from vla_deploy.dashboard.access import UserRole, connections
 from vla_deploy.dashboard.access.connections import Connections
-from vla_deploy.dashboard.access.peer import Peer, peer_at
-from vla_deploy.dashboard.access.tenure import LOOK_NS
+from vla_deploy.dashboard.access.identity import Peer, peer_at
+from vla_deploy.dashboard.access.session_expiry import CHECK_NS
 from vla_deploy.dashboard.serving import Door, serve
 
 FAR = peer_at("192.168.1.7")
@@ -197,13 +197,13 @@ def test_a_page_of_another_site_gets_no_websocket(robot):
 
 
 def test_a_websocket_ends_with_the_token_that_opened_it(robot):
-    token = robot.world.add_token("eyes", Role.VIEWER)
+    token = robot.world.add_token("eyes", UserRole.VIEWER)
     url = f"ws://127.0.0.1:{robot.port}/api/v1/echo"
     with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as echo:
         echo.send("one")
         assert echo.recv() == "one"
         robot.world.access.accounts.change(lambda held: (held.without_token("eyes"), None))
-        robot.world.clock.pass_s(LOOK_NS / 1e9)
+        robot.world.clock.pass_s(CHECK_NS / 1e9)
         with pytest.raises(ConnectionClosed) as closed:
             echo.send("two")
             echo.recv()

@@ -12,7 +12,7 @@ from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.live import LiveHub, Message, Moment, endpoint, json_message
 from vla_deploy.dashboard.live.wire import LiveProtocol
 from vla_deploy.ipc import SharedSpace
@@ -100,7 +100,7 @@ def serve() -> Any:
         app = FastAPI()
         app.state.live = hub
         app.include_router(endpoint.router)
-        app.dependency_overrides[require(Role.VIEWER)] = lambda: None
+        app.dependency_overrides[require(UserRole.VIEWER)] = lambda: None
         if prepare is not None:
             prepare(app)
         config = uvicorn.Config(

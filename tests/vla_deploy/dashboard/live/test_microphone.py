@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 from drivers.clock import MonotonicClock
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Identity, Role, Way, require
+from vla_deploy.dashboard.access import AuthMethod, Identity, UserRole, require
 from vla_deploy.dashboard.live import microphone
 from vla_deploy.dashboard.live.microphone import PageMicrophones
 from vla_deploy.ipc import SharedSpace
@@ -51,8 +51,8 @@ def run(rig: Rig, serve: Any, make_hub: Any) -> Callable[[Any], None]:
     def prepare(app: Any) -> None:
         app.state.microphones = rig.microphones
         app.include_router(microphone.router)
-        who = Identity(role=Role.OPERATOR, user="anna", way=Way.SESSION, address="")
-        app.dependency_overrides[require(Role.OPERATOR)] = lambda: who
+        who = Identity(role=UserRole.OPERATOR, user="anna", way=AuthMethod.SESSION, address="")
+        app.dependency_overrides[require(UserRole.OPERATOR)] = lambda: who
 
     async def serving(talk: Any) -> None:
         async with serve(make_hub(), prepare=prepare) as served:
