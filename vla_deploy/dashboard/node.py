@@ -9,9 +9,8 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.doors import SOCKET_NAME, open_socket
 from vla_deploy.dashboard.parts import Part
-from vla_deploy.dashboard.serving import Door
+from vla_deploy.dashboard.serving import SOCKET_NAME, Door, open_socket
 from vla_deploy.ipc import CellWriter
 from vla_deploy.runtime.net import DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext

@@ -1,4 +1,4 @@
-"""Serve one application at several doors, and step the node beside it, in one event loop."""
+"""Serve one application at several sockets, and step the node, in one event loop."""
 
 import asyncio
 import contextlib
@@ -7,6 +7,7 @@ import socket
 import ssl
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import uvicorn
@@ -19,8 +20,33 @@ from vla_deploy.dashboard.access.connections import (
     Connections,
     bounded_by,
 )
-from vla_deploy.dashboard.live.wire import LiveProtocol
+from vla_deploy.dashboard.live.endpoint import LiveProtocol
+from vla_deploy.ipc.doorbell import short_path
+from vla_deploy.runtime.net import BACKLOG, PortTaken
 from vla_deploy.runtime.node import Node
+
+SOCKET_NAME: Final = "dashboard.sock"
+_SOCKET_MODE: Final = 0o660
+
+
+def open_socket(path: Path) -> socket.socket:
+    """Listen at a Unix socket, which only owner and group may use.
+
+    Raises:
+        PortTaken: it cannot be made.
+    """
+    door = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        path.unlink(missing_ok=True)  # an earlier instance of this run left it
+        with short_path(path.parent) as folder:
+            door.bind(f"{folder}/{path.name}")
+        path.chmod(_SOCKET_MODE)
+    except OSError as error:
+        door.close()
+        raise PortTaken(f"{path}: cannot listen there: {error}") from error
+    door.listen(BACKLOG)
+    return door
+
 
 GOODBYE_S: Final = 1  # for requests that are under way at the end
 _KEEP_ALIVE_S: Final = 10

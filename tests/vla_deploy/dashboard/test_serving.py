@@ -4,7 +4,7 @@ import stat
 
 import pytest
 
-from vla_deploy.dashboard.doors import open_socket
+from vla_deploy.dashboard.serving import open_socket
 from vla_deploy.runtime.net import PortTaken
 
 

@@ -1,32 +1,32 @@
-"""Find processes that are gone, that come and go, or that write too seldom or nonsense."""
+"""Find processes that are lost, restarted or silent, and topics with invalid values."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from vla_deploy.dashboard.alarms.finding import Finding, Severity
-from vla_deploy.dashboard.alarms.told import Document, Told
-from vla_deploy.ipc import BY_NAME
+from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
+from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
+from vla_deploy.ipc import BY_NAME, TOPICS, Kind, Topic
 from vla_deploy.supervisor.lifecycle import State
 from vla_deploy.supervisor.table import TABLE, GivingUp
 
-GIVEN_UP: Final[Mapping[GivingUp, Severity]] = {
-    GivingUp.END_RUN: Severity.CRITICAL,
-    GivingUp.NO_COMMANDS: Severity.ERROR,
-    GivingUp.CARRY_ON: Severity.WARNING,
+GIVEN_UP: Final[Mapping[GivingUp, AlarmSeverity]] = {
+    GivingUp.END_RUN: AlarmSeverity.CRITICAL,
+    GivingUp.NO_COMMANDS: AlarmSeverity.ERROR,
+    GivingUp.CARRY_ON: AlarmSeverity.WARNING,
 }
 _AGAIN: Final = (State.BACKOFF.value, State.ABORTING.value)
 _WHAT_IT_MEANS: Final = {spec.name: spec.giving_up for spec in TABLE}
 
 
-def silent_supervisor(told: Told) -> Iterator[Finding]:
+def silent_supervisor(robot: RobotStatus) -> Iterator[AlarmFinding]:
     """Find a supervisor that no longer tells what runs: control stops the robot for it, too."""
-    age_s, limit_s = told.age_s("process_table"), BY_NAME["process_table"].deadline_s
+    age_s, limit_s = robot.age_s("process_table"), BY_NAME["process_table"].deadline_s
     if age_s is not None and age_s > limit_s:
-        yield Finding(
+        yield AlarmFinding(
             process="supervisor",
             field="process_table",
             text="the supervisor is silent: nobody restarts what fails",
-            severity=Severity.CRITICAL,
+            severity=AlarmSeverity.CRITICAL,
             advice="vla-deploy status; where the run has ended, start it anew",
             measured=age_s,
             limit=limit_s,
@@ -35,31 +35,31 @@ def silent_supervisor(told: Told) -> Iterator[Finding]:
         )
 
 
-def lost_processes(told: Told) -> Iterator[Finding]:
+def lost_processes(robot: RobotStatus) -> Iterator[AlarmFinding]:
     """Find processes that were given up, and those that are being started again."""
-    for row in _rows(told):
+    for row in _rows(robot):
         if row["state"] == State.GIVEN_UP.value:
             yield _given_up(row)
         elif row["state"] in _AGAIN or _is_starting_again(row):
             yield _started_again(row)
 
 
-def odd_topics(told: Told) -> Iterator[Finding]:
+def odd_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
     """Find what the supervisor's watch says: too few values, and such as cannot be."""
-    for row in _rows(told):
+    for row in _rows(robot):
         for topic in row["topics"] if row["state"] == State.READY.value else ():
             yield from _seldom(row["name"], topic)
             yield from _nonsense(row["name"], topic)
 
 
-def _rows(told: Told) -> tuple[Document, ...]:
-    table = told.document("process_table")
+def _rows(robot: RobotStatus) -> tuple[Document, ...]:
+    table = robot.document("process_table")
     return () if table is None else tuple(table["processes"])
 
 
-def _given_up(row: Document) -> Finding:
+def _given_up(row: Document) -> AlarmFinding:
     meaning = _WHAT_IT_MEANS.get(row["name"], GivingUp.CARRY_ON)
-    return Finding(
+    return AlarmFinding(
         process=row["name"],
         field="state",
         text=f"{row['name']} was given up: {row['reason']}; {meaning.value}",
@@ -75,12 +75,12 @@ def _is_starting_again(row: Document) -> bool:
     return row["state"] == State.STARTING.value and bool(row["restarts"])
 
 
-def _started_again(row: Document) -> Finding:
-    return Finding(
+def _started_again(row: Document) -> AlarmFinding:
+    return AlarmFinding(
         process=row["name"],
         field="restarts",
         text=f"{row['name']} is started again: {row['reason'] or 'it ended'}",
-        severity=Severity.WARNING,
+        severity=AlarmSeverity.WARNING,
         advice=f"vla-deploy crashes list; vla-deploy logs {row['name']}",
         measured=float(row["restarts"]),
         unit="restarts",
@@ -88,14 +88,14 @@ def _started_again(row: Document) -> Finding:
     )
 
 
-def _seldom(process: str, topic: Document) -> Iterator[Finding]:
+def _seldom(process: str, topic: Document) -> Iterator[AlarmFinding]:
     rate_hz, least_hz = topic["rate_hz"], topic["least_hz"]
     if rate_hz is not None and rate_hz < least_hz:
-        yield Finding(
+        yield AlarmFinding(
             process=process,
             field=f"{topic['topic']} rate",
             text=f"{process} writes {topic['topic']} too seldom",
-            severity=Severity.WARNING,
+            severity=AlarmSeverity.WARNING,
             advice="the computer is too busy, or the process hangs: vla-deploy budget",
             measured=rate_hz,
             limit=least_hz,
@@ -104,14 +104,83 @@ def _seldom(process: str, topic: Document) -> Iterator[Finding]:
         )
 
 
-def _nonsense(process: str, topic: Document) -> Iterator[Finding]:
+def _nonsense(process: str, topic: Document) -> Iterator[AlarmFinding]:
     for fault in topic["faults"]:
-        yield Finding(
+        yield AlarmFinding(
             process=process,
             field=topic["topic"],
             subject=fault.partition(":")[0],
             text=f"{process} writes what cannot be: {topic['topic']}.{fault}",
-            severity=Severity.ERROR,
+            severity=AlarmSeverity.ERROR,
             advice=f"vla-deploy logs {process}",
             age_s=topic["age_s"],
         )
+
+
+BY_OWNER: Final[Mapping[str, AlarmSeverity]] = {"control": AlarmSeverity.CRITICAL}
+"""How grave a silent topic is by its owner; of others it is a warning."""
+ON_DEMAND: Final = frozenset({"base_command"})
+"""Written while the base is driven; safety judges its age then."""
+OF_SENSOR: Final[Mapping[str, str]] = {
+    "scan": "lidar",
+    "imu": "imu",
+    "near_obstacles": "camera",
+}
+"""Topics that fall silent with one sensor while their process goes on; `away` may say why."""
+_SUPERVISOR: Final = "supervisor"
+_LEAST_RATIO: Final = 0.01
+_RISE_S: Final = 1.0
+_CHECK_CABLE: Final = "check its cable and power; it is taken up again by itself"
+_RESTARTED: Final = "the supervisor starts it again before long; see why"
+_CELLS: Final = tuple(
+    topic
+    for topic in TOPICS
+    if topic.kind is Kind.CELL and topic.deadline_s and topic.name not in ON_DEMAND
+)
+
+
+def old_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
+    """Find cells beyond their deadline; one that is told to work slowly has more time."""
+    away = (robot.document("scene") or {}).get("away", {})
+    for topic in _CELLS:
+        age_s = robot.age_s(topic.name)
+        if age_s is None or not _is_at_work(robot, topic) or OF_SENSOR.get(topic.name) in away:
+            continue
+        limit_s = topic.deadline_s / _rate_ratio(robot, topic.owner)
+        if age_s > limit_s:
+            yield _old(topic, age_s, limit_s, _silent_sensor(robot, topic))
+
+
+def _is_at_work(robot: RobotStatus, topic: Topic) -> bool:
+    """Tell whether its age says something: the supervisor's own silence is another alarm."""
+    if topic.owner == _SUPERVISOR:
+        return topic.name != "process_table" and robot.document("process_table") is not None
+    return robot.is_ready(topic.owner)
+
+
+def _rate_ratio(robot: RobotStatus, process: str) -> float:
+    directives = robot.document("resource_directives") or {}
+    return max(float(directives.get("rate_ratio", {}).get(process, 1.0)), _LEAST_RATIO)
+
+
+def _silent_sensor(robot: RobotStatus, topic: Topic) -> str:
+    """Return the sensor that is to blame: its process writes all that needs it not."""
+    sensor = OF_SENSOR.get(topic.name, "")
+    return sensor if sensor and robot.document("scene") is not None else ""
+
+
+def _old(topic: Topic, age_s: float, limit_s: float, sensor: str) -> AlarmFinding:
+    culprit = f"the {sensor} has gone silent: no {topic.name}"
+    return AlarmFinding(
+        process=topic.owner,
+        field=topic.name,
+        subject=sensor,
+        text=culprit if sensor else f"{topic.owner} has gone silent on {topic.name}",
+        severity=BY_OWNER.get(topic.owner, AlarmSeverity.WARNING),
+        advice=_CHECK_CABLE if sensor else f"{_RESTARTED}: vla-deploy logs {topic.owner}",
+        measured=age_s,
+        limit=limit_s,
+        unit="s",
+        age_s=age_s,
+        rise_s=_RISE_S,
+    )

@@ -1,11 +1,79 @@
-"""Tell what the scene holds, how things lie, and whether a goal can be reached; nothing moves."""
+"""Analyse the scene and judge goals by measurement: no model is asked, nothing moves.
 
+The robot's kinematics are loaded with the first request, to save memory.
+"""
+
+from http import HTTPStatus
+from threading import Lock
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Query, Request
 
 from vla_deploy.analysis.document import SceneAnalysis
+from vla_deploy.analysis.question import FRESH_S, Analyser, question_about
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.access.rates import TokenBuckets
+from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.navigation.errors import MapInvalid
+from vla_deploy.robots import load_robot
+from vla_deploy.world import SceneUnreadable
+
+# One question at a time: threads that wait for their turn are those that other answers need.
+_TURN_WITHIN_S: Final = 2.0
+# A room full of things takes half a second of a core; the dashboard's budget is a fifth of one.
+_RATE_HZ: Final = 0.25
+_BURST: Final = 5
+
+
+class Analyst:
+    """Answer questions about the scene, one at a time; for routes that run in threads."""
+
+    def __init__(self, link: RobotLink) -> None:
+        self._link = link
+        self._turn = Lock()
+        self._asked = TokenBuckets(_RATE_HZ, _BURST, link.clock)
+        self._analyser: Analyser | None = None
+
+    def analyse(self, goal: str) -> SceneAnalysis:
+        """Return what the geometric analyser makes of the scene, and of a goal in words.
+
+        Raises:
+            ApiError: nothing is seen, the robot's map cannot be used, or too many ask.
+        """
+        scene = self._link.document("scene", age_limit_s=FRESH_S)
+        if scene is None:
+            raise _unavailable("no_scene", "perception tells no scene")
+        if self._asked.take("") > 0.0:
+            raise ApiError(
+                HTTPStatus.TOO_MANY_REQUESTS,
+                "too_often",
+                "analyses are asked for too often",
+                f"ask again in {1.0 / _RATE_HZ:.0f} s",
+            )
+        if not self._turn.acquire(timeout=_TURN_WITHIN_S):
+            raise _unavailable("busy", "others are asking just now", "ask again in a moment")
+        try:
+            analyser = self._analyser = self._analyser or _measuring(self._link.robot)
+            return analyser.analyse(question_about(self._link, scene, goal))
+        except SceneUnreadable as error:
+            raise _unavailable("no_scene", str(error)) from error
+        except MapInvalid as error:
+            raise _unavailable("no_map", str(error), "vla-deploy map check") from error
+        finally:
+            self._turn.release()
+
+
+def _measuring(robot: str) -> Analyser:
+    from vla_deploy.analysis.abilities import Abilities  # takes pinocchio with it
+    from vla_deploy.analysis.geometric import GeometricAnalyser
+
+    return GeometricAnalyser(Abilities.of(load_robot(robot)))
+
+
+def _unavailable(code: str, what: str, try_: str = "vla-deploy status") -> ApiError:
+    return ApiError(HTTPStatus.SERVICE_UNAVAILABLE, code, what, try_)
+
 
 router = APIRouter(tags=["state"])
 

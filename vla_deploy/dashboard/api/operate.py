@@ -1,16 +1,31 @@
-"""Stop the robot, which anyone may; reset, arm and disarm it, which are acts of their own."""
+"""Stop the robot, which anyone may; reset, arm and disarm it, and wait for control to show it."""
 
+import asyncio
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from vla_deploy.client.acts import why_not
+from drivers.clock import NS_PER_S
+from vla_deploy.client.acts import REACHED, Status, why_not
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, note, require
-from vla_deploy.dashboard.acts import carried_out
 from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.ipc.stop_button import ESTOP
+
+
+async def carried_out(link: RobotLink, act: str, within_s: float) -> tuple[bool, Status | None]:
+    """Wait until control shows an act, or the time is over; return its last status, too."""
+    end_ns = link.clock.now_ns() + round(within_s * NS_PER_S)
+    while True:
+        status = link.document("control_status", age_limit_s=1.0)
+        if status is not None and REACHED[act](status):
+            return True, status
+        if link.clock.now_ns() >= end_ns:
+            return False, status
+        await asyncio.sleep(0.02)
+
 
 router = APIRouter(tags=["operate"])
 

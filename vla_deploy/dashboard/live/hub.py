@@ -1,22 +1,64 @@
-"""Bring live topics to clients: each message serialised once, nobody held up by anybody else.
+"""Send live topics to clients; no client waits for another.
 
-The hub looks only at topics that somebody is subscribed to. A client has an outbox and a task that
-empties it: what it does not take waits there, bounded, and one that takes nothing for `FROZEN_S` is
-dropped.
+The hub reads only the topics that somebody is subscribed to. Each client has a bounded outbox and a
+task that empties it; a client that takes nothing for `FROZEN_S` is dropped.
 """
 
 import asyncio
 import logging
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.dashboard.live.feed import Feed
-from vla_deploy.dashboard.live.message import Message, Moment, json_message
-from vla_deploy.dashboard.live.outbox import Outbox
+from vla_deploy.dashboard.live.message import (
+    LiveFeed,
+    LiveMessage,
+    LookTime,
+    json_message,
+    lost_message,
+)
 
-Send = Callable[[Sequence[Message]], Awaitable[None]]
+MOST_EVENTS: Final = 256
+
+
+class Outbox:
+    """Give messages in turn; a slow client skips values and is told how many events it lost."""
+
+    def __init__(self, most_events: int = MOST_EVENTS) -> None:
+        self._most_events = most_events
+        self._values: dict[str, LiveMessage] = {}
+        self._events: deque[LiveMessage] = deque()
+        self._lost: dict[str, int] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._values or self._events)
+
+    def put(self, message: LiveMessage) -> None:
+        """Take a message: a value replaces the one before, a full queue loses its oldest event."""
+        if not message.queued:
+            self._values[message.topic] = message
+            return
+        if len(self._events) >= self._most_events:
+            topic = self._events.popleft().topic
+            self._lost[topic] = self._lost.get(topic, 0) + 1
+        self._events.append(message)
+
+    def take(self) -> list[LiveMessage]:
+        """Return all that waits, and forget it: what was lost, the events, then the values."""
+        lost = [lost_message(topic, count) for topic, count in self._lost.items()]
+        waiting = [*lost, *self._events, *self._values.values()]
+        self._lost.clear()
+        self._events.clear()
+        self._values.clear()
+        return waiting
+
+    def forget(self, topic: str) -> None:
+        """Drop the value of a topic that is wanted no more."""
+        self._values.pop(topic, None)
+
+
+Send = Callable[[Sequence[LiveMessage]], Awaitable[None]]
 STEP_S: Final = 0.05
 FROZEN_S: Final = 5.0
 ALIVE: Final = "alive"
@@ -26,7 +68,7 @@ MOST_CLIENTS: Final = 100
 _log = logging.getLogger(__name__)
 
 
-class Client:
+class LiveClient:
     """Hold what one client wants and has yet to get."""
 
     def __init__(self, send: Send, clock: Clock) -> None:
@@ -60,12 +102,12 @@ class Client:
 class LiveHub:
     """Know the feeds and the clients, and look at what is wanted in each step."""
 
-    def __init__(self, feeds: Iterable[Feed], clock: Clock, wall_ns: Callable[[], int]) -> None:
+    def __init__(self, feeds: Iterable[LiveFeed], clock: Clock, wall_ns: Callable[[], int]) -> None:
         self.failed_looks: Counter[str] = Counter()
-        self._feeds: dict[str, Feed] = {feed.topic: feed for feed in feeds}
+        self._feeds: dict[str, LiveFeed] = {feed.topic: feed for feed in feeds}
         self._clock = clock
         self._wall_ns = wall_ns
-        self._clients: dict[Client, asyncio.Task[None]] = {}
+        self._clients: dict[LiveClient, asyncio.Task[None]] = {}
         self._due_ns: dict[str, int] = {}
         self._alive_ns = 0
 
@@ -89,20 +131,16 @@ class LiveHub:
         """Tell whether no more clients are taken."""
         return len(self._clients) >= MOST_CLIENTS
 
-    def add(self, feed: Feed) -> None:
-        """Offer another topic, or another feed of one."""
-        self._feeds[feed.topic] = feed
-
-    def join(self, client: Client) -> "asyncio.Task[None]":
+    def join(self, client: LiveClient) -> "asyncio.Task[None]":
         """Take a client in; the task ends when it is dropped or its connection fails."""
         self._clients[client] = asyncio.create_task(client.deliver())
         return self._clients[client]
 
-    def leave(self, client: Client) -> None:
+    def leave(self, client: LiveClient) -> None:
         """Let a client go."""
         self._clients.pop(client).cancel()
 
-    def subscribe(self, client: Client, topics: frozenset[str]) -> None:
+    def subscribe(self, client: LiveClient, topics: frozenset[str]) -> None:
         """Bring a client these topics and no others; each begins with its newest value."""
         for topic in client.topics - topics:
             client.outbox.forget(topic)
@@ -134,7 +172,7 @@ class LiveHub:
         for client in list(self._clients):
             self.leave(client)
 
-    def _look_at(self, feed: Feed, now: Moment) -> None:
+    def _look_at(self, feed: LiveFeed, now: LookTime) -> None:
         # A step may come a little early: the next one would be half a period late.
         self._due_ns[feed.topic] = now.run_ns + round((feed.period_s - STEP_S / 2) * NS_PER_S)
         try:
@@ -149,12 +187,12 @@ class LiveHub:
                 for message in messages:
                     client.outbox.put(message)
 
-    def _tell_alive(self, now: Moment) -> None:
+    def _tell_alive(self, now: LookTime) -> None:
         if now.run_ns >= self._alive_ns:
             self._alive_ns = now.run_ns + round(ALIVE_S * NS_PER_S)
             message = json_message(ALIVE, now.run_ns, now, {})
             for client in self._clients:
                 client.outbox.put(message)
 
-    def _now(self) -> Moment:
-        return Moment(run_ns=self._clock.now_ns(), wall_ns=self._wall_ns())
+    def _now(self) -> LookTime:
+        return LookTime(run_ns=self._clock.now_ns(), wall_ns=self._wall_ns())

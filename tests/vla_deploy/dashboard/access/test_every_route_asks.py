@@ -4,7 +4,8 @@ import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 
 from vla_deploy.dashboard.access import Require, UserRole
-from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
+from vla_deploy.dashboard.access.request import API_PREFIX
+from vla_deploy.dashboard.app import API_ROUTERS, ROOT_ROUTERS
 
 OPEN = {
     "/",

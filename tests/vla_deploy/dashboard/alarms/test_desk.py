@@ -4,11 +4,9 @@ import json
 
 import pytest
 
-from vla_deploy.dashboard.alarms.alarm_file import AlarmFile
-from vla_deploy.dashboard.alarms.desk import AlarmDesk
-from vla_deploy.dashboard.alarms.live_feed import AlarmFeed
-from vla_deploy.dashboard.alarms.told import Told, Word
-from vla_deploy.dashboard.live.message import Moment
+from vla_deploy.dashboard.alarms.manager import AlarmFeed, AlarmFile, AlarmManager
+from vla_deploy.dashboard.alarms.robot_status import RobotStatus, TopicStatus
+from vla_deploy.dashboard.live.message import LookTime
 
 ARMED = {"state": "armed", "cause": "", "estop_latched": False, "buses": {}, "detail": ""}
 STOPPED = {
@@ -26,7 +24,9 @@ STOPPED = {
 
 def told(status):
     judged = {"tick": 10, "judged_tick": 10}
-    return Told(words={"control_status": Word(age_s=0.01, document={**status, **judged})})
+    return RobotStatus(
+        words={"control_status": TopicStatus(age_s=0.01, document={**status, **judged})}
+    )
 
 
 class Office:
@@ -35,7 +35,7 @@ class Office:
     def __init__(self, path, clock, run="run-1"):
         self.now = told(ARMED)
         self.clock = clock
-        self.desk = AlarmDesk(run, lambda: self.now, AlarmFile(path), clock, clock.wall_ns)
+        self.desk = AlarmManager(run, lambda: self.now, AlarmFile(path), clock, clock.wall_ns)
 
     def look_for(self, seconds):
         for _ in range(round(2 * seconds)):
@@ -138,7 +138,7 @@ def test_numbers_that_change_are_told_but_cost_no_write(office, path):
 
 def test_pages_are_told_on_change_alone(office, hand_clock):
     feed = AlarmFeed(office.desk)
-    now = Moment(run_ns=hand_clock.now_ns(), wall_ns=hand_clock.wall_ns())
+    now = LookTime(run_ns=hand_clock.now_ns(), wall_ns=hand_clock.wall_ns())
     feed.begin()
     assert len(feed.look(now)) == 1
     assert feed.look(now) == ()

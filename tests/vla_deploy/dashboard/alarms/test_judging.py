@@ -1,11 +1,14 @@
-from vla_deploy.dashboard.alarms.finding import Finding, Severity
-from vla_deploy.dashboard.alarms.judging import PATIENCE, judge
+from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
+from vla_deploy.dashboard.alarms.manager import RAISE_DELAYS, judge
 
 S = 1_000_000_000
-HOT = Finding(
-    process="control", field="heat", text="hot", severity=Severity.WARNING, advice="cool it"
+HOT = AlarmFinding(
+    process="control", field="heat", text="hot", severity=AlarmSeverity.WARNING, advice="cool it"
 )
-RISE_S, FALL_S = PATIENCE[Severity.WARNING].rise_s, PATIENCE[Severity.WARNING].fall_s
+RISE_S, FALL_S = (
+    RAISE_DELAYS[AlarmSeverity.WARNING].rise_s,
+    RAISE_DELAYS[AlarmSeverity.WARNING].fall_s,
+)
 
 
 def play(*looks):
@@ -38,16 +41,18 @@ def test_a_condition_that_comes_and_goes_is_one_alarm():
 
 
 def test_what_a_rule_says_of_its_patience_goes_before_the_table():
-    at_once = Finding(**{name: getattr(HOT, name) for name in HOT.__slots__} | {"rise_s": 0.0})
+    at_once = AlarmFinding(**{name: getattr(HOT, name) for name in HOT.__slots__} | {"rise_s": 0.0})
     assert play((0, [at_once])) == [[at_once]]
 
 
 def test_an_alarm_shows_the_newest_numbers():
-    hotter = Finding(**{name: getattr(HOT, name) for name in HOT.__slots__} | {"measured": 80.0})
+    hotter = AlarmFinding(
+        **{name: getattr(HOT, name) for name in HOT.__slots__} | {"measured": 80.0}
+    )
     assert play((0, [HOT]), (RISE_S, [hotter]))[1][0].measured == 80.0
 
 
 def test_the_graver_the_sooner():
-    rises = [PATIENCE[severity].rise_s for severity in Severity]
+    rises = [RAISE_DELAYS[severity].rise_s for severity in AlarmSeverity]
     assert rises == sorted(rises)
-    assert set(PATIENCE) == set(Severity)
+    assert set(RAISE_DELAYS) == set(AlarmSeverity)

@@ -13,8 +13,10 @@ from fastapi import FastAPI
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.dashboard.access import UserRole, require
-from vla_deploy.dashboard.live import LiveHub, Message, Moment, endpoint, json_message
-from vla_deploy.dashboard.live.wire import LiveProtocol
+from vla_deploy.dashboard.live import endpoint
+from vla_deploy.dashboard.live.endpoint import LiveProtocol
+from vla_deploy.dashboard.live.hub import LiveHub
+from vla_deploy.dashboard.live.message import LiveMessage, LookTime, json_message
 from vla_deploy.ipc import SharedSpace
 
 WALL_NS = 1_800_000_000 * NS_PER_S
@@ -34,7 +36,7 @@ class Script:
         if self._queued:
             self.waiting.clear()
 
-    def look(self, now: Moment) -> Sequence[Message]:
+    def look(self, now: LookTime) -> Sequence[LiveMessage]:
         self.looks += 1
         waiting, self.waiting = self.waiting, []
         return [

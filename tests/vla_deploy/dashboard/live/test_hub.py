@@ -13,8 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.live import LiveHub
-from vla_deploy.dashboard.live.hub import ALIVE, FROZEN_S
+from vla_deploy.dashboard.live.hub import ALIVE, FROZEN_S, LiveHub
 
 MakeHub = Callable[..., LiveHub]
 Until = Callable[[Callable[[], object]], Awaitable[None]]

@@ -2,13 +2,13 @@
 
 import json
 
-from vla_deploy.dashboard.live.message import Message, Moment, json_message
-from vla_deploy.dashboard.live.outbox import Outbox
+from vla_deploy.dashboard.live.hub import Outbox
+from vla_deploy.dashboard.live.message import LiveMessage, LookTime, json_message
 
-NOW = Moment(run_ns=0, wall_ns=0)
+NOW = LookTime(run_ns=0, wall_ns=0)
 
 
-def message(topic: str, number: int, *, queued: bool = False) -> Message:
+def message(topic: str, number: int, *, queued: bool = False) -> LiveMessage:
     return json_message(topic, 0, NOW, number, queued=queued)
 
 

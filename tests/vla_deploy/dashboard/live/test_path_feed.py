@@ -8,15 +8,15 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.live.message import Moment
-from vla_deploy.dashboard.live.path_feed import MOST_POINTS, PathFeed
+from vla_deploy.dashboard.live.feeds import MOST_POINTS, PathFeed
+from vla_deploy.dashboard.live.message import LookTime
 from vla_deploy.ipc import SharedSpace
 
 
 class Rig:
     def __init__(self, space: SharedSpace, clock: ManualClock) -> None:
         self.clock = clock
-        self.feed = PathFeed(space)
+        self.feed = PathFeed(space, clock)
         self._pose = space.cell_writer("pose")
         self._executor = space.cell_writer("executor_status")
 
@@ -30,7 +30,7 @@ class Rig:
         self._executor.put_document({"way_m": points})
 
     def told(self) -> Any:
-        messages = self.feed.look(Moment(run_ns=self.clock.ns, wall_ns=0))
+        messages = self.feed.look(LookTime(run_ns=self.clock.ns, wall_ns=0))
         return json.loads(messages[0].content)["data"] if messages else None
 
 

@@ -9,30 +9,29 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.live.feed import Feed
-from vla_deploy.dashboard.live.message import Message, Moment
-from vla_deploy.dashboard.live.topic_feeds import topic_feeds
+from vla_deploy.dashboard.live.feeds import topic_feeds
+from vla_deploy.dashboard.live.message import LiveFeed, LiveMessage, LookTime
 from vla_deploy.ipc import TOPICS, Kind, SharedSpace
 
 NAMES = ("shoulder", "elbow")
 
 
 @pytest.fixture
-def feeds(space: SharedSpace) -> Mapping[str, Feed]:
+def feeds(space: SharedSpace) -> Mapping[str, LiveFeed]:
     return {feed.topic: feed for feed in topic_feeds(space, NAMES)}
 
 
-def told(message: Message) -> Any:
+def told(message: LiveMessage) -> Any:
     text = json.loads(message.content)
     assert text["topic"] == message.topic
     return text
 
 
-def now(clock: ManualClock) -> Moment:
-    return Moment(run_ns=clock.ns, wall_ns=clock.ns + 100 * NS_PER_S)
+def now(clock: ManualClock) -> LookTime:
+    return LookTime(run_ns=clock.ns, wall_ns=clock.ns + 100 * NS_PER_S)
 
 
-def test_every_cell_and_ring_has_a_feed(feeds: Mapping[str, Feed]) -> None:
+def test_every_cell_and_ring_has_a_feed(feeds: Mapping[str, LiveFeed]) -> None:
     expected = {topic.name for topic in TOPICS if topic.kind in (Kind.CELL, Kind.RING)}
     assert set(feeds) == expected
     assert all(feed.period_s <= 0.5 for feed in feeds.values())
@@ -42,7 +41,7 @@ def test_every_cell_and_ring_has_a_feed(feeds: Mapping[str, Feed]) -> None:
 
 
 def test_a_document_passes_as_it_is_with_its_age_and_once(
-    feeds: Mapping[str, Feed], space: SharedSpace, clock: ManualClock
+    feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
 ) -> None:
     feed = feeds["control_status"]
     assert feed.look(now(clock)) == ()
@@ -59,7 +58,7 @@ def test_a_document_passes_as_it_is_with_its_age_and_once(
 
 
 def test_joints_come_with_their_names_and_no_longer_than_they_are(
-    feeds: Mapping[str, Feed], space: SharedSpace, clock: ManualClock
+    feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
 ) -> None:
     numbers = [0.123456789, -1.0]
     space.cell_writer("joint_state").put(
@@ -79,7 +78,7 @@ def test_joints_come_with_their_names_and_no_longer_than_they_are(
 
 
 def test_a_scan_is_told_in_millimetres_without_the_age_of_its_beams(
-    feeds: Mapping[str, Feed], space: SharedSpace, clock: ManualClock
+    feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
 ) -> None:
     space.cell_writer("scan").put(range_m=[1.23456] * 360, beam_age_s=[0.05] * 360)
     data = told(feeds["scan"].look(now(clock))[0])["data"]
@@ -87,7 +86,7 @@ def test_a_scan_is_told_in_millimetres_without_the_age_of_its_beams(
 
 
 def test_events_begin_now_and_none_is_skipped(
-    feeds: Mapping[str, Feed], space: SharedSpace, clock: ManualClock
+    feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
 ) -> None:
     ring = space.ring_writer("task_event")
     ring.publish({"event": "old"})

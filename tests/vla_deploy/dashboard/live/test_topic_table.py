@@ -7,14 +7,13 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.live.message import Moment
-from vla_deploy.dashboard.live.topic_feeds import RingFeed
-from vla_deploy.dashboard.live.topic_table import TopicTable
+from vla_deploy.dashboard.live.feeds import RingFeed, TopicTable
+from vla_deploy.dashboard.live.message import LookTime
 from vla_deploy.ipc import BY_NAME, TOPICS, SharedSpace
 
 
 def rows(table: TopicTable, clock: ManualClock) -> dict[str, Any]:
-    (message,) = table.look(Moment(run_ns=clock.ns, wall_ns=clock.ns))
+    (message,) = table.look(LookTime(run_ns=clock.ns, wall_ns=clock.ns))
     return {row["topic"]: row for row in json.loads(message.content)["data"]["topics"]}
 
 
@@ -51,5 +50,5 @@ def test_a_ring_tells_what_was_overwritten_before_it_was_read(
     table, writer = TopicTable(space, {"motion_result": ring}), space.ring_writer("motion_result")
     for _ in range(BY_NAME["motion_result"].slots + 5):
         writer.publish({})
-    ring.look(Moment(run_ns=0, wall_ns=0))
+    ring.look(LookTime(run_ns=0, wall_ns=0))
     assert rows(table, clock)["motion_result"]["lost"] == 5

@@ -3,12 +3,12 @@
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.live.turn import (
+from vla_deploy.dashboard.live.microphone import (
     AHEAD_S,
     LONGEST_S,
     Floor,
-    Turn,
-    TurnRefused,
+    SpeechTurn,
+    SpeechTurnRefused,
     check_end,
     rate_in,
 )
@@ -21,33 +21,33 @@ def sound(seconds: float) -> bytes:
 
 
 def test_samples_are_taken_as_they_are() -> None:
-    assert Turn(RATE_HZ, 0).take(b"\x01\x00\xff\xff\x00\x80", 0).tolist() == [1, -1, -32768]
-    assert Turn(RATE_HZ, 0).take(b"", 0).tolist() == []
+    assert SpeechTurn(RATE_HZ, 0).take(b"\x01\x00\xff\xff\x00\x80", 0).tolist() == [1, -1, -32768]
+    assert SpeechTurn(RATE_HZ, 0).take(b"", 0).tolist() == []
 
 
 @pytest.mark.parametrize(
     ("data", "word"), [(b"\x01", "garbage"), (sound(1.0) + b"\x00\x00", "too_large")]
 )
 def test_what_is_no_sound_or_too_much_of_it_ends_the_turn(data: bytes, word: str) -> None:
-    with pytest.raises(TurnRefused) as refused:
-        Turn(RATE_HZ, 0).take(data, 0)
+    with pytest.raises(SpeechTurnRefused) as refused:
+        SpeechTurn(RATE_HZ, 0).take(data, 0)
     assert refused.value.word == word
 
 
 def test_sound_may_come_a_little_ahead_of_time_but_not_faster_than_speech() -> None:
-    turn = Turn(RATE_HZ, 0)
+    turn = SpeechTurn(RATE_HZ, 0)
     turn.take(sound(1.0), 0)
     turn.take(sound(AHEAD_S - 1.0), 0)
-    with pytest.raises(TurnRefused, match="faster") as refused:
+    with pytest.raises(SpeechTurnRefused, match="faster") as refused:
         turn.take(sound(0.1), NS_PER_S // 20)
     assert refused.value.word == "too_fast"
 
 
 def test_a_turn_as_long_as_no_command_is_ended() -> None:
-    turn = Turn(RATE_HZ, 0)
+    turn = SpeechTurn(RATE_HZ, 0)
     for second in range(int(LONGEST_S)):
         turn.take(sound(1.0), (second + 1) * NS_PER_S)
-    with pytest.raises(TurnRefused) as refused:
+    with pytest.raises(SpeechTurnRefused) as refused:
         turn.take(sound(0.1), round((LONGEST_S + 0.1) * NS_PER_S))
     assert refused.value.word == "too_long"
 
@@ -55,7 +55,7 @@ def test_a_turn_as_long_as_no_command_is_ended() -> None:
 def test_one_has_the_floor_and_the_other_is_told_who() -> None:
     floor = Floor()
     floor.take("anna")
-    with pytest.raises(TurnRefused, match="anna speaks") as refused:
+    with pytest.raises(SpeechTurnRefused, match="anna speaks") as refused:
         floor.take("ben")
     assert refused.value.word == "taken"
     floor.leave()
@@ -71,11 +71,11 @@ def test_a_turn_declares_its_rate(rate_hz: int) -> None:
     "text", ["", "{", "[16000]", "{}", '{"rate_hz": 44100}', '{"rate_hz": true}', "[" * 9000]
 )
 def test_another_beginning_is_refused(text: str) -> None:
-    with pytest.raises(TurnRefused, match="rate_hz"):
+    with pytest.raises(SpeechTurnRefused, match="rate_hz"):
         rate_in(text)
 
 
 def test_text_within_a_turn_ends_it_or_is_refused() -> None:
     check_end('{"end": true}')
-    with pytest.raises(TurnRefused, match="end"):
+    with pytest.raises(SpeechTurnRefused, match="end"):
         check_end('{"end": false}')

@@ -1,4 +1,4 @@
-"""Give metrics to scrapers, their history to pages, and the reason for what is missing."""
+"""Answer metrics for scrapers, their history for pages, and the reason for what is missing."""
 
 import asyncio
 import json

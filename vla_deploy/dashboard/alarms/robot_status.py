@@ -1,14 +1,63 @@
-"""Collect what all processes tell, for the rules to judge."""
+"""Read what all processes publish at one moment, as the input of the alarm rules."""
 
 from collections import deque
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.alarms.told import Document, Told, Word
-from vla_deploy.ipc import TOPICS, Kind, Sample
+from vla_deploy.ipc import BY_NAME, TOPICS, Kind, Sample
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
+
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicStatus:
+    """Hold the newest value of a cell: how old, and its document; of packed fields, "pose" alone.
+
+    That one is `{"state", "doubt", "match_ratio"}`, in words as `status` tells them.
+    """
+
+    age_s: float
+    document: Document | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotStatus:
+    """Hold the newest word on each topic; what nobody has ever told is missing.
+
+    `late_ratio` is the share of control's ticks of the last seconds that came late, None before
+    enough of them went by.
+    """
+
+    words: Mapping[str, TopicStatus] = field(default_factory=dict)
+    late_ratio: float | None = None
+
+    def age_s(self, topic: str) -> float | None:
+        """Return how old the newest word on a topic is."""
+        word = self.words.get(topic)
+        return None if word is None else word.age_s
+
+    def document(self, topic: str) -> Document | None:
+        """Return the newest document of a topic, None where it is too old to be believed."""
+        word = self.words.get(topic)
+        if word is None or word.age_s > BY_NAME[topic].deadline_s:
+            return None
+        return word.document
+
+    def row(self, process: str) -> Document | None:
+        """Return a process' row of the supervisor's table."""
+        table = self.document("process_table")
+        rows = table["processes"] if table is not None else ()
+        return next((row for row in rows if row["name"] == process), None)
+
+    def is_ready(self, process: str) -> bool:
+        """Tell whether the supervisor says that a process is at work; nobody watches itself."""
+        row = self.row(process)
+        return row is not None and row["state"] == "ready"
+
 
 DOCUMENTS: Final = frozenset(
     {
@@ -29,26 +78,29 @@ _CELLS: Final = tuple(
 )
 
 
-class Listener:
+class StatusReader:
     """Look at every cell with a deadline, and count control's late ticks over a few seconds."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
         self._ticks: deque[tuple[int, int, int]] = deque()
 
-    def listen(self) -> Told:
+    def read(self) -> RobotStatus:
         """Return what is told now."""
         words = dict(self._words())
         status = words.get("control_status")
         ratio = None if status is None else self._late_ratio(status.document or {})
-        return Told(words=words, late_ratio=ratio)
+        return RobotStatus(words=words, late_ratio=ratio)
 
-    def _words(self) -> Iterator[tuple[str, Word]]:
+    def _words(self) -> Iterator[tuple[str, TopicStatus]]:
         now_ns = self._link.clock.now_ns()
         for name in _CELLS:
             sample = self._link.fresh(name)
             if sample is not None:
-                yield name, Word(age_s=max(sample.age_s(now_ns), 0.0), document=_document(sample))
+                yield (
+                    name,
+                    TopicStatus(age_s=max(sample.age_s(now_ns), 0.0), document=_document(sample)),
+                )
 
     def _late_ratio(self, status: Document) -> float | None:
         """Return the share of late ticks within the window, which a control that starts begins."""

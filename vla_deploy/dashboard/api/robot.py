@@ -1,11 +1,17 @@
-"""Tell what of robot and home does not move: the robot's links, the map, places and zones."""
+"""Answer what the robot is made of, its map, and the newest camera image."""
 
 from dataclasses import asdict
 from functools import cached_property
+from http import HTTPStatus
 from typing import Any, Final
 
 import cv2
+from fastapi import APIRouter, Depends, Request, Response
 
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.dashboard.live.camera import CameraFeed
+from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.navigation.map_file import MapFile, read_map_file
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematic_tree import KinematicTree
@@ -14,7 +20,7 @@ from vla_deploy.robots.tree_reader import read_tree
 _DIGITS: Final = 6
 
 
-class Still:
+class StaticModel:
     """Hold a robot's description in the forms that a page draws; made when first asked for."""
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -85,3 +91,58 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_rounded(one) for one in value]
     return round(value, _DIGITS) if isinstance(value, float) else value
+
+
+router = APIRouter(tags=["robot"], dependencies=[Depends(require(UserRole.VIEWER))])
+
+_UNCHANGED_S: Final = 60
+_KEPT: Final = {"cache-control": f"private, max-age={_UNCHANGED_S}"}
+_PICTURES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {"content": {"image/png": {}, "image/jpeg": {}}},
+    404: {"description": "there is none"},
+}
+
+
+@router.get("/robot/model")
+def model(request: Request) -> dict[str, Any]:
+    """Return the robot's links, joints and shapes, and its safety zones, in the base frame."""
+    return _model(request).model
+
+
+@router.get("/map")
+def floor(request: Request) -> dict[str, Any]:
+    """Return where the map's picture lies (its lower left corner), places and keep-out zones."""
+    try:
+        return _model(request).map
+    except MapInvalid as error:
+        raise _no_map(error) from error
+
+
+@router.get("/map.png", response_class=Response, responses=_PICTURES)
+def floor_picture(request: Request) -> Response:
+    """Return the map's picture: black is blocked, white is free, grey is unknown."""
+    try:
+        return Response(_model(request).map_png, media_type="image/png", headers=_KEPT)
+    except MapInvalid as error:
+        raise _no_map(error) from error
+
+
+@router.get("/camera.jpg", response_class=Response, responses=_PICTURES)
+async def camera(request: Request) -> Response:
+    """Return the newest picture of the head's camera."""
+    feed: CameraFeed = request.app.state.camera
+    picture = feed.newest()
+    if picture is None:
+        what = "the camera has given no picture yet"
+        raise ApiError(HTTPStatus.NOT_FOUND, "no_picture", what, "vla-deploy status")
+    headers = {"cache-control": "no-store"}
+    return Response(picture.jpeg, media_type="image/jpeg", headers=headers)
+
+
+def _model(request: Request) -> StaticModel:
+    model: StaticModel = request.app.state.static_model
+    return model
+
+
+def _no_map(error: MapInvalid) -> ApiError:
+    return ApiError(HTTPStatus.NOT_FOUND, "no_map", str(error), "vla-deploy map check")

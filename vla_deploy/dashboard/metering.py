@@ -1,13 +1,10 @@
-"""Read every metric once a second into the history, and at any time for whoever asks."""
+"""Read every metric once a second into the history, and at any time on request."""
 
 import logging
-import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
-
-from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
@@ -23,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 class Metering:
-    """Hold the way to all metrics and their history; without room for one, `why_not` says so."""
+    """Read all metrics and write their history; `why_not` says why none is kept."""
 
     def __init__(
         self, link: RobotLink, clients: Callable[[], int], wall_ns: Callable[[], int]
@@ -42,11 +39,11 @@ class Metering:
 
     @property
     def wall_s(self) -> float:
-        """Return the time of the wall clock, by which the history is kept."""
+        """Return the wall clock in seconds, which dates the history."""
         return self._wall_ns() / NS_PER_S
 
     def readings(self) -> Readings:
-        """Return every metric as it is now."""
+        """Return the current value of every metric."""
         begun_ns = self._link.clock.now_ns()
         own = {
             "version": version("vla-deploy"),
@@ -60,7 +57,7 @@ class Metering:
         return readings
 
     def step(self) -> None:
-        """Put what is due into the history."""
+        """Write the metrics into the history once a second."""
         now_ns = self._link.clock.now_ns()
         if self.store is None or now_ns < self._due_ns:
             return
@@ -89,16 +86,9 @@ class Metering:
 
 
 def joint_names(robot: str) -> tuple[str, ...]:
-    """Return a robot's joints in the order of its file; none where the file is not to be had."""
+    """Return a robot's joints in the order of its file; none where it cannot be read."""
     try:
         return load_robot(robot).joint_names
     except RobotFileError as error:
         _log.warning("joints have no names in the metrics: %s", error)
         return ()
-
-
-def metering(app: FastAPI) -> Metering:
-    """Make the part, and let routes find it as `app.state.metering`."""
-    app.state.metering = Metering(app.state.link, lambda: app.state.live.client_count, time.time_ns)
-    part: Metering = app.state.metering
-    return part
