@@ -1,6 +1,8 @@
+"""Requests are read by their head alone, and scripts of the same host alone read the answer."""
+
 import pytest
 
-from vla_deploy.stop_door.request import Malformed, read_head
+from vla_deploy.stop_door.http_messages import Malformed, read_head
 
 
 def test_a_press_needs_no_more_than_its_first_line():
