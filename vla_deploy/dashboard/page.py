@@ -21,16 +21,16 @@ _HOST: Final = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:\d{1,5})?")
 def stop_door_url(request: HTTPConnection) -> str:
     """Return the stop door's address by the host name that the request used.
 
-    The door itself tells its port, also once it is gone; until it has, the settings do.
+    The port is the one that the door published last, else that of the settings.
     """
     state = request.app.state
-    told = state.link.document(STATUS_TOPIC) or {}
-    port = told.get("port", state.settings.stop_port)
+    status = state.link.document(STATUS_TOPIC) or {}
+    port = status.get("port", state.settings.stop_port)
     return f"{state.settings.scheme}://{called_host(request) or state.settings.host}:{port}"
 
 
 def called_host(request: HTTPConnection) -> str:
-    """Return the host by whose name the request came, without the port; "" when it is malformed."""
+    """Return the name of the Host header without the port, "" when it is malformed."""
     found = _HOST.fullmatch(request.headers.get("host", ""))
     return found[1] if found else ""
 
@@ -95,7 +95,7 @@ router = APIRouter(include_in_schema=False, dependencies=[Depends(require(UserRo
 
 
 class _PageFiles(StaticFiles):
-    """Serve files of which a browser asks each time whether they have changed."""
+    """Serve files that a browser revalidates each time."""
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:
         response = super().file_response(*args, **kwargs)
@@ -104,13 +104,13 @@ class _PageFiles(StaticFiles):
 
 
 def add_page_files(app: FastAPI) -> None:
-    """Serve what the page is made of below `/static`."""
+    """Serve the page's files below `/static`."""
     app.mount("/static", _PageFiles(directory=STATIC, check_dir=False))
 
 
 @router.get("/")
 async def index(request: Request) -> HTMLResponse:
-    """Return the page, which knows by a meta element where the stop door is."""
+    """Return the page, with the stop door's address in a meta element."""
     text = (STATIC / "index.html").read_text(encoding="utf-8")
     meta = f'name="stop-door" content="{stop_door_url(request)}"'
     return HTMLResponse(text.replace(_STOP_META, meta), headers={"cache-control": "no-store"})
@@ -118,5 +118,5 @@ async def index(request: Request) -> HTMLResponse:
 
 @router.get("/favicon.ico")
 async def favicon() -> FileResponse:
-    """Return the page's icon for browsers that ask by this name."""
+    """Return the page's icon under its conventional name."""
     return FileResponse(STATIC / "icon.svg", media_type="image/svg+xml")

@@ -8,7 +8,7 @@ import ssl
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import uvicorn
 from starlette.types import ASGIApp
@@ -27,73 +27,60 @@ from vla_deploy.runtime.node import Node
 
 SOCKET_NAME: Final = "dashboard.sock"
 _SOCKET_MODE: Final = 0o660
+_SHUTDOWN_S: Final = 1  # for open requests
+_KEEP_ALIVE_S: Final = 10
+_MOST_MESSAGE_BYTES: Final = 1_000_000
 
 
 def open_socket(path: Path) -> socket.socket:
     """Listen at a Unix socket, which only owner and group may use.
 
     Raises:
-        PortTaken: it cannot be made.
+        PortTaken: it cannot be created.
     """
-    door = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.unlink(missing_ok=True)  # an earlier instance of this run left it
         with short_path(path.parent) as folder:
-            door.bind(f"{folder}/{path.name}")
+            listening.bind(f"{folder}/{path.name}")
         path.chmod(_SOCKET_MODE)
     except OSError as error:
-        door.close()
+        listening.close()
         raise PortTaken(f"{path}: cannot listen there: {error}") from error
-    door.listen(BACKLOG)
-    return door
-
-
-GOODBYE_S: Final = 1  # for requests that are under way at the end
-_KEEP_ALIVE_S: Final = 10
-_MOST_MESSAGE_BYTES: Final = 1_000_000
+    listening.listen(BACKLOG)
+    return listening
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
-    """Name a listening socket, and what it encrypts with."""
+class HttpSocket:
+    """Hold a listening socket with its TLS context."""
 
-    name: str
     listener: socket.socket
     tls: ssl.SSLContext | None = None
 
 
 class _Server(uvicorn.Server):
-    """Leave the process' signals to whoever runs it."""
+    """Leave signals to the process's main function."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
 
 
-def serve(
+async def serve(
     app: ASGIApp,
-    doors: Sequence[Door],
+    sockets: Sequence[HttpSocket],
     node: Node,
     clock: Clock,
     should_stop: Callable[[], bool],
     connections: Connections | None = None,
 ) -> None:
     """Answer requests and step a started node until `should_stop()`."""
-    asyncio.run(_serve(app, doors, node, clock, should_stop, connections or Connections()))
-
-
-async def _serve(
-    app: ASGIApp,
-    doors: Sequence[Door],
-    node: Node,
-    clock: Clock,
-    should_stop: Callable[[], bool],
-    connections: Connections,
-) -> None:
-    servers = [_Server(_config(app, door, connections)) for door in doors]
+    bounds = connections or Connections()
+    servers = [_Server(_config(app, one, bounds)) for one in sockets]
     serving = [
-        asyncio.create_task(server.serve([door.listener]))
-        for server, door in zip(servers, doors, strict=True)
+        asyncio.create_task(server.serve([one.listener]))
+        for server, one in zip(servers, sockets, strict=True)
     ]
     try:
         await _step(node, clock, lambda: should_stop() or any(task.done() for task in serving))
@@ -109,16 +96,16 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
     while not should_stop():
         node.step()
         if isinstance(clock, TwinClock):
-            clock.release()  # requests are answered by the wall clock, and hold nothing
+            clock.release()  # requests are answered in real time, and hold up no twin
         period_ns = round(node.period_s * NS_PER_S)
         deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)
 
 
-def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Config:
-    tls = door.tls
+def _config(app: ASGIApp, at: HttpSocket, connections: Connections) -> uvicorn.Config:
+    tls = at.tls
     return uvicorn.Config(
-        _named(app, door.name),
+        app,
         log_config=None,
         log_level=logging.WARNING,
         access_log=False,
@@ -126,21 +113,12 @@ def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Confi
         loop="asyncio",
         http=bounded_by(connections),
         ws=LiveProtocol,
-        ws_per_message_deflate=False,  # it would compress each message anew for each client
+        ws_per_message_deflate=False,  # else each message is compressed for each client
         proxy_headers=False,
         server_header=False,
         h11_max_incomplete_event_size=HEAD_BYTES,
         timeout_keep_alive=_KEEP_ALIVE_S,
-        timeout_graceful_shutdown=GOODBYE_S,
+        timeout_graceful_shutdown=_SHUTDOWN_S,
         ws_max_size=_MOST_MESSAGE_BYTES,
         ssl_context_factory=None if tls is None else lambda *_: tls,
     )
-
-
-def _named(app: ASGIApp, name: str) -> ASGIApp:
-    """Let the application know through which door a request came: `scope["door"]`."""
-
-    async def through_door(scope: Any, receive: Any, send: Any) -> None:
-        await app({**scope, "door": name}, receive, send)
-
-    return through_door

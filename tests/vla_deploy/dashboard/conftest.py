@@ -14,8 +14,15 @@ from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
+from vla_deploy.dashboard.live.message import LiveMessage
 from vla_deploy.ipc import RingReader, SharedSpace
 from vla_deploy.runtime.net import DashboardSettings
+
+
+def payload_of(message: LiveMessage) -> bytes:
+    """Return what a client receives by a message's frame."""
+    length = message.frame[1]
+    return message.frame[{126: 4, 127: 10}.get(length, 2) :]
 
 
 class HandClock:

@@ -1,4 +1,4 @@
-"""Find why control stops or slows the robot, late ticks, and buses with missing answers."""
+"""Find why control stops or slows the robot, late ticks, and faulty buses."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -51,7 +51,7 @@ UNITS: Final[Mapping[Cause, str]] = {
     Cause.OBSTACLE_LIMIT_ZONE: "m",
     Cause.OBSTACLE_APPROACH: "s",
 }
-"""Units of what each cause measures; fingers, which slide, are in metres where joints turn."""
+"""The unit that each cause measures; for sliding fingers read metres in place of radians."""
 LATE_RATIO: Final = 0.2
 UNJUDGED_TICKS: Final = 2
 _ADVICE: Final = {rule.cause: rule.advice for rule in RULES}
@@ -59,7 +59,7 @@ _LATE_RISE_S: Final = 5.0
 
 
 def active_cause(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find what safety reports: the cause that wins over all others."""
+    """Find the cause that safety reports, which has priority over all others."""
     status = robot.document("control_status")
     if status is None:
         return
@@ -77,7 +77,7 @@ def active_cause(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def untimely_control(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a control that ticks late, or that safety does not judge."""
+    """Find late ticks, and ticks that safety does not judge."""
     status = robot.document("control_status")
     if robot.late_ratio is not None and robot.late_ratio > LATE_RATIO:
         yield AlarmFinding(
@@ -134,13 +134,13 @@ _NODES: Final = {
     "degraded_nodes": ("has nodes that answer badly", AlarmSeverity.WARNING),
     "bus_degraded": ("carries damaged frames", AlarmSeverity.WARNING),
 }
-"""Counters of a CAN bus that are zero while all is well."""
+"""Counters of a CAN bus that are zero in normal operation."""
 
 
 def troubled_buses(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find what each bus counts against itself.
+    """Find the faults that each bus counts.
 
-    With the emergency stop latched nothing is told: a button may cut the power of the devices.
+    None while the emergency stop is latched: the button may cut the power of the devices.
     """
     status = robot.document("control_status")
     if status is None or status["estop_latched"]:

@@ -23,10 +23,14 @@ from vla_deploy.dashboard.alarms.robot_status import RobotStatus
 from vla_deploy.dashboard.alarms.rules import find
 from vla_deploy.dashboard.live.message import LiveMessage, LookTime, json_message
 
+_LOOK_NS: Final = NS_PER_S // 2
+_FILE_MODE: Final = 0o600
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True, slots=True)
 class RaiseDelay:
-    """Declare how long a condition must last, and be gone, before that counts."""
+    """Set how long a finding must last to raise an alarm, and be absent to clear it."""
 
     rise_s: float
     fall_s: float
@@ -42,7 +46,7 @@ RAISE_DELAYS: Final[Mapping[AlarmSeverity, RaiseDelay]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackedFinding:
-    """Follow one finding: its newest form, since when, when it was last seen, whether raised."""
+    """Track one finding: its newest form, since when, when last found, whether raised."""
 
     finding: AlarmFinding
     since_ns: int
@@ -53,7 +57,7 @@ class TrackedFinding:
 def judge(
     before: Mapping[Key, TrackedFinding], findings: Mapping[Key, AlarmFinding], now_ns: int
 ) -> dict[Key, TrackedFinding]:
-    """Return the conditions after a look; the raised ones are alarms."""
+    """Return the tracked findings after a look; the raised ones are alarms."""
     after = {key: _seen(before.get(key), finding, now_ns) for key, finding in findings.items()}
     lasting = {
         key: condition
@@ -80,12 +84,8 @@ def _is_over(condition: TrackedFinding, now_ns: int) -> bool:
     return now_ns - condition.seen_ns >= fall_s * NS_PER_S
 
 
-_MODE: Final = 0o600
-_log = logging.getLogger(__name__)
-
-
 class AlarmFile:
-    """Read and write one ledger together with the run that it is of."""
+    """Store one ledger with the name of its run, so that it outlives the dashboard."""
 
     def __init__(self, path: Path) -> None:
         self.refused = 0
@@ -93,7 +93,7 @@ class AlarmFile:
         self._path = path
 
     def read(self) -> tuple[str, Ledger]:
-        """Return the run and its ledger; an empty one where there is none that can be read."""
+        """Return the run and its ledger; an empty one where the file cannot be read."""
         try:
             document = json.loads(self._path.read_text(encoding="utf-8"))
             alarms = tuple(alarm_from_document(one) for one in document["alarms"])
@@ -105,14 +105,14 @@ class AlarmFile:
             return "", Ledger()
 
     def write(self, run: str, ledger: Ledger) -> None:
-        """Replace the file; what the disk refuses is counted, and told once."""
+        """Replace the file; failures are counted, and logged once."""
         alarms = [alarm.document() for alarm in ledger.alarms]
         text = json.dumps({"run": run, "next": ledger.next_number, "alarms": alarms})
         fresh = self._path.with_suffix(".new")
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             fresh.write_text(text, encoding="utf-8")
-            fresh.chmod(_MODE)
+            fresh.chmod(_FILE_MODE)
             fresh.replace(self._path)
         except OSError as error:
             if not self.refused:
@@ -120,48 +120,45 @@ class AlarmFile:
             self.refused += 1
 
 
-_LOOK_NS: Final = NS_PER_S // 2
-
-
 class AlarmManager:
-    """Hold the conditions of now and the ledger of alarms; `revision` changes with the ledger."""
+    """Hold the tracked findings and the ledger of alarms; `revision` changes with the ledger."""
 
     def __init__(
         self,
         run: str,
-        listen: Callable[[], RobotStatus],
+        read_status: Callable[[], RobotStatus],
         file: AlarmFile,
         clock: Clock,
         wall_ns: Callable[[], int],
     ) -> None:
         self.revision = 0
         self._run = run
-        self._listen = listen
+        self._read_status = read_status
         self._file = file
         self._clock = clock
         self._wall_ns = wall_ns
         self._due_ns = 0
         before, kept = file.read()
-        # The alarms of this run go on where the dashboard, not the robot, was started anew.
+        # After a restart of the dashboard alone the alarms of the run stay open.
         self._ledger = kept if before == run else end_all(kept, self._now_s())
-        self._conditions = _gone_on(self._ledger, clock.now_ns())
+        self._conditions = _tracked(self._ledger, clock.now_ns())
 
     def step(self) -> None:
-        """Look, when it is time."""
+        """Read the status and update the alarms twice a second."""
         now_ns = self._clock.now_ns()
         if now_ns < self._due_ns:
             return
         self._due_ns = now_ns + _LOOK_NS
-        self._conditions = judge(self._conditions, find(self._listen()), now_ns)
+        self._conditions = judge(self._conditions, find(self._read_status()), now_ns)
         raised = {key: one.finding for key, one in self._conditions.items() if one.raised}
         self._keep(update_ledger(self._ledger, raised, self._now_s()))
 
     def stop(self) -> None:
-        """Keep what there is."""
+        """Store the ledger."""
         self._file.write(self._run, self._ledger)
 
     def acknowledge(self, alarm_id: str, by: str) -> Alarm | None:
-        """Note who has seen an alarm, which goes on; None where there is no such alarm."""
+        """Record who acknowledges an alarm, which stays open; return None without such an alarm."""
         self._keep(acknowledge_alarm(self._ledger, alarm_id, by, self._now_s()))
         return self._ledger.find(alarm_id)
 
@@ -173,17 +170,17 @@ class AlarmManager:
         before, self._ledger = self._ledger, after
         if after != before:
             self.revision += 1
-        if _lasting(after) != _lasting(before):
+        if _stored_part(after) != _stored_part(before):
             self._file.write(self._run, after)
 
     def _now_s(self) -> float:
         return round(self._wall_ns() / NS_PER_S, 3)
 
 
-def _gone_on(kept: Ledger, now_ns: int) -> dict[Key, TrackedFinding]:
-    """Return the conditions of alarms that were open: they have the time to be found again."""
+def _tracked(kept: Ledger, now_ns: int) -> dict[Key, TrackedFinding]:
+    """Return open alarms as tracked findings, so that they have time to be found again."""
     return {
-        alarm.key: TrackedFinding(
+        alarm.finding.key: TrackedFinding(
             finding=alarm.finding, since_ns=now_ns, seen_ns=now_ns, raised=True
         )
         for alarm in kept.alarms
@@ -191,34 +188,37 @@ def _gone_on(kept: Ledger, now_ns: int) -> dict[Key, TrackedFinding]:
     }
 
 
-def _lasting(kept: Ledger) -> list[tuple[Any, ...]]:
-    """Return what is worth a write: not the numbers, which change with every look."""
+def _stored_part(kept: Ledger) -> list[tuple[Any, ...]]:
+    """Return what is worth a write, without numbers, which change with every look."""
     return [
-        (alarm.id, alarm.ended_s, alarm.acknowledged_by, alarm.severity, alarm.count)
+        (
+            alarm.id,
+            alarm.ended_s,
+            alarm.acknowledged_by,
+            alarm.finding.severity,
+            alarm.count,
+        )
         for alarm in kept.alarms
     ]
 
 
-TOPIC: Final = "alarms"
-
-
 class AlarmFeed:
-    """Tell all alarms when any has changed."""
+    """Publish the live topic "alarms"."""
 
-    topic = TOPIC
+    topic = "alarms"
     period_s = 0.5
 
-    def __init__(self, desk: AlarmManager) -> None:
-        self._desk = desk
-        self._told = -1
+    def __init__(self, manager: AlarmManager) -> None:
+        self._manager = manager
+        self._sent = -1
 
     def begin(self) -> None:
-        """Tell what there is."""
-        self._told = -1
+        """Send the alarms again."""
+        self._sent = -1
 
     def look(self, now: LookTime) -> Sequence[LiveMessage]:
         """Return the alarms, if any has changed."""
-        if self._desk.revision == self._told:
+        if self._manager.revision == self._sent:
             return ()
-        self._told = self._desk.revision
-        return (json_message(self.topic, now.run_ns, now, self._desk.document()),)
+        self._sent = self._manager.revision
+        return (json_message(self.topic, now.run_ns, now, self._manager.document()),)

@@ -1,4 +1,4 @@
-"""Find what parts of the robot report about themselves, and exceeded budgets."""
+"""Find what the parts of the robot report about themselves, and exceeded budgets."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -9,11 +9,11 @@ from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
 from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
 
 _LOADING_S: Final = 30.0
-"""Models are being loaded for so long after a start; that is no alarm."""
+"""Models may load for this long after a start without an alarm."""
 
 
 def hearing(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a robot that does not understand, cannot speak, or does not hear a spoken stop."""
+    """Find speech that cannot recognise words, spoken stops, or cannot speak."""
     speech = robot.document("speech_status")
     if speech is None:
         return
@@ -22,7 +22,7 @@ def hearing(robot: RobotStatus) -> Iterator[AlarmFinding]:
         text = f"the robot understands no words: {speech['why']}"
         yield _speech("state", text, "type commands; vla-deploy doctor", age_s)
     stop_words = speech["stop_words"]
-    if stop_words["state"] != "live" and stop_words["sensitivity"] != "off":  # which is a choice
+    if stop_words["state"] != "live" and stop_words["sensitivity"] != "off":  # the user's choice
         text = f"nobody can stop the robot by voice: {stop_words['why']}"
         yield _speech("stop_words", text, "keep to the other stops; vla-deploy doctor", age_s)
     if speech["voice"]["state"] != "ready" and speech["voice"]["why"]:
@@ -31,7 +31,7 @@ def hearing(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def seeing(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find sensors that give nothing, images that are not to be trusted, a network that is away."""
+    """Find sensors without data, faulty images, and a detector that is not available."""
     scene = robot.document("scene")
     if scene is None:
         return
@@ -50,7 +50,7 @@ def seeing(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def planning(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find planners that are away, and a memory that cannot be written."""
+    """Find planner back ends that are not available, and a memory that cannot be written."""
     planner = robot.document("planner_status")
     if planner is None:
         return
@@ -64,7 +64,7 @@ def planning(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def place(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a robot that is not sure of its place on the map, or has lost it."""
+    """Find an uncertain or lost position on the map."""
     pose = robot.document("pose")
     if pose is None or pose["state"] == "tracking":
         return
@@ -83,7 +83,7 @@ def place(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def stop_door(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a stop door that nobody can reach."""
+    """Find a stop door that cannot be reached."""
     door = robot.document("stop_door_status")
     if door is None or not door["why"]:
         return
@@ -149,7 +149,7 @@ _TWIN_RISE_S: Final = 10.0
 
 
 def exceeded_budgets(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find lines that are over, by the judge's own hysteresis, and such as nobody can measure."""
+    """Find budgets that are exceeded, by their own hysteresis, or that cannot be measured."""
     budget = robot.document("budget")
     for row in budget["rows"] if budget is not None else ():
         if row["over"]:
@@ -159,7 +159,7 @@ def exceeded_budgets(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def steps_taken(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find what the ladder does to the processes meanwhile."""
+    """Find the measures that the budget ladder has taken."""
     budget = robot.document("budget")
     for step in budget["ladder"]["taken"] if budget is not None else ():
         action = step["action"].replace("_", " ")
@@ -176,7 +176,7 @@ def steps_taken(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def slow_twin(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a twin that does not keep pace with the wall clock: harmless, where its time waits."""
+    """Find a twin that is slower than real time: harmless where its time waits."""
     status = robot.document("twin_status")
     factor = None if status is None else status["real_time_factor"]
     if status is not None and factor is not None and factor < _REAL_TIME:

@@ -19,7 +19,7 @@ _WHAT_IT_MEANS: Final = {spec.name: spec.giving_up for spec in TABLE}
 
 
 def silent_supervisor(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find a supervisor that no longer tells what runs: control stops the robot for it, too."""
+    """Find a silent supervisor, for which control stops the robot, too."""
     age_s, limit_s = robot.age_s("process_table"), BY_NAME["process_table"].deadline_s
     if age_s is not None and age_s > limit_s:
         yield AlarmFinding(
@@ -36,7 +36,7 @@ def silent_supervisor(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def lost_processes(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find processes that were given up, and those that are being started again."""
+    """Find processes that were given up, and those that are being restarted."""
     for row in _rows(robot):
         if row["state"] == State.GIVEN_UP.value:
             yield _given_up(row)
@@ -45,7 +45,7 @@ def lost_processes(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def odd_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find what the supervisor's watch says: too few values, and such as cannot be."""
+    """Find topics that the supervisor reports: rates too low, and invalid values."""
     for row in _rows(robot):
         for topic in row["topics"] if row["state"] == State.READY.value else ():
             yield from _seldom(row["name"], topic)
@@ -118,15 +118,15 @@ def _nonsense(process: str, topic: Document) -> Iterator[AlarmFinding]:
 
 
 BY_OWNER: Final[Mapping[str, AlarmSeverity]] = {"control": AlarmSeverity.CRITICAL}
-"""How grave a silent topic is by its owner; of others it is a warning."""
+"""The severity of a silent topic by its owner; a warning for all others."""
 ON_DEMAND: Final = frozenset({"base_command"})
-"""Written while the base is driven; safety judges its age then."""
+"""Published only while the base is driven; safety judges its age then."""
 OF_SENSOR: Final[Mapping[str, str]] = {
     "scan": "lidar",
     "imu": "imu",
     "near_obstacles": "camera",
 }
-"""Topics that fall silent with one sensor while their process goes on; `away` may say why."""
+"""Topics that depend on one sensor; `away` of the scene may give the reason."""
 _SUPERVISOR: Final = "supervisor"
 _LEAST_RATIO: Final = 0.01
 _RISE_S: Final = 1.0
@@ -140,7 +140,7 @@ _CELLS: Final = tuple(
 
 
 def old_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
-    """Find cells beyond their deadline; one that is told to work slowly has more time."""
+    """Find cells beyond their deadline, which is longer for a process that was slowed down."""
     away = (robot.document("scene") or {}).get("away", {})
     for topic in _CELLS:
         age_s = robot.age_s(topic.name)
@@ -152,7 +152,7 @@ def old_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
 
 
 def _is_at_work(robot: RobotStatus, topic: Topic) -> bool:
-    """Tell whether its age says something: the supervisor's own silence is another alarm."""
+    """Return whether its age matters: a silent supervisor is another rule's finding."""
     if topic.owner == _SUPERVISOR:
         return topic.name != "process_table" and robot.document("process_table") is not None
     return robot.is_ready(topic.owner)
@@ -164,7 +164,7 @@ def _rate_ratio(robot: RobotStatus, process: str) -> float:
 
 
 def _silent_sensor(robot: RobotStatus, topic: Topic) -> str:
-    """Return the sensor that is to blame: its process writes all that needs it not."""
+    """Return the sensor that caused it, where its process still publishes other topics."""
     sensor = OF_SENSOR.get(topic.name, "")
     return sensor if sensor and robot.document("scene") is not None else ""
 

@@ -1,4 +1,4 @@
-"""Read what all processes publish at one moment, as the input of the alarm rules."""
+"""Read the status of all processes at one moment, as the input of the alarm rules."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -15,9 +15,9 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicStatus:
-    """Hold the newest value of a cell: how old, and its document; of packed fields, "pose" alone.
+    """Hold age and document of a cell's newest value; of packed cells "pose" alone has one.
 
-    That one is `{"state", "doubt", "match_ratio"}`, in words as `status` tells them.
+    That one is `{"state", "doubt", "match_ratio"}`, with the names of the first two.
     """
 
     age_s: float
@@ -26,37 +26,32 @@ class TopicStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotStatus:
-    """Hold the newest word on each topic; what nobody has ever told is missing.
+    """Hold the newest value of each topic; topics that were never published are missing.
 
-    `late_ratio` is the share of control's ticks of the last seconds that came late, None before
-    enough of them went by.
+    `late_ratio` is the share of late ticks of control over the last seconds, None before there are
+    enough ticks.
     """
 
-    words: Mapping[str, TopicStatus] = field(default_factory=dict)
+    topics: Mapping[str, TopicStatus] = field(default_factory=dict)
     late_ratio: float | None = None
 
     def age_s(self, topic: str) -> float | None:
-        """Return how old the newest word on a topic is."""
-        word = self.words.get(topic)
-        return None if word is None else word.age_s
+        """Return the age of a topic's newest value."""
+        topic_status = self.topics.get(topic)
+        return None if topic_status is None else topic_status.age_s
 
     def document(self, topic: str) -> Document | None:
-        """Return the newest document of a topic, None where it is too old to be believed."""
-        word = self.words.get(topic)
-        if word is None or word.age_s > BY_NAME[topic].deadline_s:
+        """Return the newest document of a topic, None where it is beyond its deadline."""
+        topic_status = self.topics.get(topic)
+        if topic_status is None or topic_status.age_s > BY_NAME[topic].deadline_s:
             return None
-        return word.document
-
-    def row(self, process: str) -> Document | None:
-        """Return a process' row of the supervisor's table."""
-        table = self.document("process_table")
-        rows = table["processes"] if table is not None else ()
-        return next((row for row in rows if row["name"] == process), None)
+        return topic_status.document
 
     def is_ready(self, process: str) -> bool:
-        """Tell whether the supervisor says that a process is at work; nobody watches itself."""
-        row = self.row(process)
-        return row is not None and row["state"] == "ready"
+        """Return whether the supervisor reports a process as ready."""
+        table = self.document("process_table")
+        rows = table["processes"] if table is not None else ()
+        return any(row["name"] == process and row["state"] == "ready" for row in rows)
 
 
 DOCUMENTS: Final = frozenset(
@@ -79,20 +74,20 @@ _CELLS: Final = tuple(
 
 
 class StatusReader:
-    """Look at every cell with a deadline, and count control's late ticks over a few seconds."""
+    """Read every cell with a deadline, and count control's late ticks over a few seconds."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
         self._ticks: deque[tuple[int, int, int]] = deque()
 
     def read(self) -> RobotStatus:
-        """Return what is told now."""
-        words = dict(self._words())
-        status = words.get("control_status")
+        """Return the status of now."""
+        topics = dict(self._topics())
+        status = topics.get("control_status")
         ratio = None if status is None else self._late_ratio(status.document or {})
-        return RobotStatus(words=words, late_ratio=ratio)
+        return RobotStatus(topics=topics, late_ratio=ratio)
 
-    def _words(self) -> Iterator[tuple[str, TopicStatus]]:
+    def _topics(self) -> Iterator[tuple[str, TopicStatus]]:
         now_ns = self._link.clock.now_ns()
         for name in _CELLS:
             sample = self._link.fresh(name)
@@ -103,7 +98,7 @@ class StatusReader:
                 )
 
     def _late_ratio(self, status: Document) -> float | None:
-        """Return the share of late ticks within the window, which a control that starts begins."""
+        """Return the share of late ticks within the window, which a restart of control resets."""
         now_ns, ticks = self._link.clock.now_ns(), self._ticks
         tick, late = int(status.get("tick", 0)), int(status.get("late_ticks", 0))
         if ticks and tick < ticks[-1][1]:
@@ -127,5 +122,5 @@ def _document(sample: Sample) -> Document | None:
         }
     try:
         return sample.document() if sample.topic in DOCUMENTS else None
-    except ValueError:  # no JSON, of which the supervisor's watch tells
+    except ValueError:  # no JSON, which the supervisor reports
         return None

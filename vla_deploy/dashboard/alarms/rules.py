@@ -1,4 +1,4 @@
-"""List every rule by which conditions are found: pure functions of what was told."""
+"""List the alarm rules, which are pure functions of the robot's status."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
@@ -29,12 +29,12 @@ RULES: Final[tuple[Rule, ...]] = (
 
 
 def find(robot: RobotStatus) -> dict[Key, AlarmFinding]:
-    """Return every condition that holds."""
-    return {finding.key: finding for rule in RULES for finding in _judged(rule, robot)}
+    """Return the findings of all rules."""
+    return {finding.key: finding for rule in RULES for finding in _findings_of(rule, robot)}
 
 
-def _judged(rule: Rule, robot: RobotStatus) -> Iterable[AlarmFinding]:
-    """Return what a rule finds; one that does not understand what it reads is found itself."""
+def _findings_of(rule: Rule, robot: RobotStatus) -> Iterable[AlarmFinding]:
+    """Return what a rule finds; a rule that fails on its input is a finding itself."""
     try:
         return tuple(rule(robot))
     except (KeyError, TypeError, ValueError) as error:

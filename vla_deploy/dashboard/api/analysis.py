@@ -19,15 +19,15 @@ from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.robots import load_robot
 from vla_deploy.world import SceneUnreadable
 
-# One question at a time: threads that wait for their turn are those that other answers need.
+# Threads that wait for their turn are missing for other answers.
 _TURN_WITHIN_S: Final = 2.0
-# A room full of things takes half a second of a core; the dashboard's budget is a fifth of one.
+# A full room takes half a second of a core; the dashboard's budget is a fifth of one.
 _RATE_HZ: Final = 0.25
 _BURST: Final = 5
 
 
 class Analyst:
-    """Answer questions about the scene, one at a time; for routes that run in threads."""
+    """Analyse the scene, one request at a time; for routes that run in threads."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
@@ -36,10 +36,11 @@ class Analyst:
         self._analyser: Analyser | None = None
 
     def analyse(self, goal: str) -> SceneAnalysis:
-        """Return what the geometric analyser makes of the scene, and of a goal in words.
+        """Return the geometric analysis of the scene, with a verdict on a goal in words.
 
         Raises:
-            ApiError: nothing is seen, the robot's map cannot be used, or too many ask.
+            ApiError: there is no scene, the robot's map cannot be used, or there are too many
+                requests.
         """
         scene = self._link.document("scene", age_limit_s=FRESH_S)
         if scene is None:
@@ -54,8 +55,10 @@ class Analyst:
         if not self._turn.acquire(timeout=_TURN_WITHIN_S):
             raise _unavailable("busy", "others are asking just now", "ask again in a moment")
         try:
-            analyser = self._analyser = self._analyser or _measuring(self._link.robot)
-            return analyser.analyse(question_about(self._link, scene, goal))
+            # Before the analyser is loaded, which may take longer than a pose is fresh.
+            question = question_about(self._link, scene, goal)
+            analyser = self._analyser = self._analyser or _geometric_analyser(self._link.robot)
+            return analyser.analyse(question)
         except SceneUnreadable as error:
             raise _unavailable("no_scene", str(error)) from error
         except MapInvalid as error:
@@ -64,15 +67,15 @@ class Analyst:
             self._turn.release()
 
 
-def _measuring(robot: str) -> Analyser:
+def _geometric_analyser(robot: str) -> Analyser:
     from vla_deploy.analysis.abilities import Abilities  # takes pinocchio with it
     from vla_deploy.analysis.geometric import GeometricAnalyser
 
     return GeometricAnalyser(Abilities.of(load_robot(robot)))
 
 
-def _unavailable(code: str, what: str, try_: str = "vla-deploy status") -> ApiError:
-    return ApiError(HTTPStatus.SERVICE_UNAVAILABLE, code, what, try_)
+def _unavailable(code: str, what: str, hint: str = "vla-deploy status") -> ApiError:
+    return ApiError(HTTPStatus.SERVICE_UNAVAILABLE, code, what, hint)
 
 
 router = APIRouter(tags=["state"])
@@ -89,7 +92,7 @@ def get_analysis(
 ) -> SceneAnalysis:
     """Return the analysis by measurement, with a verdict where a goal is given.
 
-    No model and no server is asked, and nothing is done.
+    No model and no server is asked, and nothing moves.
     """
     analyst: Any = request.app.state.analyst
     analysis: SceneAnalysis = analyst.analyse(goal)

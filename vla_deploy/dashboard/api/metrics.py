@@ -1,4 +1,4 @@
-"""Answer metrics for scrapers, their history for pages, and the reason for what is missing."""
+"""Answer metrics, their history, and the reasons for missing values."""
 
 import asyncio
 import json
@@ -27,7 +27,7 @@ _MOST_NAMES: Final = 64
 
 @scraped.get("/metrics", response_class=Response)
 async def get_metrics(request: Request) -> Response:
-    """Return every metric in Prometheus' text format, or in OpenMetrics where that is asked for."""
+    """Return every metric in Prometheus' text format, or in OpenMetrics on request."""
     readings = request.app.state.metering.readings()
     text, content_type = expose(readings, request.headers.get("accept", ""))
     return Response(text, headers={"content-type": content_type})
@@ -35,7 +35,7 @@ async def get_metrics(request: Request) -> Response:
 
 @router.get("/metrics")
 async def get_metrics_as_json(request: Request) -> dict[str, Any]:
-    """Return every metric with its values, and in words why the others have none."""
+    """Return every metric with its values, and the reasons for missing ones."""
     readings: Readings = request.app.state.metering.readings()
     return {
         "metrics": [
@@ -85,9 +85,9 @@ async def get_history(
     series: Annotated[str, Query(max_length=4096, description="names, by commas; a metric: all")],
     span_s: Annotated[float, Query(gt=0, le=_LONGEST_SPAN_S)] = 600.0,
 ) -> StreamingResponse:
-    """Return series over the last `span_s`: mean (`values`), least and most of each step.
+    """Return series over the last `span_s`: mean (`values`), minimum and maximum of each step.
 
-    Counters come as what they gained per second. `null` is a step in which nothing is known.
+    Counters are given as rates per second. `null` is a step without data.
     """
     store = _store(request)
     names = _chosen(store, series)
@@ -102,11 +102,11 @@ async def get_history(
         "times_s": _times_s(trends, len(next(iter(trends.series.values())).mean) if names else 0),
         "missing": {one.metric: one.text for one in missing if one.metric in asked},
     }
-    return StreamingResponse(_told(head, names, trends), media_type="application/json")
+    return StreamingResponse(_serialised(head, names, trends), media_type="application/json")
 
 
-async def _told(head: dict[str, Any], names: list[str], trends: Trends) -> AsyncIterator[str]:
-    """Tell series one by one: all their numbers at once would hold everybody else up."""
+async def _serialised(head: dict[str, Any], names: list[str], trends: Trends) -> AsyncIterator[str]:
+    """Serialise series one by one: all at once would block the event loop."""
     yield json.dumps(head).removesuffix("}") + ', "series": ['
     for place, name in enumerate(names):
         yield (", " if place else "") + json.dumps(_document(name, trends))
@@ -128,7 +128,7 @@ def _store(request: Request) -> TrendStore:
 
 
 def _chosen(store: TrendStore, asked: str) -> list[str]:
-    """Return the kept series that are asked for, each by its name or by that of its metric."""
+    """Return the kept series that are requested, by their names or their metrics' names."""
     wanted = list(dict.fromkeys(name.strip() for name in asked.split(",")))
     unknown = [name for name in wanted if name.partition("/")[0] not in KEPT]
     if unknown or len(wanted) > _MOST_NAMES:

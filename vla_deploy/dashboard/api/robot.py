@@ -1,4 +1,4 @@
-"""Answer what the robot is made of, its map, and the newest camera image."""
+"""Answer the robot's links and zones, its map, and the newest camera image."""
 
 from dataclasses import asdict
 from functools import cached_property
@@ -21,7 +21,7 @@ _DIGITS: Final = 6
 
 
 class StaticModel:
-    """Hold a robot's description in the forms that a page draws; made when first asked for."""
+    """Hold a robot's description and map in the forms that a page draws; made on first use."""
 
     def __init__(self, robot: RobotDescription) -> None:
         self.robot = robot
@@ -35,7 +35,7 @@ class StaticModel:
     def model(self) -> dict[str, Any]:
         """Return links and safety zones, all in the base frame.
 
-        Wheels turn by no joint of the arrays: they are drawn where they are at zero.
+        Wheels have no entry in the joint arrays: they are drawn at zero.
         """
         robot = self.robot
         return {
@@ -51,7 +51,7 @@ class StaticModel:
 
     @cached_property
     def map(self) -> dict[str, Any]:
-        """Return where the map's picture lies, and what has a name on it.
+        """Return the position of the map's image, and its places and zones.
 
         Raises:
             MapInvalid: the robot's map cannot be used.
@@ -85,7 +85,7 @@ class StaticModel:
 
 
 def _rounded(value: Any) -> Any:
-    """Return a document whose numbers are as fine as a page can draw them."""
+    """Return a document with all numbers rounded."""
     if isinstance(value, dict):
         return {key: _rounded(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
@@ -111,7 +111,7 @@ def model(request: Request) -> dict[str, Any]:
 
 @router.get("/map")
 def floor(request: Request) -> dict[str, Any]:
-    """Return where the map's picture lies (its lower left corner), places and keep-out zones."""
+    """Return the lower left corner of the map's image, places and keep-out zones."""
     try:
         return _model(request).map
     except MapInvalid as error:
@@ -120,7 +120,7 @@ def floor(request: Request) -> dict[str, Any]:
 
 @router.get("/map.png", response_class=Response, responses=_PICTURES)
 def floor_picture(request: Request) -> Response:
-    """Return the map's picture: black is blocked, white is free, grey is unknown."""
+    """Return the map's image: black is blocked, white is free, grey is unknown."""
     try:
         return Response(_model(request).map_png, media_type="image/png", headers=_KEPT)
     except MapInvalid as error:
@@ -129,7 +129,7 @@ def floor_picture(request: Request) -> Response:
 
 @router.get("/camera.jpg", response_class=Response, responses=_PICTURES)
 async def camera(request: Request) -> Response:
-    """Return the newest picture of the head's camera."""
+    """Return the newest image of the head's camera."""
     feed: CameraFeed = request.app.state.camera
     picture = feed.newest()
     if picture is None:

@@ -24,13 +24,13 @@ from vla_deploy.robots.kinematic_tree import KinematicTree
 Array = NDArray[np.float64]
 
 SEEN_NS: Final = 3 * NS_PER_S // 2
-"""What was seen last longer before the picture is remembered, not detected."""
+"""Objects that were seen longer before the image are remembered, not detected."""
 NEAREST_M: Final = 0.1
 _CORNERS: Final = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
 
 
 class Detections:
-    """Project what `scene` tells into pictures."""
+    """Project the objects of `scene` into images."""
 
     def __init__(self, space: SharedSpace, robot: RobotDescription, tree: KinematicTree) -> None:
         self._robot = robot
@@ -40,7 +40,7 @@ class Detections:
         self._joints = space.cell_reader("joint_state")
 
     def in_frame(self, frame: Frame) -> list[dict[str, Any]]:
-        """Return what is in a picture: names, confidence, and boxes in its pixels."""
+        """Return the detections in an image: names, confidence, and boxes in its pixels."""
         scene, camera = self._scene.latest(), self._camera_from_map()
         if scene is None or camera is None:
             return []
@@ -67,7 +67,7 @@ class Detections:
         return inverse
 
     def _box(self, corners: Array, frame: Frame) -> list[float] | None:
-        """Return left, top, right, bottom within the picture; None for what is not in it."""
+        """Return left, top, right, bottom within the image; None for what is outside."""
         if corners[:, 2].min() < NEAREST_M:
             return None
         pixels = project(self._robot.camera.intrinsics, corners)
@@ -79,7 +79,7 @@ class Detections:
 
 
 def _cuboids(scene: Mapping[str, Any], stamp_ns: int) -> Iterator[tuple[dict[str, Any], Array]]:
-    """Yield what was seen just now, and the corners of its cuboid in the map."""
+    """Yield what was seen at the image's time, and the corners of its cuboid in the map."""
     for thing in scene.get("objects", ()):
         if abs(stamp_ns - thing["last_seen_ns"]) <= SEEN_NS:
             names = {key: thing[key] for key in ("id", "class", "colour", "confidence")}
@@ -109,7 +109,7 @@ QUALITY: Final = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraImage:
-    """Hold a JPEG and what is told with it; boxes are in its pixels."""
+    """Hold a JPEG and its header; boxes are in its pixels."""
 
     jpeg: bytes
     stamp_ns: int
@@ -117,7 +117,7 @@ class CameraImage:
 
 
 class CameraFeed:
-    """Be the live topic "camera", and give the newest picture to whoever asks."""
+    """Publish the live topic "camera", and return the newest image on request."""
 
     topic = "camera"
     period_s = 0.2
@@ -128,18 +128,18 @@ class CameraFeed:
         self._detections = detections
         self._picture: CameraImage | None = None
         self._sequence = 0
-        self._told = 0
+        self._sent = 0
 
     def begin(self) -> None:
-        """Show the newest picture again."""
-        self._told = 0
+        """Send the newest image again."""
+        self._sent = 0
 
     def look(self, now: LookTime) -> Sequence[LiveMessage]:
-        """Return the picture, if it is a new one."""
+        """Return the image, if it is new."""
         picture = self.newest()
-        if picture is None or self._sequence == self._told:
+        if picture is None or self._sequence == self._sent:
             return ()
-        self._told = self._sequence
+        self._sent = self._sequence
         times = {
             "stamp_s": round(now.wall_s(picture.stamp_ns), 4),
             "age_s": round(now.age_s(picture.stamp_ns), 4),
@@ -148,10 +148,10 @@ class CameraFeed:
         return (binary_message(self.topic, Binary.CAMERA_JPEG, header, picture.jpeg),)
 
     def newest(self) -> CameraImage | None:
-        """Return the newest picture, None before the first; a picture is encoded once.
+        """Return the newest image, None before the first; each is encoded once.
 
         Raises:
-            BadPayload: the frame has another size than it says.
+            BadPayload: the frame's size contradicts its header.
         """
         beat = self._pulse.latest()
         if beat is not None and beat.sequence != self._sequence:
@@ -172,7 +172,7 @@ class CameraFeed:
 
 
 def _shrunk(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    """Return an image no wider than `WIDEST_PX`, and by how much it shrank."""
+    """Return an image no wider than `WIDEST_PX`, and the scale."""
     ratio = min(1.0, WIDEST_PX / image.shape[1])
     if ratio == 1.0:
         return image, ratio

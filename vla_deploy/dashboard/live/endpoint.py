@@ -22,25 +22,21 @@ from vla_deploy.dashboard.access.connections import BoundedWebSocket
 from vla_deploy.dashboard.live.hub import STEP_S, LiveClient, LiveHub, Send
 from vla_deploy.dashboard.live.message import LiveMessage
 
-FRAMES: Final = "vla_deploy.frames"
-"""The extension of ASGI by which the protocol says that it takes `frames`, and `abort`."""
-FROZEN: Final = 1008
+LONGEST_TEXT: Final = 8_192
+MOST_FAULTS: Final = 20
 LOST: Final = 1006
-_CLOSING_S: Final = 1.0
+POLICY_VIOLATION: Final = 1008
+TRY_LATER: Final = 1013
+
+router = APIRouter()
 
 
 class LiveProtocol(BoundedWebSocket):
-    """Be uvicorn's protocol, but take whole frames, and close at once where that is asked.
+    """Extend uvicorn's protocol: send whole frames, and abort a connection on request.
 
-    Frames are the same for all clients as long as nothing is compressed: it takes its place
-    together with `ws_per_message_deflate=False`.
+    Frames are the same for all clients only without compression, so it needs
+    `ws_per_message_deflate=False`.
     """
-
-    async def run_asgi(self) -> None:
-        """Run the application, which finds the extension in its scope."""
-        if not self.conn.extensions:
-            self.scope["extensions"] = {**(self.scope["extensions"] or {}), FRAMES: {}}
-        await super().run_asgi()
 
     async def send(self, message: Any) -> None:
         """Send an event of ASGI.
@@ -59,76 +55,60 @@ class LiveProtocol(BoundedWebSocket):
             await super().send(message)
 
     async def receive(self) -> Any:
-        """Return the next event, which lets more of them come."""
+        """Return the next event; read on only while the client takes what is sent."""
         event = await super().receive()
         if not self.writable.is_set():
             self.transport.pause_reading()
         return event
 
     def pause_writing(self) -> None:
-        """Hear nothing from a client that takes nothing: it would be owed a pong for each ping."""
+        """Read nothing from a client that takes nothing: pongs for its pings would pile up."""
         super().pause_writing()
         self.transport.pause_reading()
 
     def resume_writing(self) -> None:
-        """Hear the client again, unless an event of it still waits."""
+        """Read again, unless an event still waits."""
         super().resume_writing()
         if not self.read_paused:
             self.transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell a connection that was lost from one that was closed: uvicorn calls both 1005."""
+        """Report a lost connection as 1006: uvicorn reports 1005, as for a closed one."""
         if self.handshake_complete and self.conn.close_rcvd is None:
             self.queue.put_nowait({"type": "websocket.disconnect", "code": LOST})
         super().connection_lost(exc)
 
     def keepalive_timeout(self) -> None:
-        """Cut off a client that answers no ping: it would not read a farewell either."""
+        """Abort the connection of a client that answers no ping: it reads no close frame either."""
         self.transport.abort()
 
 
-def sender_of(websocket: WebSocket) -> Send:
-    """Return what sends messages to a client, all of them in one write where the server can."""
+def _sender(websocket: WebSocket) -> Send:
+    """Return what sends messages to a client, all of them in one write."""
 
-    async def send_frames(messages: Sequence[LiveMessage]) -> None:
+    async def send(messages: Sequence[LiveMessage]) -> None:
         frames = b"".join(message.frame for message in messages)
         await websocket.send({"type": "websocket.send", "frames": frames})
 
-    async def send_each(messages: Sequence[LiveMessage]) -> None:
-        for message in messages:
-            await (
-                websocket.send_text(message.content)
-                if isinstance(message.content, str)
-                else websocket.send_bytes(message.content)
-            )
-
-    return send_frames if FRAMES in websocket.scope.get("extensions", {}) else send_each
+    return send
 
 
-async def cut_off(websocket: WebSocket) -> None:
-    """End a connection whose client reads nothing: at once where the server can."""
-    farewell = {"type": "websocket.close", "code": FROZEN, "reason": "you take nothing"}
-    with contextlib.suppress(WebSocketDisconnect, TimeoutError):  # it has gone: that was wanted
-        await asyncio.wait_for(websocket.send({**farewell, "abort": True}), _CLOSING_S)
-
-
-LONGEST_TEXT: Final = 8_192
-MOST_FAULTS: Final = 20
-TRY_LATER: Final = 1013
-BAD_TALK: Final = 1008
-
-router = APIRouter()
+async def _cut_off(websocket: WebSocket) -> None:
+    """Abort a connection whose client reads nothing."""
+    close = {"type": "websocket.close", "code": POLICY_VIOLATION, "abort": True}
+    with contextlib.suppress(WebSocketDisconnect):  # the client has gone already
+        await websocket.send(close)
 
 
 @router.websocket("/live")
 async def live(websocket: WebSocket, _: Viewer) -> None:
-    """Bring a client what it subscribes to until it goes, or takes nothing any more."""
+    """Send a client its topics until it disconnects or takes nothing."""
     hub: LiveHub = websocket.app.state.live
     await websocket.accept()
     if hub.is_full:
         await websocket.close(TRY_LATER, "too many clients are connected; close a page elsewhere")
         return
-    client = LiveClient(sender_of(websocket), hub.clock)
+    client = LiveClient(_sender(websocket), hub.clock)
     delivering = hub.join(client)
     listening = asyncio.create_task(_listen(websocket, hub, client))
     try:
@@ -142,10 +122,10 @@ async def live(websocket: WebSocket, _: Viewer) -> None:
 
 
 async def _listen(websocket: WebSocket, hub: LiveHub, client: LiveClient) -> None:
-    """Take what the client wants, not faster than there is anything to bring."""
+    """Take subscriptions, at most one each step of the hub."""
     faults = 0
     while faults < MOST_FAULTS:
-        fault = _heed(await _next_text(websocket), hub, client)
+        fault = _subscribe(await _next_text(websocket), hub, client)
         if fault:
             faults += 1
             await websocket.send_json({"topic": "error", "data": fault})
@@ -160,20 +140,20 @@ async def _next_text(websocket: WebSocket) -> str:
 
 
 async def _end(websocket: WebSocket, *tasks: "asyncio.Task[None]", is_frozen: bool) -> None:
-    """Close the connection, unless the client has gone; raise what else ended a task."""
+    """Close the connection, unless the client has gone; raise other errors of the tasks."""
     errors = [task.exception() for task in tasks if not task.cancelled()]
     for error in filter(None, errors):
         if isinstance(error, WebSocketDisconnect):
             return
         raise error
     if is_frozen:
-        await cut_off(websocket)
+        await _cut_off(websocket)
     else:
-        await websocket.close(BAD_TALK, 'expected {"subscribe": [topic, ...]}')
+        await websocket.close(POLICY_VIOLATION, 'expected {"subscribe": [topic, ...]}')
 
 
-def _heed(text: str, hub: LiveHub, client: LiveClient) -> dict[str, str]:
-    """Do what a client asks; return what is wrong with it, empty where nothing is."""
+def _subscribe(text: str, hub: LiveHub, client: LiveClient) -> dict[str, str]:
+    """Apply a client's subscription; return what is wrong with it, if anything."""
     topics = _topics_in(text)
     if topics is None:
         return {
@@ -193,14 +173,14 @@ def _heed(text: str, hub: LiveHub, client: LiveClient) -> dict[str, str]:
 
 
 def _topics_in(text: str) -> frozenset[str] | None:
-    """Return the topics that a subscription names, None where it is none."""
+    """Return the topics of a subscription, None for any other text."""
     if len(text) > LONGEST_TEXT:
         return None
     try:
-        asked: Any = json.loads(text)
+        document: Any = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    topics = asked.get("subscribe") if isinstance(asked, dict) else None
+    topics = document.get("subscribe") if isinstance(document, dict) else None
     if not isinstance(topics, list) or not all(isinstance(topic, str) for topic in topics):
         return None
     return frozenset(topics)

@@ -17,14 +17,14 @@ from drivers.clock import NS_PER_S
 
 
 class Binary(IntEnum):
-    """Number what a binary message carries."""
+    """Number the kinds of binary messages."""
 
     CAMERA_JPEG = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LookTime:
-    """Say when somebody looks: on the run's clock, and by the wall."""
+    """Hold one moment on the run's clock and on the wall clock."""
 
     run_ns: int
     wall_ns: int
@@ -34,19 +34,15 @@ class LookTime:
         return (self.wall_ns - self.run_ns + stamp_ns) / NS_PER_S
 
     def age_s(self, stamp_ns: int) -> float:
-        """Return how long ago a stamp of the run's clock was."""
+        """Return the age of a stamp of the run's clock."""
         return (self.run_ns - stamp_ns) / NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LiveMessage:
-    """Hold a message of a topic; a `queued` one is an event, of which none is skipped.
-
-    `frame` is the content as a WebSocket carries it to any client.
-    """
+    """Hold a message of a topic as a WebSocket frame; a `queued` one is an event, never skipped."""
 
     topic: str
-    content: str | bytes
     frame: bytes
     queued: bool = False
 
@@ -54,7 +50,7 @@ class LiveMessage:
 def text_message(
     topic: str, stamp_ns: int, now: LookTime, data: bytes, *, queued: bool = False
 ) -> LiveMessage:
-    """Wrap JSON text that is whole already."""
+    """Return the message of data that is JSON text."""
     head = json.dumps(
         {
             "topic": topic,
@@ -63,17 +59,16 @@ def text_message(
         }
     )
     payload = b"".join((head[:-1].encode(), b', "data": ', data, b"}"))
-    frame = _frame(Opcode.TEXT, payload)
-    return LiveMessage(topic=topic, content=payload.decode(), frame=frame, queued=queued)
+    return LiveMessage(topic=topic, frame=_frame(Opcode.TEXT, payload), queued=queued)
 
 
 def json_message(
     topic: str, stamp_ns: int, now: LookTime, data: Any, *, queued: bool = False
 ) -> LiveMessage:
-    """Wrap data that is no text yet.
+    """Return the message of data that is serialised here.
 
     Raises:
-        ValueError: a number is not finite: JSON has none such.
+        ValueError: a number is not finite, which JSON cannot express.
     """
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text_message(topic, stamp_ns, now, text.encode(), queued=queued)
@@ -82,17 +77,16 @@ def json_message(
 def binary_message(
     topic: str, kind: Binary, header: Mapping[str, Any], payload: bytes
 ) -> LiveMessage:
-    """Wrap bytes with their header."""
+    """Return the message of bytes with a JSON header."""
     head = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
     whole = b"".join((struct.pack("<BI", kind, len(head)), head, payload))
-    return LiveMessage(topic=topic, content=whole, frame=_frame(Opcode.BINARY, whole))
+    return LiveMessage(topic=topic, frame=_frame(Opcode.BINARY, whole))
 
 
 def lost_message(topic: str, count: int) -> LiveMessage:
-    """Tell a client how many events of a topic it was too slow for."""
+    """Return the message that a client lost events of a topic."""
     text = json.dumps({"topic": "lost", "data": {"topic": topic, "count": count}})
-    frame = _frame(Opcode.TEXT, text.encode())
-    return LiveMessage(topic="lost", content=text, frame=frame, queued=True)
+    return LiveMessage(topic="lost", frame=_frame(Opcode.TEXT, text.encode()), queued=True)
 
 
 def _frame(opcode: Opcode, payload: bytes) -> bytes:
@@ -100,22 +94,22 @@ def _frame(opcode: Opcode, payload: bytes) -> bytes:
 
 
 class LiveFeed(Protocol):
-    """Look at one live topic; only while somebody is subscribed to it."""
+    """Make the messages of one live topic, only while a client is subscribed to it."""
 
     @property
     def topic(self) -> str:
-        """Return its name."""
+        """Return the topic's name."""
         ...
 
     @property
     def period_s(self) -> float:
-        """Return the least time between two looks."""
+        """Return the shortest time between two looks."""
         ...
 
     def begin(self) -> None:
-        """Forget what happened while nobody was subscribed; the next look gives what is newest."""
+        """Forget the time without subscribers; the next look returns the newest value."""
         ...
 
     def look(self, now: LookTime) -> Sequence[LiveMessage]:
-        """Return what is new since the last look; quick, and never waiting for anybody."""
+        """Return what is new since the last look, without waiting."""
         ...

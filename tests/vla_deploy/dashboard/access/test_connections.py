@@ -1,5 +1,6 @@
 """What uvicorn itself lets through, over real sockets."""
 
+import asyncio
 import contextlib
 import select
 import socket
@@ -17,7 +18,7 @@ from vla_deploy.dashboard.access import UserRole, connections
 from vla_deploy.dashboard.access.connections import Connections
 from vla_deploy.dashboard.access.identity import Peer, peer_at
 from vla_deploy.dashboard.access.session_expiry import CHECK_NS
-from vla_deploy.dashboard.serving import Door, serve
+from vla_deploy.dashboard.serving import HttpSocket, serve
 
 FAR = peer_at("192.168.1.7")
 HEAD_WITHIN_S = 0.3
@@ -79,10 +80,9 @@ def robot(world):
     listener = socket.create_server(("127.0.0.1", 0))
     bounds = Connections(3, 2, HEAD_WITHIN_S)
     ended = threading.Event()
-    door = Door("tcp", listener)
-    thread = threading.Thread(
-        target=serve, args=(made.app, [door], Idle(), MonotonicClock(), ended.is_set, bounds)
-    )
+    sockets = [HttpSocket(listener)]
+    serving = serve(made.app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds)
+    thread = threading.Thread(target=asyncio.run, args=(serving,))
     thread.start()
     yield Robot(listener.getsockname()[1], bounds, made)
     ended.set()

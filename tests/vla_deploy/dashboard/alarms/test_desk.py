@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.alarms.manager import AlarmFeed, AlarmFile, AlarmManager
 from vla_deploy.dashboard.alarms.robot_status import RobotStatus, TopicStatus
 from vla_deploy.dashboard.live.message import LookTime
@@ -25,7 +26,7 @@ STOPPED = {
 def told(status):
     judged = {"tick": 10, "judged_tick": 10}
     return RobotStatus(
-        words={"control_status": TopicStatus(age_s=0.01, document={**status, **judged})}
+        topics={"control_status": TopicStatus(age_s=0.01, document={**status, **judged})}
     )
 
 
@@ -145,7 +146,7 @@ def test_pages_are_told_on_change_alone(office, hand_clock):
     office.now = told(STOPPED)
     office.look_for(1)
     (message,) = feed.look(now)
-    assert json.loads(message.content)["data"]["alarms"][0]["field"] == "estop"
+    assert json.loads(payload_of(message))["data"]["alarms"][0]["field"] == "estop"
 
 
 def test_the_api_lists_alarms_and_notes_who_has_seen_one(dashboard):

@@ -34,8 +34,17 @@ def begun(at_s=100.0):
 
 def test_an_alarm_tells_what_its_condition_tells_and_since_when():
     (alarm,) = begun().alarms
-    assert (alarm.id, alarm.process, alarm.subject) == ("1", "control", "left_elbow")
-    assert (alarm.measured, alarm.limit, alarm.unit, alarm.since_s) == (71.0, 70.0, "°C", 100.0)
+    assert (alarm.id, alarm.finding.process, alarm.finding.subject) == (
+        "1",
+        "control",
+        "left_elbow",
+    )
+    assert (alarm.finding.measured, alarm.finding.limit, alarm.finding.unit, alarm.since_s) == (
+        71.0,
+        70.0,
+        "°C",
+        100.0,
+    )
     assert alarm.is_open
     assert alarm.acknowledged_by is None
 
@@ -43,7 +52,7 @@ def test_an_alarm_tells_what_its_condition_tells_and_since_when():
 def test_it_goes_on_with_new_numbers():
     later = update_ledger(begun(), holding(replace(HOT, measured=75.0)), 110.0)
     (alarm,) = later.alarms
-    assert (alarm.measured, alarm.since_s, alarm.ended_s) == (75.0, 100.0, None)
+    assert (alarm.finding.measured, alarm.since_s, alarm.ended_s) == (75.0, 100.0, None)
 
 
 def test_seeing_it_does_not_end_it_and_the_first_who_has_is_kept():
@@ -58,7 +67,7 @@ def test_seeing_one_that_is_not_there_changes_nothing():
 
 def test_it_ends_with_its_condition_and_stays_to_be_read():
     (alarm,) = update_ledger(begun(), {}, 120.0).alarms
-    assert (alarm.ended_s, alarm.text) == (120.0, "hot")
+    assert (alarm.ended_s, alarm.finding.text) == (120.0, "hot")
 
 
 def test_one_that_comes_back_soon_is_the_same_and_stays_seen():
@@ -88,7 +97,7 @@ def test_it_forgets_the_oldest_that_have_ended_before_any_that_lasts():
         ledger = update_ledger(ledger, holding(HOT), 200.5 + number)
     assert len(ledger.alarms) == MOST_ALARMS
     assert ledger.alarms[0].id == "1"
-    assert ledger.alarms[-1].subject == f"joint {3 * MOST_ALARMS - 1}"
+    assert ledger.alarms[-1].finding.subject == f"joint {3 * MOST_ALARMS - 1}"
 
 
 def test_however_many_last_it_stays_bounded():

@@ -39,7 +39,7 @@ class Words:
             topic: TopicStatus(age_s=age_s, document=self.documents.get(topic))
             for topic, age_s in self.ages_s.items()
         }
-        return list(find(RobotStatus(words=words, late_ratio=self.late_ratio)).values())
+        return list(find(RobotStatus(topics=words, late_ratio=self.late_ratio)).values())
 
     def only(self):
         (finding,) = self.findings()

@@ -96,9 +96,7 @@ def serve() -> Any:
     """Serve a hub at a port of this computer, as the process does."""
 
     @contextlib.asynccontextmanager
-    async def serving(
-        hub: LiveHub, protocol: Any = LiveProtocol, prepare: Any = None
-    ) -> AsyncIterator[Served]:
+    async def serving(hub: LiveHub, prepare: Any = None) -> AsyncIterator[Served]:
         app = FastAPI()
         app.state.live = hub
         app.include_router(endpoint.router)
@@ -106,7 +104,7 @@ def serve() -> Any:
         if prepare is not None:
             prepare(app)
         config = uvicorn.Config(
-            app, log_config=None, lifespan="off", ws=protocol, ws_per_message_deflate=False
+            app, log_config=None, lifespan="off", ws=LiveProtocol, ws_per_message_deflate=False
         )
         server = uvicorn.Server(config)
         with socket.create_server(("127.0.0.1", 0)) as listener:

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.live.camera import CameraFeed, Detections
 from vla_deploy.dashboard.live.message import LiveMessage, LookTime
 from vla_deploy.ipc import SharedSpace
@@ -87,7 +88,7 @@ def rig(space: SharedSpace, clock: ManualClock) -> Rig:
 
 
 def opened(message: LiveMessage) -> tuple[dict[str, Any], Any]:
-    whole = message.content
+    whole = payload_of(message)
     assert isinstance(whole, bytes)
     kind, length = struct.unpack_from("<BI", whole)
     assert kind == 1

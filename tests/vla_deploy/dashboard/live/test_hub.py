@@ -33,17 +33,15 @@ async def heard(client: ClientConnection, *but: str) -> Any:
     return text
 
 
-@pytest.mark.parametrize("protocol", ["live", "websockets-sansio"])
 def test_each_client_gets_what_it_subscribed_to(
-    make_hub: MakeHub, serve: Any, until: Until, script: Any, clock: ManualClock, protocol: str
+    make_hub: MakeHub, serve: Any, until: Until, script: Any, clock: ManualClock
 ) -> None:
     pose, events, idle = script("pose"), script("heard", queued=True), script("scan")
     hub = make_hub(pose, events, idle)
 
     async def talk() -> None:
-        options = {} if protocol == "live" else {"protocol": protocol}
         async with (
-            serve(hub, **options) as served,
+            serve(hub) as served,
             connect(served.url) as a,
             connect(served.url) as b,
         ):

@@ -186,7 +186,7 @@ def test_whoever_sends_nothing_loses_the_floor(
 def test_a_robot_without_a_speech_process_says_so(
     rig: Rig, run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(microphone, "_EARS_S", -1.0)
+    monkeypatch.setattr(microphone, "_STATUS_AGE_S", -1.0)
 
     async def talk(url: str) -> None:
         async with connect(url) as client:

@@ -2,6 +2,7 @@
 
 import json
 
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.live.hub import Outbox
 from vla_deploy.dashboard.live.message import LiveMessage, LookTime, json_message
 
@@ -13,7 +14,7 @@ def message(topic: str, number: int, *, queued: bool = False) -> LiveMessage:
 
 
 def taken(outbox: Outbox) -> list[tuple[str, object]]:
-    texts = [json.loads(one.content) for one in outbox.take()]
+    texts = [json.loads(payload_of(one)) for one in outbox.take()]
     return [(text["topic"], text["data"]) for text in texts]
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.live.feeds import MOST_POINTS, PathFeed
 from vla_deploy.dashboard.live.message import LookTime
 from vla_deploy.ipc import SharedSpace
@@ -31,7 +32,7 @@ class Rig:
 
     def told(self) -> Any:
         messages = self.feed.look(LookTime(run_ns=self.clock.ns, wall_ns=0))
-        return json.loads(messages[0].content)["data"] if messages else None
+        return json.loads(payload_of(messages[0]))["data"] if messages else None
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.live.feeds import topic_feeds
 from vla_deploy.dashboard.live.message import LiveFeed, LiveMessage, LookTime
 from vla_deploy.ipc import TOPICS, Kind, SharedSpace
@@ -22,7 +23,7 @@ def feeds(space: SharedSpace) -> Mapping[str, LiveFeed]:
 
 
 def told(message: LiveMessage) -> Any:
-    text = json.loads(message.content)
+    text = json.loads(payload_of(message))
     assert text["topic"] == message.topic
     return text
 

@@ -7,6 +7,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
+from tests.vla_deploy.dashboard.conftest import payload_of
 from vla_deploy.dashboard.live.feeds import RingFeed, TopicTable
 from vla_deploy.dashboard.live.message import LookTime
 from vla_deploy.ipc import BY_NAME, TOPICS, SharedSpace
@@ -14,7 +15,7 @@ from vla_deploy.ipc import BY_NAME, TOPICS, SharedSpace
 
 def rows(table: TopicTable, clock: ManualClock) -> dict[str, Any]:
     (message,) = table.look(LookTime(run_ns=clock.ns, wall_ns=clock.ns))
-    return {row["topic"]: row for row in json.loads(message.content)["data"]["topics"]}
+    return {row["topic"]: row for row in json.loads(payload_of(message))["data"]["topics"]}
 
 
 def test_every_declared_topic_has_a_row_before_anything_is_written(

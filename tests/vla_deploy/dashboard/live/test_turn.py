@@ -25,13 +25,11 @@ def test_samples_are_taken_as_they_are() -> None:
     assert SpeechTurn(RATE_HZ, 0).take(b"", 0).tolist() == []
 
 
-@pytest.mark.parametrize(
-    ("data", "word"), [(b"\x01", "garbage"), (sound(1.0) + b"\x00\x00", "too_large")]
-)
-def test_what_is_no_sound_or_too_much_of_it_ends_the_turn(data: bytes, word: str) -> None:
+@pytest.mark.parametrize(("data", "code"), [(b"\x01", 1007), (sound(1.0) + b"\x00\x00", 1009)])
+def test_what_is_no_sound_or_too_much_of_it_ends_the_turn(data: bytes, code: int) -> None:
     with pytest.raises(SpeechTurnRefused) as refused:
         SpeechTurn(RATE_HZ, 0).take(data, 0)
-    assert refused.value.word == word
+    assert refused.value.code == code
 
 
 def test_sound_may_come_a_little_ahead_of_time_but_not_faster_than_speech() -> None:
@@ -40,7 +38,7 @@ def test_sound_may_come_a_little_ahead_of_time_but_not_faster_than_speech() -> N
     turn.take(sound(AHEAD_S - 1.0), 0)
     with pytest.raises(SpeechTurnRefused, match="faster") as refused:
         turn.take(sound(0.1), NS_PER_S // 20)
-    assert refused.value.word == "too_fast"
+    assert refused.value.code == 4429
 
 
 def test_a_turn_as_long_as_no_command_is_ended() -> None:
@@ -49,7 +47,7 @@ def test_a_turn_as_long_as_no_command_is_ended() -> None:
         turn.take(sound(1.0), (second + 1) * NS_PER_S)
     with pytest.raises(SpeechTurnRefused) as refused:
         turn.take(sound(0.1), round((LONGEST_S + 0.1) * NS_PER_S))
-    assert refused.value.word == "too_long"
+    assert refused.value.code == 4413
 
 
 def test_one_has_the_floor_and_the_other_is_told_who() -> None:
@@ -57,7 +55,7 @@ def test_one_has_the_floor_and_the_other_is_told_who() -> None:
     floor.take("anna")
     with pytest.raises(SpeechTurnRefused, match="anna speaks") as refused:
         floor.take("ben")
-    assert refused.value.word == "taken"
+    assert refused.value.code == 4409
     floor.leave()
     floor.take("ben")
 
