@@ -113,3 +113,8 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
         part.stop()
     robot.space.close()
     link.close()
+
+
+@pytest.fixture
+def stranger(dashboard: Dashboard) -> TestClient:
+    return TestClient(dashboard.app, "http://127.0.0.1:8088", client=("192.0.2.7", 50_000))

@@ -1,3 +1,5 @@
+"""The ledger of alarms is kept by pure functions."""
+
 from dataclasses import replace
 
 from vla_deploy.dashboard.alarms.alarm import (

@@ -1,3 +1,5 @@
+"""The status that the alarm rules read is collected from the topics."""
+
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.robot_status import StatusReader
 from vla_deploy.ipc import SharedSpace

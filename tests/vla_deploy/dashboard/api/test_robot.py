@@ -1,4 +1,4 @@
-"""What does not move is told in the forms that the page draws."""
+"""The robot's links, map and camera image are answered over HTTP."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Metrics and their history are asked for over HTTP; what is missing says why."""
+"""Metrics and their history are answered over HTTP, with reasons for what is missing."""
 
 import asyncio
 from typing import Any
