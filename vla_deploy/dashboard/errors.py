@@ -7,6 +7,7 @@ ApiError            a route cannot do what was requested
 import logging
 from collections.abc import Mapping
 from enum import Enum
+from functools import partial
 from http import HTTPStatus
 from math import ceil
 from typing import Any, Final
@@ -19,6 +20,11 @@ from starlette.exceptions import HTTPException
 from vla_deploy.ipc import BadPayload, IpcError, ReplayOnly
 
 _DESCRIPTION: Final = "see the API's description: /api/v1/openapi.json"
+_IPC_ANSWERS: Final[Mapping[type[IpcError], tuple[HTTPStatus, str, str]]] = {
+    BadPayload: (HTTPStatus.UNPROCESSABLE_ENTITY, "unfit", "send plain text, and less of it"),
+    ReplayOnly: (HTTPStatus.CONFLICT, "replay", "look only; no robot is here"),
+    IpcError: (HTTPStatus.SERVICE_UNAVAILABLE, "robot_unreachable", "vla-deploy status"),
+}
 _log = logging.getLogger(__name__)
 
 
@@ -87,9 +93,8 @@ def add_error_handlers(app: FastAPI) -> None:
     """Answer what the routes raise."""
     app.add_exception_handler(ApiError, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
-    app.add_exception_handler(BadPayload, _unfit)
-    app.add_exception_handler(ReplayOnly, _replayed)
-    app.add_exception_handler(IpcError, _unreachable)
+    for kind, answer in _IPC_ANSWERS.items():
+        app.add_exception_handler(kind, partial(_ipc, *answer))
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(Exception, _broken)
 
@@ -107,20 +112,8 @@ async def _invalid(_: Request, error: Any) -> JSONResponse:
     )
 
 
-async def _unfit(_: Request, error: Any) -> JSONResponse:
-    return error_response(
-        HTTPStatus.UNPROCESSABLE_ENTITY, "unfit", str(error), "send plain text, and less of it"
-    )
-
-
-async def _replayed(_: Request, error: Any) -> JSONResponse:
-    return error_response(HTTPStatus.CONFLICT, "replay", str(error), "look only; no robot is here")
-
-
-async def _unreachable(_: Request, error: Any) -> JSONResponse:
-    return error_response(
-        HTTPStatus.SERVICE_UNAVAILABLE, "robot_unreachable", str(error), "vla-deploy status"
-    )
+async def _ipc(status: HTTPStatus, code: str, hint: str, _: Request, error: Any) -> JSONResponse:
+    return error_response(status, code, str(error), hint)
 
 
 async def _http(_: Request, error: Any) -> JSONResponse:

@@ -14,13 +14,10 @@ MOST_KEYS: Final = 4096
 class TokenBuckets:
     """Admit `burst` requests at once, and `rate_hz` in the long run, for each key."""
 
-    def __init__(
-        self, rate_hz: float, burst: int, clock: Clock, most_keys: int = MOST_KEYS
-    ) -> None:
+    def __init__(self, rate_hz: float, burst: int, clock: Clock) -> None:
         self._rate_hz = rate_hz
         self._burst = burst
         self._clock = clock
-        self._most_keys = most_keys
         self._lock = threading.Lock()
         self._by_key: OrderedDict[str, tuple[float, int]] = OrderedDict()
 
@@ -32,7 +29,7 @@ class TokenBuckets:
             left = min(self._burst, left + self._rate_hz * (now_ns - seen_ns) / NS_PER_S)
             wait_s = 0.0 if left >= 1.0 else (1.0 - left) / self._rate_hz
             self._by_key[key] = (left - 1.0 if wait_s == 0.0 else left, now_ns)
-            _forget_beyond(self._by_key, self._most_keys)
+            _bound(self._by_key)
             return wait_s
 
 
@@ -55,10 +52,9 @@ class BackOff:
     An attempt counts as a failure from its start on, so that parallel ones gain nothing.
     """
 
-    def __init__(self, rule: BackOffRule, clock: Clock, most_keys: int = MOST_KEYS) -> None:
+    def __init__(self, rule: BackOffRule, clock: Clock) -> None:
         self._rule = rule
         self._clock = clock
-        self._most_keys = most_keys
         self._lock = threading.Lock()
         self._by_key: OrderedDict[str, tuple[int, int]] = OrderedDict()
 
@@ -79,7 +75,7 @@ class BackOff:
             failures, last_ns = self._by_key.pop(key, (0, now_ns))
             is_forgotten = (now_ns - last_ns) / NS_PER_S > self._rule.forget_s
             self._by_key[key] = (1 if is_forgotten else failures + 1, now_ns)
-            _forget_beyond(self._by_key, self._most_keys)
+            _bound(self._by_key)
 
     def succeeded(self, key: str) -> None:
         """Forget the failures of a key."""
@@ -87,6 +83,6 @@ class BackOff:
             self._by_key.pop(key, None)
 
 
-def _forget_beyond(held: "OrderedDict[str, Any]", most: int) -> None:
-    while len(held) > most:
+def _bound(held: "OrderedDict[str, Any]") -> None:
+    while len(held) > MOST_KEYS:
         held.popitem(last=False)

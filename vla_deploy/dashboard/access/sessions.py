@@ -30,15 +30,12 @@ class LoginSession:
 
 
 class Sessions:
-    """Hold sessions for a limited time; beyond `most`, the least recently used one ends."""
+    """Hold sessions for a limited time; beyond `MOST_SESSIONS` the least recently used one ends."""
 
-    def __init__(
-        self, idle_s: float, longest_s: float, clock: Clock, most: int = MOST_SESSIONS
-    ) -> None:
+    def __init__(self, idle_s: float, longest_s: float, clock: Clock) -> None:
         self._idle_ns = round(idle_s * NS_PER_S)
         self._longest_ns = round(longest_s * NS_PER_S)
         self._clock = clock
-        self._most = most
         self._lock = threading.Lock()
         self._by_digest: OrderedDict[bytes, LoginSession] = OrderedDict()
 
@@ -55,7 +52,7 @@ class Sessions:
         )
         with self._lock:
             self._by_digest[_digest(session_id)] = session
-            while len(self._by_digest) > self._most:
+            while len(self._by_digest) > MOST_SESSIONS:
                 self._by_digest.popitem(last=False)
         return session_id, session
 

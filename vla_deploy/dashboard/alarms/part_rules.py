@@ -1,6 +1,7 @@
 """Find what the parts of the robot report about themselves, and exceeded budgets."""
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Final
 
 from drivers.twin_page import TwinPace
@@ -10,6 +11,17 @@ from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
 
 _LOADING_S: Final = 30.0
 """Models may load for this long after a start without an alarm."""
+BUDGET_UNITS: Final[Mapping[str, str]] = {
+    "memory_mb": "MB",
+    "gpu_memory_mb": "MB",
+    "cpu_ratio": "cores",
+    "disk_free_mb": "MB",
+    "power_w": "W",
+    "temperature_c": "°C",
+}
+_COMPUTER: Final = "computer"
+_REAL_TIME: Final = 0.8
+_TWIN_RISE_S: Final = 10.0
 
 
 def hearing(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -17,17 +29,24 @@ def hearing(robot: RobotStatus) -> Iterator[AlarmFinding]:
     speech = robot.document("speech_status")
     if speech is None:
         return
-    age_s = robot.age_s("speech_status")
+    finding = partial(
+        AlarmFinding,
+        process="speech",
+        severity=AlarmSeverity.WARNING,
+        age_s=robot.age_s("speech_status"),
+        rise_s=_LOADING_S,
+    )
     if speech["state"] == "deaf":
         text = f"the robot understands no words: {speech['why']}"
-        yield _speech("state", text, "type commands; vla-deploy doctor", age_s)
+        yield finding(field="state", text=text, advice="type commands; vla-deploy doctor")
     stop_words = speech["stop_words"]
     if stop_words["state"] != "live" and stop_words["sensitivity"] != "off":  # the user's choice
         text = f"nobody can stop the robot by voice: {stop_words['why']}"
-        yield _speech("stop_words", text, "keep to the other stops; vla-deploy doctor", age_s)
+        advice = "keep to the other stops; vla-deploy doctor"
+        yield finding(field="stop_words", text=text, advice=advice)
     if speech["voice"]["state"] != "ready" and speech["voice"]["why"]:
         text = f"the robot cannot speak: {speech['voice']['why']}"
-        yield _speech("voice", text, "vla-deploy doctor", age_s)
+        yield finding(field="voice", text=text, advice="vla-deploy doctor")
 
 
 def seeing(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -35,18 +54,31 @@ def seeing(robot: RobotStatus) -> Iterator[AlarmFinding]:
     scene = robot.document("scene")
     if scene is None:
         return
-    age_s = robot.age_s("scene")
+    finding = partial(AlarmFinding, process="perception", age_s=robot.age_s("scene"))
     for sensor, why in scene["away"].items():
-        text = f"the {sensor} gives nothing: {why}"
-        advice = "check its cable and power; it is taken up again by itself"
-        yield _perception("away", sensor, text, AlarmSeverity.ERROR, advice, age_s)
+        yield finding(
+            field="away",
+            subject=sensor,
+            text=f"the {sensor} gives nothing: {why}",
+            severity=AlarmSeverity.ERROR,
+            advice="check its cable and power; it is taken up again by itself",
+        )
     for fault in scene["image"]["faults"]:
-        text = f"camera image: {fault}"
-        yield _perception("image", fault, text, AlarmSeverity.WARNING, "clean and light it", age_s)
+        yield finding(
+            field="image",
+            subject=fault,
+            text=f"camera image: {fault}",
+            severity=AlarmSeverity.WARNING,
+            advice="clean and light it",
+        )
     sight = scene["sight"]
     if sight["mode"] == "form" and sight["why"]:
-        text = f"things are named by their form alone: {sight['why']}"
-        yield _perception("sight", "", text, AlarmSeverity.INFO, "vla-deploy models list", age_s)
+        yield finding(
+            field="sight",
+            text=f"things are named by their form alone: {sight['why']}",
+            severity=AlarmSeverity.INFO,
+            advice="vla-deploy models list",
+        )
 
 
 def planning(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -54,13 +86,21 @@ def planning(robot: RobotStatus) -> Iterator[AlarmFinding]:
     planner = robot.document("planner_status")
     if planner is None:
         return
-    age_s = robot.age_s("planner_status")
+    finding = partial(
+        AlarmFinding,
+        process="planner",
+        severity=AlarmSeverity.INFO,
+        age_s=robot.age_s("planner_status"),
+        rise_s=_LOADING_S,
+    )
     for rung, why in planner["away"].items():
         text = f"commands are planned without {rung}: {why}"
-        yield _planner(f"rung {rung}", text, "vla-deploy servers check; vla-deploy doctor", age_s)
+        advice = "vla-deploy servers check; vla-deploy doctor"
+        yield finding(field=f"rung {rung}", text=text, advice=advice)
     trouble = (planner.get("memory") or {}).get("trouble")
     if trouble:
-        yield _planner("memory", f"nothing is remembered: {trouble}", "vla-deploy doctor", age_s)
+        text = f"nothing is remembered: {trouble}"
+        yield finding(field="memory", text=text, advice="vla-deploy doctor")
 
 
 def place(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -95,57 +135,6 @@ def stop_door(robot: RobotStatus) -> Iterator[AlarmFinding]:
         advice="mend dashboard.toml or free the port; the dashboard's own stop goes on",
         age_s=robot.age_s("stop_door_status"),
     )
-
-
-def _speech(field: str, text: str, advice: str, age_s: float | None) -> AlarmFinding:
-    return AlarmFinding(
-        process="speech",
-        field=field,
-        text=text,
-        severity=AlarmSeverity.WARNING,
-        advice=advice,
-        age_s=age_s,
-        rise_s=_LOADING_S,
-    )
-
-
-def _perception(
-    field: str, subject: str, text: str, severity: AlarmSeverity, advice: str, age_s: float | None
-) -> AlarmFinding:
-    return AlarmFinding(
-        process="perception",
-        field=field,
-        subject=subject,
-        text=text,
-        severity=severity,
-        advice=advice,
-        age_s=age_s,
-    )
-
-
-def _planner(field: str, text: str, advice: str, age_s: float | None) -> AlarmFinding:
-    return AlarmFinding(
-        process="planner",
-        field=field,
-        text=text,
-        severity=AlarmSeverity.INFO,
-        advice=advice,
-        age_s=age_s,
-        rise_s=_LOADING_S,
-    )
-
-
-BUDGET_UNITS: Final[Mapping[str, str]] = {
-    "memory_mb": "MB",
-    "gpu_memory_mb": "MB",
-    "cpu_ratio": "cores",
-    "disk_free_mb": "MB",
-    "power_w": "W",
-    "temperature_c": "°C",
-}
-_COMPUTER: Final = "computer"
-_REAL_TIME: Final = 0.8
-_TWIN_RISE_S: Final = 10.0
 
 
 def exceeded_budgets(robot: RobotStatus) -> Iterator[AlarmFinding]:

@@ -105,16 +105,11 @@ class LiveHub:
     def __init__(self, feeds: Iterable[LiveFeed], clock: Clock, wall_ns: Callable[[], int]) -> None:
         self.failed_looks: Counter[str] = Counter()
         self._feeds: dict[str, LiveFeed] = {feed.topic: feed for feed in feeds}
-        self._clock = clock
+        self.clock = clock
         self._wall_ns = wall_ns
         self._clients: dict[LiveClient, asyncio.Task[None]] = {}
         self._due_ns: dict[str, int] = {}
         self._alive_ns = 0
-
-    @property
-    def clock(self) -> Clock:
-        """Return the run's clock."""
-        return self._clock
 
     @property
     def topics(self) -> frozenset[str]:
@@ -197,4 +192,4 @@ class LiveHub:
                 client.outbox.put(message)
 
     def _now(self) -> LookTime:
-        return LookTime(run_ns=self._clock.now_ns(), wall_ns=self._wall_ns())
+        return LookTime(run_ns=self.clock.now_ns(), wall_ns=self._wall_ns())
