@@ -16,25 +16,6 @@ from vla_deploy.dashboard.access import UserRole, require
 
 STATUS_TOPIC: Final = "stop_door_status"
 _HOST: Final = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:\d{1,5})?")
-
-
-def stop_door_url(request: HTTPConnection) -> str:
-    """Return the stop door's address by the host name that the request used.
-
-    The port is the one that the door published last, else that of the settings.
-    """
-    state = request.app.state
-    status = state.link.document(STATUS_TOPIC) or {}
-    port = status.get("port", state.settings.stop_port)
-    return f"{state.settings.scheme}://{called_host(request) or state.settings.host}:{port}"
-
-
-def called_host(request: HTTPConnection) -> str:
-    """Return the name of the Host header without the port, "" when it is malformed."""
-    found = _HOST.fullmatch(request.headers.get("host", ""))
-    return found[1] if found else ""
-
-
 _POLICY: Final = {
     "default-src": "'none'",
     "script-src": "'self'",
@@ -57,6 +38,26 @@ _HEADERS: Final = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), microphone=(self)",
 }
+STATIC: Final = Path(__file__).with_name("static")
+_STOP_META: Final = 'name="stop-door" content=""'
+router = APIRouter(include_in_schema=False, dependencies=[Depends(require(UserRole.ANYONE))])
+
+
+def stop_door_url(request: HTTPConnection) -> str:
+    """Return the stop door's address by the host name that the request used.
+
+    The port is the one that the door published last, else that of the settings.
+    """
+    state = request.app.state
+    status = state.link.document(STATUS_TOPIC) or {}
+    port = status.get("port", state.settings.stop_port)
+    return f"{state.settings.scheme}://{called_host(request) or state.settings.host}:{port}"
+
+
+def called_host(request: HTTPConnection) -> str:
+    """Return the name of the Host header without the port, "" when it is malformed."""
+    found = _HOST.fullmatch(request.headers.get("host", ""))
+    return found[1] if found else ""
 
 
 class SafeHeaders:
@@ -86,12 +87,6 @@ def policy(scope: Any) -> dict[str, str]:
     stop_door = stop_door_url(HTTPConnection(scope))
     words = "; ".join(f"{name} {sources}" for name, sources in _POLICY.items())
     return {"content-security-policy": words.format(stop_door=stop_door)}
-
-
-STATIC: Final = Path(__file__).with_name("static")
-_STOP_META: Final = 'name="stop-door" content=""'
-
-router = APIRouter(include_in_schema=False, dependencies=[Depends(require(UserRole.ANYONE))])
 
 
 class _PageFiles(StaticFiles):

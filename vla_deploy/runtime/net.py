@@ -15,6 +15,13 @@ from typing import Any, Final, NoReturn
 
 from vla_deploy.runtime.state_dir import config_dir_of
 
+SETTINGS_FILE: Final = "dashboard.toml"
+_LAST_PORT: Final = 65535
+_BEYOND_GROUP_READ: Final = 0o037
+_ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
+BACKLOG: Final = 128
+_PAIRS: Final = 200
+
 
 class NetError(Exception):
     """Base of the errors that keep a server from listening; a person can mend them."""
@@ -34,12 +41,6 @@ class PortTaken(NetError):
 
 class TlsUnusable(NetError):
     """Report what is wrong with certificate or key, and what to try."""
-
-
-SETTINGS_FILE: Final = "dashboard.toml"
-_LAST_PORT: Final = 65535
-_BEYOND_GROUP_READ: Final = 0o037
-_ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,10 +149,6 @@ def _contradictions(document: Mapping[str, Any]) -> Iterator[str]:
         yield f"stop_port: expected another port than the dashboard's, got {stop_port} for both"
     if ("tls_certificate" in document) != ("tls_key" in document):
         yield "tls_certificate, tls_key: expected both or neither"
-
-
-BACKLOG: Final = 128
-_PAIRS: Final = 200
 
 
 def open_port(host: str, port: int, *, search: bool, before: int | None = None) -> socket.socket:

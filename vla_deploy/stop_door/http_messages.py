@@ -15,6 +15,49 @@ _LINE_END: Final = re.compile(r"\r?\n")
 _KNOWN: Final = frozenset({"host", "origin", "accept"})
 _HTML_TYPE: Final = "text/html"
 _ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9._:\[\]-]+")  # it is written into an answer
+_STYLE: Final = """
+:root { color-scheme: light dark; font: 1.25rem/1.5 system-ui, sans-serif; }
+body { margin: 0; min-height: 100vh; display: grid; place-content: center; gap: 1.5rem;
+  padding: 1rem; box-sizing: border-box; text-align: center; }
+button { width: min(80vmin, 24rem); aspect-ratio: 1; border: 1rem solid #ffd400;
+  border-radius: 50%; background: #b00020; color: #fff; font: bold 4rem system-ui, sans-serif; }
+button:focus-visible { outline: .5rem solid Highlight; outline-offset: .25rem; }
+"""
+_PAGE: Final = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Stop the robot</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+<h1>{heading}</h1>
+<form method="post" action="/stop"><button autofocus>STOP</button></form>
+<p role="status">{line}</p>
+</main>
+</body>
+</html>
+"""
+STYLE_DIGEST: Final = b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
+"""The hash by which the content security policy admits the page's style."""
+_SILENT: Final = "control is silent; use the emergency stop button on the robot"
+_ALWAYS: Final = {
+    "Connection": "close",
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": (
+        f"default-src 'none'; style-src 'sha256-{STYLE_DIGEST}'; form-action 'self'; "
+        "base-uri 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Vary": "Origin",
+}
+_JSON: Final = "application/json"
+_HTML: Final = "text/html; charset=utf-8"
+_METHODS: Final = {"/": "GET, HEAD, OPTIONS", "/stop": "POST, OPTIONS"}
+_STOP_HERE: Final = "POST /stop stops the robot, GET / shows a page with a stop button"
 
 
 class Malformed(Exception):
@@ -84,41 +127,9 @@ def _host_name(url: str) -> str:
         return ""
 
 
-_STYLE: Final = """
-:root { color-scheme: light dark; font: 1.25rem/1.5 system-ui, sans-serif; }
-body { margin: 0; min-height: 100vh; display: grid; place-content: center; gap: 1.5rem;
-  padding: 1rem; box-sizing: border-box; text-align: center; }
-button { width: min(80vmin, 24rem); aspect-ratio: 1; border: 1rem solid #ffd400;
-  border-radius: 50%; background: #b00020; color: #fff; font: bold 4rem system-ui, sans-serif; }
-button:focus-visible { outline: .5rem solid Highlight; outline-offset: .25rem; }
-"""
-_PAGE: Final = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Stop the robot</title>
-<style>{style}</style>
-</head>
-<body>
-<main>
-<h1>{heading}</h1>
-<form method="post" action="/stop"><button autofocus>STOP</button></form>
-<p role="status">{line}</p>
-</main>
-</body>
-</html>
-"""
-STYLE_DIGEST: Final = b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
-"""The hash by which the content security policy admits the page's style."""
-
-
 def stop_page(heading: str, line: str) -> str:
     """Return the page with a heading and a line below the button."""
     return _PAGE.format(style=_STYLE, heading=escape(heading), line=escape(line))
-
-
-_SILENT: Final = "control is silent; use the emergency stop button on the robot"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,23 +147,6 @@ def control_text(control: ControlState | None) -> str:
         return _SILENT
     latched = ", emergency stop latched" if control.estop_latched else ""
     return f"control: {control.state.replace('_', ' ')}{latched}"
-
-
-_ALWAYS: Final = {
-    "Connection": "close",
-    "Cache-Control": "no-store",
-    "Content-Security-Policy": (
-        f"default-src 'none'; style-src 'sha256-{STYLE_DIGEST}'; form-action 'self'; "
-        "base-uri 'none'; frame-ancestors 'none'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Vary": "Origin",
-}
-_JSON: Final = "application/json"
-_HTML: Final = "text/html; charset=utf-8"
-_METHODS: Final = {"/": "GET, HEAD, OPTIONS", "/stop": "POST, OPTIONS"}
-_STOP_HERE: Final = "POST /stop stops the robot, GET / shows a page with a stop button"
 
 
 def pressed(request: StopRequest, control: ControlState | None) -> bytes:

@@ -37,6 +37,8 @@ _ACCEPTED_AT_ONCE: Final = 32
 _FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 _MAPPED: Final = "::ffff:"
 _log = logging.getLogger(__name__)
+Responder = Callable[[bytes, bool], bytes]
+"""Makes the answer from a head, and from whether the head is whole."""
 
 
 class ConnectionStage(Enum):
@@ -46,10 +48,6 @@ class ConnectionStage(Enum):
     ANSWERING = "answering"
     LINGERING = "lingering"
     CLOSED = "closed"
-
-
-Responder = Callable[[bytes, bool], bytes]
-"""Makes the answer from a head, and from whether the head is whole."""
 
 
 class Connection:

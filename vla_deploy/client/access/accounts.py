@@ -23,6 +23,20 @@ from vla_deploy.client.access.passwords import is_password_hash
 from vla_deploy.client.access.private_file import give, turn
 from vla_deploy.runtime.state_dir import access_dir_of
 
+NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
+MOST_USERS: Final = 64
+MOST_TOKENS: Final = 256
+_TOKEN: Final = re.compile(r"vla_([0-9a-f]{8})_([0-9a-f]{64})")
+_ID_BYTES: Final = 4
+_SECRET_BYTES: Final = 32
+# A clock that is set back by more than this cannot judge what has expired.
+_CLOCK_SLACK_S: Final = 600.0
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+_STRICT: Final = ConfigDict(extra="forbid", frozen=True, strict=True)
+ACCOUNTS_FILE: Final = "accounts.json"
+_MOST_BYTES: Final = 2**20
+T = TypeVar("T")
+
 
 class UserRole(StrEnum):
     """Name what a user may do; each role includes the roles before it."""
@@ -42,19 +56,6 @@ class UserRole(StrEnum):
 
 
 _ORDER: Final = tuple(UserRole)
-
-
-NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
-MOST_USERS: Final = 64
-MOST_TOKENS: Final = 256
-_TOKEN: Final = re.compile(r"vla_([0-9a-f]{8})_([0-9a-f]{64})")
-_ID_BYTES: Final = 4
-_SECRET_BYTES: Final = 32
-# A clock that is set back by more than this cannot judge what has expired.
-_CLOCK_SLACK_S: Final = 600.0
-
-Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-_STRICT: Final = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 def may_log_in(role: UserRole) -> UserRole:
@@ -212,11 +213,6 @@ def _check_name(name: str) -> None:
 
 def _digest(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()
-
-
-ACCOUNTS_FILE: Final = "accounts.json"
-_MOST_BYTES: Final = 2**20
-T = TypeVar("T")
 
 
 class AccountsFile:

@@ -23,6 +23,15 @@ from vla_deploy.runtime.state_dir import access_dir_of
 
 _MOST_LETTERS: Final = 400
 _MOST_DETAILS: Final = 12
+MOST_BYTES: Final = 2**20
+MOST_FILES: Final = 5
+AUDIT_FILE: Final = "audit.jsonl"
+FOLD_S: Final = 60.0
+"""Refusals of one act to one address are recorded once within this time, with their count."""
+STOP_FOLD_S: Final = 1.0
+_MOST_KINDS: Final = 1024
+_MOST_WAITING: Final = 256
+_log = logging.getLogger(__name__)
 
 
 class AuditOutcome(StrEnum):
@@ -81,10 +90,6 @@ def _bounded(details: Mapping[str, Any]) -> dict[str, Any]:
 
 def _short(value: Any) -> Any:
     return value if isinstance(value, bool | int | float) else str(value)[:_MOST_LETTERS]
-
-
-MOST_BYTES: Final = 2**20
-MOST_FILES: Final = 5
 
 
 class AuditFile:
@@ -150,15 +155,6 @@ class AuditFile:
         for older, newer in zip(reversed(files[1:]), reversed(files[:-1]), strict=True):
             if newer.exists():
                 newer.replace(older)
-
-
-AUDIT_FILE: Final = "audit.jsonl"
-FOLD_S: Final = 60.0
-"""Refusals of one act to one address are recorded once within this time, with their count."""
-STOP_FOLD_S: Final = 1.0
-_MOST_KINDS: Final = 1024
-_MOST_WAITING: Final = 256
-_log = logging.getLogger(__name__)
 
 
 class AuditLog:

@@ -33,6 +33,13 @@ from vla_deploy.dashboard.errors import AccessDenied, Denial
 from vla_deploy.runtime.executors import low_priority_thread
 
 _HOUR_S: Final = 3600.0
+CSRF_HEADER: Final = "x-csrf-token"
+_COOKIE: Final = "vla_session"
+_BEARER: Final = "bearer "
+# A user who is not logged in changes nothing but the stop and a login.
+_UNKNOWN_HZ: Final = 1.0
+_UNKNOWN_BURST: Final = 20
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,15 +61,6 @@ class AccessRules:
     session_longest_s: float = 168 * _HOUR_S
     acts_hz: float = 10.0
     acts_burst: int = 40
-
-
-CSRF_HEADER: Final = "x-csrf-token"
-_COOKIE: Final = "vla_session"
-_BEARER: Final = "bearer "
-# A user who is not logged in changes nothing but the stop and a login.
-_UNKNOWN_HZ: Final = 1.0
-_UNKNOWN_BURST: Final = 20
-_log = logging.getLogger(__name__)
 
 
 class AccessControl:

@@ -10,6 +10,9 @@ from vla_deploy.client.access.accounts import UserRole
 
 IDENTITY: Final = "identity"
 """The key of a request's state that holds its identity."""
+UNKNOWN: Final = "unknown"
+SOCKET: Final = "socket"
+_V6_NETWORK_BITS: Final = 64  # one subscriber has a network of that size
 
 
 class AuthMethod(StrEnum):
@@ -40,11 +43,6 @@ class Identity:
 def unknown_user(address: str) -> Identity:
     """Return the identity of a user who is not authenticated."""
     return Identity(role=UserRole.ANYONE, user="anyone", way=AuthMethod.NONE, address=address)
-
-
-UNKNOWN: Final = "unknown"
-SOCKET: Final = "socket"
-_V6_NETWORK_BITS: Final = 64  # one subscriber has a network of that size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,10 @@ _SECURE: Final = {"ws": "http", "wss": "https"}
 
 Scope = MutableMapping[str, Any]
 Headers = Mapping[str, Sequence[str]]
+_HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]{1,253})(?::(?P<port>\d{1,5}))?")
+_DEFAULT_PORT: Final = {"http": "80", "https": "443"}
+FORWARDED: Final = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip", "via")
+"""Reverse proxies add these: behind one, the connection's address identifies nobody."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,12 +71,6 @@ def read_request(scope: Scope) -> IncomingRequest:
         headers=headers,
         peer=peer_of(scope),
     )
-
-
-_HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]{1,253})(?::(?P<port>\d{1,5}))?")
-_DEFAULT_PORT: Final = {"http": "80", "https": "443"}
-FORWARDED: Final = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip", "via")
-"""Reverse proxies add these: behind one, the connection's address identifies nobody."""
 
 
 def host_name(headers: Headers) -> str:

@@ -16,6 +16,10 @@ from vla_deploy.dashboard.errors import AccessDenied, Denial
 
 MOST_SESSIONS: Final = 256
 _ID_BYTES: Final = 32
+PER_ADDRESS: Final = BackOffRule(free=5, first_s=1.0, longest_s=300.0)
+# From any address: guesses by others must not lock the owner out for long.
+PER_USER: Final = BackOffRule(free=10, first_s=1.0, longest_s=30.0)
+_MOST_AT_ONCE: Final = 4
 
 
 @dataclass(slots=True, kw_only=True)
@@ -84,12 +88,6 @@ class Sessions:
 def _digest(session_id: str) -> bytes:
     """Return the key of a session: the time of a look-up reveals nothing about the id."""
     return hashlib.sha256(session_id.encode(errors="surrogatepass")).digest()
-
-
-PER_ADDRESS: Final = BackOffRule(free=5, first_s=1.0, longest_s=300.0)
-# From any address: guesses by others must not lock the owner out for long.
-PER_USER: Final = BackOffRule(free=10, first_s=1.0, longest_s=30.0)
-_MOST_AT_ONCE: Final = 4
 
 
 class Logins:

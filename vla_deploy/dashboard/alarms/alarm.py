@@ -5,6 +5,14 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any, Final
 
+Key = tuple[str, str, str]
+"""Process, field and subject, which identify a finding."""
+_NUMBERS: Final = ("measured", "limit", "age_s")
+_DIGITS: Final = 3
+MOST_ALARMS: Final = 200
+BACK_SOON_S: Final = 60.0
+"""An alarm that comes back within this time is the same one, and stays acknowledged."""
+
 
 class AlarmSeverity(StrEnum):
     """Order what a finding means for the robot, the most severe first."""
@@ -17,10 +25,6 @@ class AlarmSeverity(StrEnum):
     """It works with less than it should have."""
     INFO = "info"
     """It works, but in another way than usual."""
-
-
-Key = tuple[str, str, str]
-"""Process, field and subject, which identify a finding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,8 +55,6 @@ class AlarmFinding:
 
 
 _PUBLISHED: Final = tuple(one.name for one in fields(AlarmFinding) if one.name != "rise_s")
-_NUMBERS: Final = ("measured", "limit", "age_s")
-_DIGITS: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,11 +103,6 @@ def alarm_from_document(document: dict[str, Any]) -> Alarm:
         return Alarm(id=document["id"], finding=AlarmFinding(**finding), **state)
     except (KeyError, TypeError) as error:
         raise ValueError(f"{document!r:.80} is no alarm: {error}") from error
-
-
-MOST_ALARMS: Final = 200
-BACK_SOON_S: Final = 60.0
-"""An alarm that comes back within this time is the same one, and stays acknowledged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

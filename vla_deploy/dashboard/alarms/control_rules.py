@@ -56,6 +56,18 @@ LATE_RATIO: Final = 0.2
 UNJUDGED_TICKS: Final = 2
 _ADVICE: Final = {rule.cause: rule.advice for rule in RULES}
 _LATE_RISE_S: Final = 5.0
+_CABLE: Final = "check cable, termination and the device's power"
+_SHOWN: Final = 4
+_SERVOS: Final = {
+    "lost": ("has lost", AlarmSeverity.ERROR),
+    "degraded": ("gets too few answers of", AlarmSeverity.WARNING),
+}
+_NODES: Final = {
+    "lost_nodes": ("has lost nodes", AlarmSeverity.ERROR),
+    "degraded_nodes": ("has nodes that answer badly", AlarmSeverity.WARNING),
+    "bus_degraded": ("carries damaged frames", AlarmSeverity.WARNING),
+}
+"""Counters of a CAN bus that are zero in normal operation."""
 
 
 def active_cause(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -121,20 +133,6 @@ def _of_cause(status: Document) -> AlarmFinding:
         age_s=status["age_s"],
         rise_s=0.0,
     )
-
-
-_CABLE: Final = "check cable, termination and the device's power"
-_SHOWN: Final = 4
-_SERVOS: Final = {
-    "lost": ("has lost", AlarmSeverity.ERROR),
-    "degraded": ("gets too few answers of", AlarmSeverity.WARNING),
-}
-_NODES: Final = {
-    "lost_nodes": ("has lost nodes", AlarmSeverity.ERROR),
-    "degraded_nodes": ("has nodes that answer badly", AlarmSeverity.WARNING),
-    "bus_degraded": ("carries damaged frames", AlarmSeverity.WARNING),
-}
-"""Counters of a CAN bus that are zero in normal operation."""
 
 
 def troubled_buses(robot: RobotStatus) -> Iterator[AlarmFinding]:

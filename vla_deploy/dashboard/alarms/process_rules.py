@@ -16,6 +16,26 @@ GIVEN_UP: Final[Mapping[GivingUp, AlarmSeverity]] = {
 }
 _AGAIN: Final = (State.BACKOFF.value, State.ABORTING.value)
 _WHAT_IT_MEANS: Final = {spec.name: spec.giving_up for spec in TABLE}
+BY_OWNER: Final[Mapping[str, AlarmSeverity]] = {"control": AlarmSeverity.CRITICAL}
+"""The severity of a silent topic by its owner; a warning for all others."""
+ON_DEMAND: Final = frozenset({"base_command"})
+"""Published only while the base is driven; safety judges its age then."""
+OF_SENSOR: Final[Mapping[str, str]] = {
+    "scan": "lidar",
+    "imu": "imu",
+    "near_obstacles": "camera",
+}
+"""Topics that depend on one sensor; `away` of the scene may give the reason."""
+_SUPERVISOR: Final = "supervisor"
+_LEAST_RATIO: Final = 0.01
+_RISE_S: Final = 1.0
+_CHECK_CABLE: Final = "check its cable and power; it is taken up again by itself"
+_RESTARTED: Final = "the supervisor starts it again before long; see why"
+_CELLS: Final = tuple(
+    topic
+    for topic in TOPICS
+    if topic.kind is Kind.CELL and topic.deadline_s and topic.name not in ON_DEMAND
+)
 
 
 def silent_supervisor(robot: RobotStatus) -> Iterator[AlarmFinding]:
@@ -115,28 +135,6 @@ def _nonsense(process: str, topic: Document) -> Iterator[AlarmFinding]:
             advice=f"vla-deploy logs {process}",
             age_s=topic["age_s"],
         )
-
-
-BY_OWNER: Final[Mapping[str, AlarmSeverity]] = {"control": AlarmSeverity.CRITICAL}
-"""The severity of a silent topic by its owner; a warning for all others."""
-ON_DEMAND: Final = frozenset({"base_command"})
-"""Published only while the base is driven; safety judges its age then."""
-OF_SENSOR: Final[Mapping[str, str]] = {
-    "scan": "lidar",
-    "imu": "imu",
-    "near_obstacles": "camera",
-}
-"""Topics that depend on one sensor; `away` of the scene may give the reason."""
-_SUPERVISOR: Final = "supervisor"
-_LEAST_RATIO: Final = 0.01
-_RISE_S: Final = 1.0
-_CHECK_CABLE: Final = "check its cable and power; it is taken up again by itself"
-_RESTARTED: Final = "the supervisor starts it again before long; see why"
-_CELLS: Final = tuple(
-    topic
-    for topic in TOPICS
-    if topic.kind is Kind.CELL and topic.deadline_s and topic.name not in ON_DEMAND
-)
 
 
 def old_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:

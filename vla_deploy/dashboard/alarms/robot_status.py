@@ -11,6 +11,23 @@ from vla_deploy.ipc import BY_NAME, TOPICS, Kind, Sample
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
 
 Document = Mapping[str, Any]
+DOCUMENTS: Final = frozenset(
+    {
+        "process_table",
+        "control_status",
+        "budget",
+        "resource_directives",
+        "scene",
+        "speech_status",
+        "planner_status",
+        "stop_door_status",
+        "twin_status",
+    }
+)
+_WINDOW_NS: Final = 5 * NS_PER_S
+_CELLS: Final = tuple(
+    topic.name for topic in TOPICS if topic.kind is Kind.CELL and topic.deadline_s
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,25 +69,6 @@ class RobotStatus:
         table = self.document("process_table")
         rows = table["processes"] if table is not None else ()
         return any(row["name"] == process and row["state"] == "ready" for row in rows)
-
-
-DOCUMENTS: Final = frozenset(
-    {
-        "process_table",
-        "control_status",
-        "budget",
-        "resource_directives",
-        "scene",
-        "speech_status",
-        "planner_status",
-        "stop_door_status",
-        "twin_status",
-    }
-)
-_WINDOW_NS: Final = 5 * NS_PER_S
-_CELLS: Final = tuple(
-    topic.name for topic in TOPICS if topic.kind is Kind.CELL and topic.deadline_s
-)
 
 
 class StatusReader:

@@ -24,6 +24,8 @@ _TURN_WITHIN_S: Final = 2.0
 # A full room takes half a second of a core; the dashboard's budget is a fifth of one.
 _RATE_HZ: Final = 0.25
 _BURST: Final = 5
+router = APIRouter(tags=["state"])
+_LONGEST_GOAL: Final = 500
 
 
 class Analyst:
@@ -76,11 +78,6 @@ def _geometric_analyser(robot: str) -> Analyser:
 
 def _unavailable(code: str, what: str, hint: str = "vla-deploy status") -> ApiError:
     return ApiError(HTTPStatus.SERVICE_UNAVAILABLE, code, what, hint)
-
-
-router = APIRouter(tags=["state"])
-
-_LONGEST_GOAL: Final = 500
 
 
 @router.get("/analysis", dependencies=[Depends(require(UserRole.VIEWER))])

@@ -14,6 +14,10 @@ from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.ipc.stop_button import ESTOP
 
+router = APIRouter(tags=["operate"])
+_WITHIN_S: Final = 3.0
+_Operator: Final = Depends(require(UserRole.OPERATOR))
+
 
 async def carried_out(link: RobotLink, act: str, within_s: float) -> tuple[bool, Status | None]:
     """Wait until control's status shows an act; return whether it did in time, and the status."""
@@ -25,12 +29,6 @@ async def carried_out(link: RobotLink, act: str, within_s: float) -> tuple[bool,
         if link.clock.now_ns() >= end_ns:
             return False, status
         await asyncio.sleep(0.02)
-
-
-router = APIRouter(tags=["operate"])
-
-_WITHIN_S: Final = 3.0
-_Operator: Final = Depends(require(UserRole.OPERATOR))
 
 
 class ReasonBody(BaseModel):

@@ -18,6 +18,13 @@ from vla_deploy.robots.kinematic_tree import KinematicTree
 from vla_deploy.robots.tree_reader import read_tree
 
 _DIGITS: Final = 6
+router = APIRouter(tags=["robot"], dependencies=[Depends(require(UserRole.VIEWER))])
+_UNCHANGED_S: Final = 60
+_KEPT: Final = {"cache-control": f"private, max-age={_UNCHANGED_S}"}
+_PICTURES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {"content": {"image/png": {}, "image/jpeg": {}}},
+    404: {"description": "there is none"},
+}
 
 
 class StaticModel:
@@ -91,16 +98,6 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_rounded(one) for one in value]
     return round(value, _DIGITS) if isinstance(value, float) else value
-
-
-router = APIRouter(tags=["robot"], dependencies=[Depends(require(UserRole.VIEWER))])
-
-_UNCHANGED_S: Final = 60
-_KEPT: Final = {"cache-control": f"private, max-age={_UNCHANGED_S}"}
-_PICTURES: Final[dict[int | str, dict[str, Any]]] = {
-    200: {"content": {"image/png": {}, "image/jpeg": {}}},
-    404: {"description": "there is none"},
-}
 
 
 @router.get("/robot/model")

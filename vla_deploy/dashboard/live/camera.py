@@ -27,6 +27,8 @@ SEEN_NS: Final = 3 * NS_PER_S // 2
 """Objects that were seen longer before the image are remembered, not detected."""
 NEAREST_M: Final = 0.1
 _CORNERS: Final = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
+WIDEST_PX: Final = 640
+QUALITY: Final = 80
 
 
 class Detections:
@@ -101,10 +103,6 @@ def _standing(position_m: Sequence[float], width_m: float, top_m: float) -> Arra
 def _turned(yaw_rad: float) -> Array:
     cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array(((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0)))
-
-
-WIDEST_PX: Final = 640
-QUALITY: Final = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

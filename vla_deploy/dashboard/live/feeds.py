@@ -34,6 +34,15 @@ FASTEST_S: Final = 0.1
 ON_CHANGE_S: Final = 0.5
 EVENTS_S: Final = 0.05
 DIGITS: Final = 4
+PERIODS_S: Final[Mapping[str, float]] = {"scan": 0.2}
+"""Topics that are sent less often than their rate and `FASTEST_S` allow."""
+TABLE_PERIOD_S: Final = 0.5
+WINDOW_S: Final = 4.0
+"""Rates are measured over this time: values are counted, and tables come twice a second."""
+MOST_POINTS: Final = 600
+STEP_M: Final = 0.05
+_STALE_S: Final = 1.0
+_FOLLOW_NS: Final = NS_PER_S // 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +62,6 @@ PACKINGS: Final[Mapping[str, Packing]] = {
     "near_obstacles": Packing(counted_by="count", digits=3),
     "scan": Packing(fields=("range_m",), digits=3),
 }
-PERIODS_S: Final[Mapping[str, float]] = {"scan": 0.2}
-"""Topics that are sent less often than their rate and `FASTEST_S` allow."""
 
 
 class CellFeed:
@@ -151,11 +158,6 @@ def _plain(value: Any, digits: int, used: int | None) -> Any:
     return json.loads(json.dumps(exact.tolist()), parse_constant=lambda _: None)
 
 
-TABLE_PERIOD_S: Final = 0.5
-WINDOW_S: Final = 4.0
-"""Rates are measured over this time: values are counted, and tables come twice a second."""
-
-
 class _Counted:
     """Measure the rate of one topic by its sequence."""
 
@@ -211,12 +213,6 @@ class TopicTable:
             "deadline_s": topic.deadline_s,
             "lost": 0 if ring is None else ring.lost,
         }
-
-
-MOST_POINTS: Final = 600
-STEP_M: Final = 0.05
-_STALE_S: Final = 1.0
-_FOLLOW_NS: Final = NS_PER_S // 5
 
 
 class PathFeed:

@@ -20,6 +20,14 @@ from vla_deploy.dashboard.live.message import (
 )
 
 MOST_EVENTS: Final = 256
+Send = Callable[[Sequence[LiveMessage]], Awaitable[None]]
+STEP_S: Final = 0.05
+FROZEN_S: Final = 5.0
+ALIVE: Final = "alive"
+ALIVE_S: Final = 2.0
+"""The interval at which every client is told that the hub works."""
+MOST_CLIENTS: Final = 100
+_log = logging.getLogger(__name__)
 
 
 class Outbox:
@@ -56,16 +64,6 @@ class Outbox:
     def forget(self, topic: str) -> None:
         """Drop the value of a topic without subscription."""
         self._values.pop(topic, None)
-
-
-Send = Callable[[Sequence[LiveMessage]], Awaitable[None]]
-STEP_S: Final = 0.05
-FROZEN_S: Final = 5.0
-ALIVE: Final = "alive"
-ALIVE_S: Final = 2.0
-"""The interval at which every client is told that the hub works."""
-MOST_CLIENTS: Final = 100
-_log = logging.getLogger(__name__)
 
 
 class LiveClient:
