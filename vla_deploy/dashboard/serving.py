@@ -96,7 +96,7 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
     while not should_stop():
         node.step()
         if isinstance(clock, TwinClock):
-            clock.release()  # requests are answered in real time, and hold up no twin
+            clock.release()  # requests are answered in real time; the twin does not wait
         period_ns = round(node.period_s * NS_PER_S)
         deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)

@@ -227,7 +227,7 @@ def server_context(certificate: str, key: str) -> ssl.SSLContext:
 
 
 def _refuse_password(key: str) -> NoReturn:
-    """Refuse instead of asking for it: nobody sits at the robot when it starts."""
+    """Refuse instead of asking for it: the robot starts unattended."""
     raise TlsUnusable(
         f"tls_key {key}: it needs a password, expected a key without: openssl pkey -in {key}"
     )

@@ -159,7 +159,7 @@ def pressed(request: StopRequest, control: ControlState | None) -> bytes:
 
 
 def not_pressed(request: StopRequest, why: str) -> bytes:
-    """Answer a press that failed, so that nobody can overlook it."""
+    """Answer a press that failed, in large letters on the page."""
     if request.wants_page:
         page = stop_page("NOT stopped", f"{why}; use the emergency stop button on the robot")
         return _answer(request, HTTPStatus.SERVICE_UNAVAILABLE, page, _HTML)

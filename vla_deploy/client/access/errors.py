@@ -12,12 +12,12 @@ class AccessError(Exception):
 
 
 class AccountsUnusable(AccessError):
-    """Say what is wrong with the file of accounts."""
+    """Report what is wrong with the accounts file."""
 
 
 class AccountRefused(AccessError):
-    """Say why an act on a user or a token cannot be carried out."""
+    """Report why a user or token cannot be changed as requested."""
 
 
 class AuditUnusable(AccessError):
-    """Say why the audit log cannot be read."""
+    """Report why the audit log cannot be read."""

@@ -1,4 +1,4 @@
-"""Check every request before its route: who asks, what is sent, which role the route needs."""
+"""Check every request before its route: the user, the body, and the role that it needs."""
 
 from typing import Annotated, Final
 
@@ -70,10 +70,10 @@ class Require:
         self.role = role
 
     async def __call__(self, connection: HTTPConnection) -> Identity:
-        """Return who asks.
+        """Return the identity of the user.
 
         Raises:
-            AccessDenied: nobody is logged in, or the user's role is too low.
+            AccessDenied: the user is not logged in, or the user's role is too low.
         """
         note_required(connection, self.role)
         identity: Identity = getattr(connection.state, IDENTITY)

@@ -21,7 +21,7 @@ Headers = Mapping[str, Sequence[str]]
 _HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]{1,253})(?::(?P<port>\d{1,5}))?")
 _DEFAULT_PORT: Final = {"http": "80", "https": "443"}
 FORWARDED: Final = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip", "via")
-"""Reverse proxies add these: behind one, the connection's address identifies nobody."""
+"""Reverse proxies add these: behind one, the connection's address is not the user's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

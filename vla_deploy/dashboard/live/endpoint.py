@@ -3,7 +3,7 @@
 A client sends {"subscribe": [topic, ...]} any number of times; each replaces the one before. Other
 text is answered by a message of the topic "error", and too much of it ends the connection.
 
-Uvicorn frames each message anew for each client, in a write of its own, and closes a connection
+Uvicorn frames each message again for each client, in a write of its own, and closes a connection
 only after it has sent everything that waits: never, to a client that reads nothing. `LiveProtocol`
 takes frames that are made once for all clients, and can abort a connection.
 """

@@ -191,7 +191,7 @@ class TopicTable:
         self._counted = [(topic, _Counted(space.pulse_reader(topic.name))) for topic in TOPICS]
 
     def begin(self) -> None:
-        """Measure rates anew, as nothing was counted meanwhile."""
+        """Restart the measurement of rates, as nothing was counted without subscribers."""
         for _, counted in self._counted:
             counted.begin()
 
@@ -231,7 +231,7 @@ class PathFeed:
         self._points = 0
 
     def step(self) -> None:
-        """Follow the robot five times a second, also while nobody is subscribed."""
+        """Follow the robot five times a second, also without subscribers."""
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + _FOLLOW_NS
@@ -257,10 +257,10 @@ class PathFeed:
     def look(self, now: LookTime) -> Sequence[LiveMessage]:
         """Return both ways, if one has changed."""
         planned = self._planned(now)
-        told = (self._points, len(planned), planned[-1:])
-        if told == self._sent:
+        state = (self._points, len(planned), planned[-1:])
+        if state == self._sent:
             return ()
-        self._sent = told
+        self._sent = state
         data = {"planned": planned, "driven": list(self._driven)}
         return (json_message(self.topic, now.run_ns, now, data),)
 

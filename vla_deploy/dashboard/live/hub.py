@@ -1,6 +1,6 @@
 """Send live topics to clients; no client waits for another.
 
-The hub reads only the topics that somebody is subscribed to. Each client has a bounded outbox and a
+The hub reads only topics with subscribers. Each client has a bounded outbox and a
 task that empties it; a client that takes nothing for `FROZEN_S` is dropped.
 """
 
@@ -25,7 +25,7 @@ STEP_S: Final = 0.05
 FROZEN_S: Final = 5.0
 ALIVE: Final = "alive"
 ALIVE_S: Final = 2.0
-"""The interval at which every client is told that the hub works."""
+"""The interval of the message to every client that the hub works."""
 MOST_CLIENTS: Final = 100
 _log = logging.getLogger(__name__)
 
