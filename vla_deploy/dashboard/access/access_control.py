@@ -190,15 +190,10 @@ class AccessControl:
 
     def _by_connection(self, request: IncomingRequest) -> Identity:
         address = request.peer.address
-        if request.peer.is_socket:
-            return Identity(
-                role=UserRole.ADMIN, user="local", way=AuthMethod.SOCKET, address=address
-            )
-        if self._is_trusted(request):
-            return Identity(
-                role=UserRole.ADMIN, user="local", way=AuthMethod.LOOPBACK, address=address
-            )
-        return unknown_user(address)
+        if not request.peer.is_socket and not self._is_trusted(request):
+            return unknown_user(address)
+        way = AuthMethod.SOCKET if request.peer.is_socket else AuthMethod.LOOPBACK
+        return Identity(role=UserRole.ADMIN, user="local", way=way, address=address)
 
     def _is_trusted(self, request: IncomingRequest) -> bool:
         """Return whether the request comes from this computer, by its own name and no proxy."""
@@ -235,11 +230,13 @@ class AccessControl:
             return self.accounts.read()
         except AccountsUnusable as error:
             _log.error("nobody can log in: %s", error)
-            raise AccessDenied(
-                Denial.ACCOUNTS_AWAY,
-                "the file of accounts cannot be used",
-                "see the dashboard's log on the robot",
-            ) from error
+            raise accounts_away() from error
+
+
+def accounts_away() -> AccessDenied:
+    """Return the denial while the accounts file cannot be used."""
+    what, hint = "the file of accounts cannot be used", "see the dashboard's log on the robot"
+    return AccessDenied(Denial.ACCOUNTS_AWAY, what, hint)
 
 
 def own_names() -> frozenset[str]:

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from vla_deploy.client.access.accounts import UserRole
 from vla_deploy.client.access.errors import AccountsUnusable, AuditUnusable
 from vla_deploy.client.access.passwords import LONGEST
-from vla_deploy.dashboard.access.access_control import AccessControl
+from vla_deploy.dashboard.access.access_control import AccessControl, accounts_away
 from vla_deploy.dashboard.access.audit_middleware import note
 from vla_deploy.dashboard.access.guard import Anyone, require
 from vla_deploy.dashboard.access.request import read_request
@@ -57,18 +57,13 @@ async def log_in(login: Login, request: Request, response: Response) -> SessionS
     incoming = read_request(request.scope)
     try:
         is_known = access.logins.knows(login.user)
-        note(
-            request, name=login.user if is_known else "(unknown)"
-        )  # an unknown one may be a password
+        # An unknown name may be a password in the wrong field.
+        note(request, name=login.user if is_known else "(unknown)")
         session_id, session, role = await access.logins.log_in(
             login.user, login.password, incoming.peer.rate_key
         )
     except AccountsUnusable as error:
-        raise AccessDenied(
-            Denial.ACCOUNTS_AWAY,
-            "the file of accounts cannot be used",
-            "see the dashboard's log on the robot",
-        ) from error
+        raise accounts_away() from error
     access.sessions.end(access.session_id(incoming))
     response.set_cookie(
         access.cookie_name(),
