@@ -9,6 +9,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.client.access.accounts import AccountsFile
 from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.link import RobotLink
@@ -25,23 +26,14 @@ def payload_of(message: LiveMessage) -> bytes:
     return message.frame[{126: 4, 127: 10}.get(length, 2) :]
 
 
-class HandClock:
+class HandClock(ManualClock):
     """Time passes when a test says so."""
 
-    def __init__(self) -> None:
-        self.time_ns = 1000 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-
     def pass_s(self, seconds: float) -> None:
-        self.time_ns += round(seconds * NS_PER_S)
+        self.ns += round(seconds * NS_PER_S)
 
     def wall_ns(self) -> int:
-        return self.time_ns + 1_800_000_000 * NS_PER_S
+        return self.ns + 1_800_000_000 * NS_PER_S
 
 
 @dataclass
@@ -92,7 +84,7 @@ class Dashboard:
 
 @pytest.fixture
 def hand_clock() -> HandClock:
-    return HandClock()
+    return HandClock(1000 * NS_PER_S)
 
 
 @pytest.fixture

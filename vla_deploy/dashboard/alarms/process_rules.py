@@ -60,16 +60,16 @@ def lost_processes(robot: RobotStatus) -> Iterator[AlarmFinding]:
     for row in _rows(robot):
         if row["state"] == State.GIVEN_UP.value:
             yield _given_up(row)
-        elif row["state"] in _AGAIN or _is_starting_again(row):
-            yield _started_again(row)
+        elif row["state"] in _AGAIN or (row["state"] == State.STARTING.value and row["restarts"]):
+            yield _restarting(row)
 
 
 def odd_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
     """Find topics that the supervisor reports: rates too low, and invalid values."""
     for row in _rows(robot):
         for topic in row["topics"] if row["state"] == State.READY.value else ():
-            yield from _seldom(row["name"], topic)
-            yield from _nonsense(row["name"], topic)
+            yield from _low_rate(row["name"], topic)
+            yield from _invalid_values(row["name"], topic)
 
 
 def _rows(robot: RobotStatus) -> tuple[Document, ...]:
@@ -91,11 +91,7 @@ def _given_up(row: Document) -> AlarmFinding:
     )
 
 
-def _is_starting_again(row: Document) -> bool:
-    return row["state"] == State.STARTING.value and bool(row["restarts"])
-
-
-def _started_again(row: Document) -> AlarmFinding:
+def _restarting(row: Document) -> AlarmFinding:
     return AlarmFinding(
         process=row["name"],
         field="restarts",
@@ -108,7 +104,7 @@ def _started_again(row: Document) -> AlarmFinding:
     )
 
 
-def _seldom(process: str, topic: Document) -> Iterator[AlarmFinding]:
+def _low_rate(process: str, topic: Document) -> Iterator[AlarmFinding]:
     rate_hz, least_hz = topic["rate_hz"], topic["least_hz"]
     if rate_hz is not None and rate_hz < least_hz:
         yield AlarmFinding(
@@ -124,7 +120,7 @@ def _seldom(process: str, topic: Document) -> Iterator[AlarmFinding]:
         )
 
 
-def _nonsense(process: str, topic: Document) -> Iterator[AlarmFinding]:
+def _invalid_values(process: str, topic: Document) -> Iterator[AlarmFinding]:
     for fault in topic["faults"]:
         yield AlarmFinding(
             process=process,
