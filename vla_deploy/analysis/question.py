@@ -2,16 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import Clock
 from vla_deploy.analysis.document import SceneAnalysis
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.world import Snapshot, Viewpoint, read_snapshot
 from vla_deploy.world.resting import rest_of
 
 Image = NDArray[np.uint8]
+FRESH_S: Final = 5.0
+"""How old a scene may be that is analysed."""
+_POSE_AGE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +51,20 @@ class Analyser(Protocol):
         ...
 
 
+class RobotTopics(Protocol):
+    """Read the topics of a running robot."""
+
+    clock: Clock
+
+    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any] | None:
+        """Return the newest JSON document of a topic, None where there is none that young."""
+        ...
+
+    def fresh(self, topic: str, age_limit_s: float | None = None) -> Any:
+        """Return the newest sample of a topic, None where there is none that young."""
+        ...
+
+
 def question_of(
     scene: Mapping[str, Any],
     *,
@@ -74,6 +93,34 @@ def question_of(
         image=image,
         goal=goal.strip(),
     )
+
+
+def question_about(
+    topics: RobotTopics, scene: dict[str, Any], goal: str, image: Image | None = None
+) -> SceneQuestion:
+    """Return a question about a scene, with where the robot is and what it holds now.
+
+    Raises:
+        SceneUnreadable: the document is no scene.
+    """
+    executor = topics.document("executor_status", age_limit_s=FRESH_S) or {}
+    return question_of(
+        scene,
+        now_ns=topics.clock.now_ns(),
+        robot=_pose(topics),
+        holding=executor.get("holding", {}),
+        image=image,
+        goal=goal,
+    )
+
+
+def _pose(topics: RobotTopics) -> Viewpoint | None:
+    """Return where the robot is; one that is lost is nowhere."""
+    sample = topics.fresh("pose", age_limit_s=_POSE_AGE_S)
+    if sample is None or PlaceState(int(sample.data["state"])) is PlaceState.LOST:
+        return None
+    x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+    return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
 def _bystander(told: Mapping[str, Any]) -> FloorPlanBystander:

@@ -21,7 +21,7 @@ class CommandFailed(Exception):
 USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.cli.errors": "UsageError",
     "drivers.errors": "DriverError",
-    "vla_deploy.dashboard.access.errors": "AccessError",
+    "vla_deploy.client.access.errors": "AccessError",
     "vla_deploy.gateways.ros.errors": "RosGatewayError",
     "vla_deploy.install.errors": "InstallError",
     "vla_deploy.inference.errors": "InferenceError",

@@ -5,7 +5,7 @@ from typing import Final
 
 
 class ActionStatus(StrEnum):
-    """Tell how far an action has come; the last five are final."""
+    """Name how far an action has come; the last five are final."""
 
     PENDING = "pending"
     ACTIVE = "active"

@@ -37,7 +37,7 @@ class Standing(StrEnum):
 
     @property
     def is_final(self) -> bool:
-        """Tell whether nothing more comes."""
+        """Return whether nothing more comes."""
         return self in _FINAL
 
 

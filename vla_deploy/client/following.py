@@ -37,7 +37,7 @@ class Following:
 
     @property
     def is_unanswered(self) -> bool:
-        """Tell whether nobody has answered in time."""
+        """Return whether nobody has answered in time."""
         return not self.is_answered and self._clock.now_ns() > self._answer_by_ns
 
     def why_lost(self) -> str:

@@ -1,4 +1,4 @@
-"""Tell in words why the robot may not move now, from what control says of itself."""
+"""Say why the robot may not move now, from what control says of itself."""
 
 from collections.abc import Mapping
 from typing import Any

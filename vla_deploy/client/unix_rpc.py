@@ -11,7 +11,7 @@ _CHUNK_BYTES: Final = 65_536
 
 
 def request(path: Path, question: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the answer of whoever listens at `path`.
+    """Return the answer of the server at `path`.
 
     Raises:
         OSError: nobody listens there, or no whole answer comes within 10 s of silence.

@@ -1,22 +1,53 @@
-"""Build the web application; what it serves is listed in `routers.py` and `parts.py`."""
+"""Build the web application: its routes, its parts, and the checks before them."""
 
-from fastapi import FastAPI
+from typing import Final
+
+from fastapi import APIRouter, FastAPI
 
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, guard
-from vla_deploy.dashboard.analysing import Analyst
-from vla_deploy.dashboard.answers import add_error_answers
-from vla_deploy.dashboard.headers import SafeHeaders
-from vla_deploy.dashboard.page import add_page_files
-from vla_deploy.dashboard.parts import PARTS
-from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard import page
+from vla_deploy.dashboard.access import AccessControl, guard
+from vla_deploy.dashboard.access import routes as access_routes
+from vla_deploy.dashboard.access.request import API_PREFIX
+from vla_deploy.dashboard.api import (
+    analysis,
+    commands,
+    metrics,
+    operate,
+    profile,
+    recordings,
+    robot,
+    state,
+)
+from vla_deploy.dashboard.errors import add_error_handlers
+from vla_deploy.dashboard.live import endpoint, microphone
+from vla_deploy.dashboard.page import SafeHeaders, add_page_files
+from vla_deploy.dashboard.parts import make_parts
+from vla_deploy.runtime.net import DashboardSettings
+
+# Below the prefix.
+API_ROUTERS: Final[tuple[APIRouter, ...]] = (
+    access_routes.router,
+    state.router,
+    analysis.router,
+    commands.router,
+    operate.router,
+    profile.router,
+    recordings.router,
+    recordings.replay_router,
+    endpoint.router,
+    microphone.router,
+    robot.router,
+    metrics.router,
+)
+# At the root: the page, and what has its place by convention.
+ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health, metrics.scraped)
 
 
-def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> FastAPI:
-    """Return the application; `app.state` holds what is given, and what the parts put there.
+def create_app(link: RobotLink, settings: DashboardSettings, access: AccessControl) -> FastAPI:
+    """Return the application; the server steps `app.state.parts`.
 
-    Whoever serves it steps `app.state.parts`.
+    `app.state` holds `link`, `settings`, `access`, `parts`, and what the parts put there.
     """
     app = FastAPI(
         title="vla_deploy",
@@ -25,10 +56,9 @@ def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> 
         redoc_url=None,
     )
     app.state.link, app.state.settings = link, settings
-    app.state.analyst = Analyst(link)
-    app.state.parts = [make(app) for make in PARTS]
+    app.state.parts = make_parts(app)
     guard(app, access)
-    add_error_answers(app)
+    add_error_handlers(app)
     for router in API_ROUTERS:
         app.include_router(router, prefix=API_PREFIX)
     for router in ROOT_ROUTERS:

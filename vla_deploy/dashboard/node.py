@@ -1,4 +1,4 @@
-"""Keep the dashboard's own state, and tell how it is."""
+"""Run the dashboard as a node: sockets, application, parts and status."""
 
 import logging
 from typing import Final
@@ -7,27 +7,23 @@ from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, AccessRules
+from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
 from vla_deploy.dashboard.parts import Part
-from vla_deploy.dashboard.serving import Door
-from vla_deploy.dashboard.settings import DashboardSettings
-from vla_deploy.dashboard.tls import server_context
+from vla_deploy.dashboard.serving import SOCKET_NAME, HttpSocket, open_socket
 from vla_deploy.ipc import CellWriter
+from vla_deploy.runtime.net import DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
 STATUS_TOPIC: Final = "dashboard_status"
-TCP: Final = "tcp"
-UNIX: Final = "unix"
-_TELL_NS: Final = NS_PER_S // 2
+_PUBLISH_NS: Final = NS_PER_S // 2
 _EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 _log = logging.getLogger(__name__)
 
 
 class DashboardNode:
-    """Open the doors, step what works beside the requests, and tell the address."""
+    """Open the sockets, step the parts, and publish the page's address."""
 
     period_s = 0.05
 
@@ -37,10 +33,10 @@ class DashboardNode:
         self._clock = context.clock
         self.link = RobotLink(context.run_dir, context.clock, robot=context.robot)
         self.app: FastAPI
-        self.doors: tuple[Door, ...] = ()
+        self.sockets: tuple[HttpSocket, ...] = ()
         self._parts: list[Part] = []
         self._guard = PartGuard(_log)
-        self._access: Access | None = None
+        self._access: AccessControl | None = None
         self._status: CellWriter
         self._due_ns = 0
         self._url = ""
@@ -49,7 +45,7 @@ class DashboardNode:
         """Listen; requests wait until they are served.
 
         Raises:
-            PortTaken: somebody else listens there.
+            PortTaken: another program listens there.
             TlsUnusable: certificate or key cannot be used.
         """
         settings = self._settings
@@ -59,32 +55,38 @@ class DashboardNode:
         before = (self.link.document(STATUS_TOPIC) or {}).get("port")
         tcp = open_port(settings.host, settings.port, search=twin, before=before)
         unix = open_socket(self._context.run_dir / SOCKET_NAME)
-        self.doors = (Door(TCP, tcp, tls), Door(UNIX, unix))
+        self.sockets = (HttpSocket(tcp, tls), HttpSocket(unix))
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
-        # People log in, and are kept from guessing, by the wall clock.
+        # Sessions and limits on guesses run in real time.
         base, rules = self._context.run_dir.parent, _rules(settings)
-        self._access = Access.of_base(base, rules, MonotonicClock())
+        self._access = AccessControl.of_base(base, rules, MonotonicClock())
         self.app = create_app(self.link, settings, self._access)
         self._parts = self.app.state.parts
         self._port = tcp.getsockname()[1]
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
     def step(self) -> None:
-        """Step the parts, and tell twice a second where the page is."""
+        """Step the parts, and publish the page's address twice a second."""
         for part in self._parts:
             self._guard.run(type(part).__name__, part.step)
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
-            self._due_ns = now_ns + _TELL_NS
-            told = {"url": self._url, "port": self._port, "host": self._settings.host}
-            self._status.put_document(told | {"failures": dict(self._guard.failures)})
+            self._due_ns = now_ns + _PUBLISH_NS
+            self._status.put_document(
+                {
+                    "url": self._url,
+                    "port": self._port,
+                    "host": self._settings.host,
+                    "failures": dict(self._guard.failures),
+                }
+            )
 
     def stop(self) -> None:
         """Stop the parts and close everything."""
         for part in self._parts:
             part.stop()
-        for door in self.doors:
-            door.listener.close()
+        for one in self.sockets:
+            one.listener.close()
         if self._access is not None:
             self._access.close()
         self.link.close()
@@ -100,6 +102,6 @@ def _rules(settings: DashboardSettings) -> AccessRules:
 
 
 def _reachable(host: str) -> str:
-    """Return an address that a browser on this computer finds; IPv6 in its brackets."""
+    """Return a host that a browser on this computer can reach; IPv6 in brackets."""
     name = _EVERYWHERE.get(host, host)
     return f"[{name}]" if ":" in name else name

@@ -1,4 +1,4 @@
-"""Serve one application at several doors, and step the node beside it, in one event loop."""
+"""Serve one application at several sockets, and step the node, in one event loop."""
 
 import asyncio
 import contextlib
@@ -7,7 +7,8 @@ import socket
 import ssl
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from pathlib import Path
+from typing import Final
 
 import uvicorn
 from starlette.types import ASGIApp
@@ -19,55 +20,67 @@ from vla_deploy.dashboard.access.connections import (
     Connections,
     bounded_by,
 )
-from vla_deploy.dashboard.live.wire import LiveProtocol
+from vla_deploy.dashboard.live.endpoint import LiveProtocol
+from vla_deploy.ipc.memory.doorbell import short_path
+from vla_deploy.runtime.net import BACKLOG, PortTaken
 from vla_deploy.runtime.node import Node
 
-GOODBYE_S: Final = 1  # for requests that are under way at the end
+SOCKET_NAME: Final = "dashboard.sock"
+_SOCKET_MODE: Final = 0o660
+_SHUTDOWN_S: Final = 1  # for open requests
 _KEEP_ALIVE_S: Final = 10
 _MOST_MESSAGE_BYTES: Final = 1_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Door:
-    """Name a listening socket, and what it encrypts with."""
+def open_socket(path: Path) -> socket.socket:
+    """Listen at a Unix socket, which only owner and group may use.
 
-    name: str
+    Raises:
+        PortTaken: it cannot be created.
+    """
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        path.unlink(missing_ok=True)  # an earlier instance of this run left it
+        with short_path(path.parent) as folder:
+            listening.bind(f"{folder}/{path.name}")
+        path.chmod(_SOCKET_MODE)
+    except OSError as error:
+        listening.close()
+        raise PortTaken(f"{path}: cannot listen there: {error}") from error
+    listening.listen(BACKLOG)
+    return listening
+
+
+@dataclass(frozen=True, slots=True)
+class HttpSocket:
+    """Hold a listening socket with its TLS context."""
+
     listener: socket.socket
     tls: ssl.SSLContext | None = None
 
 
 class _Server(uvicorn.Server):
-    """Leave the process' signals to whoever runs it."""
+    """Leave signals to the process's main function."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
 
 
-def serve(
+async def serve(
     app: ASGIApp,
-    doors: Sequence[Door],
+    sockets: Sequence[HttpSocket],
     node: Node,
     clock: Clock,
     should_stop: Callable[[], bool],
     connections: Connections | None = None,
 ) -> None:
     """Answer requests and step a started node until `should_stop()`."""
-    asyncio.run(_serve(app, doors, node, clock, should_stop, connections or Connections()))
-
-
-async def _serve(
-    app: ASGIApp,
-    doors: Sequence[Door],
-    node: Node,
-    clock: Clock,
-    should_stop: Callable[[], bool],
-    connections: Connections,
-) -> None:
-    servers = [_Server(_config(app, door, connections)) for door in doors]
+    bounds = connections or Connections()
+    servers = [_Server(_config(app, one, bounds)) for one in sockets]
     serving = [
-        asyncio.create_task(server.serve([door.listener]))
-        for server, door in zip(servers, doors, strict=True)
+        asyncio.create_task(server.serve([one.listener]))
+        for server, one in zip(servers, sockets, strict=True)
     ]
     try:
         await _step(node, clock, lambda: should_stop() or any(task.done() for task in serving))
@@ -83,16 +96,16 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
     while not should_stop():
         node.step()
         if isinstance(clock, TwinClock):
-            clock.release()  # requests are answered by the wall clock, and hold nothing
+            clock.release()  # requests are answered in real time; the twin does not wait
         period_ns = round(node.period_s * NS_PER_S)
         deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)
 
 
-def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Config:
-    tls = door.tls
+def _config(app: ASGIApp, at: HttpSocket, connections: Connections) -> uvicorn.Config:
+    tls = at.tls
     return uvicorn.Config(
-        _named(app, door.name),
+        app,
         log_config=None,
         log_level=logging.WARNING,
         access_log=False,
@@ -100,21 +113,12 @@ def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Confi
         loop="asyncio",
         http=bounded_by(connections),
         ws=LiveProtocol,
-        ws_per_message_deflate=False,  # it would compress each message anew for each client
+        ws_per_message_deflate=False,  # else each message is compressed for each client
         proxy_headers=False,
         server_header=False,
         h11_max_incomplete_event_size=HEAD_BYTES,
         timeout_keep_alive=_KEEP_ALIVE_S,
-        timeout_graceful_shutdown=GOODBYE_S,
+        timeout_graceful_shutdown=_SHUTDOWN_S,
         ws_max_size=_MOST_MESSAGE_BYTES,
         ssl_context_factory=None if tls is None else lambda *_: tls,
     )
-
-
-def _named(app: ASGIApp, name: str) -> ASGIApp:
-    """Let the application know through which door a request came: `scope["door"]`."""
-
-    async def through_door(scope: Any, receive: Any, send: Any) -> None:
-        await app({**scope, "door": name}, receive, send)
-
-    return through_door

@@ -4,12 +4,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.dashboard.doors import open_port
-from vla_deploy.dashboard.errors import PortTaken, SettingsInvalid, TlsUnusable
-from vla_deploy.dashboard.settings import SETTINGS_FILE, DashboardSettings, read_settings
-from vla_deploy.dashboard.tls import server_context
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, ok, warn
+from vla_deploy.runtime.net import (
+    SETTINGS_FILE,
+    DashboardSettings,
+    DashboardSettingsInvalid,
+    PortTaken,
+    TlsUnusable,
+    open_port,
+    read_settings,
+    server_context,
+)
 from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.runs.runtime import default_base, running
 
@@ -23,7 +29,7 @@ def dashboard(context: DoctorContext) -> Iterator[DoctorFinding]:
     file = config_dir_of(base) / SETTINGS_FILE
     try:
         settings = read_settings(base)
-    except SettingsInvalid as error:
+    except DashboardSettingsInvalid as error:
         yield fail(_NAME, "; ".join(error.faults), f"sudoedit {file}")
         return
     yield from _ports(settings, is_running=running(base) is not None)

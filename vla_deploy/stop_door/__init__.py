@@ -1,1 +1,1 @@
-"""Let anyone who reaches this robot stop it: a small HTTP server of its own that can do no more."""
+"""Stop the robot by a small HTTP server of its own, which needs no login and can do no more."""

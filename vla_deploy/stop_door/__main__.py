@@ -2,8 +2,8 @@
 
 import sys
 
-from vla_deploy.dashboard.settings import read_settings
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.net import read_settings
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.process_main import main
 from vla_deploy.stop_door.node import StopDoorNode

@@ -25,17 +25,16 @@ from playwright.sync_api import (
 )
 
 from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.dashboard.access import Role
-from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.passwords import stored_form
-from vla_deploy.dashboard.settings import SETTINGS_FILE
+from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
+from vla_deploy.client.access.passwords import hash_password
+from vla_deploy.dashboard.access import UserRole
+from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.speech.voice.tts import EspeakEngine
 
 CHROMIUM: Final = "/usr/bin/chromium"
 DESKTOP: Final = ViewportSize(width=1440, height=900)
-ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
+ROLES: Final = {"anna": UserRole.ADMIN, "vera": UserRole.VIEWER}
 PASSWORD: Final = "five-words-that-nobody-guesses"
 SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
@@ -70,7 +69,7 @@ def stack(chromium: Browser, coarse: str) -> Iterator[ProcessStack]:
 
 
 def add_accounts(base: Path) -> None:
-    stored = stored_form(PASSWORD)
+    stored = hash_password(PASSWORD)
 
     def everybody(accounts: Accounts) -> tuple[Accounts, None]:
         for name, role in ROLES.items():

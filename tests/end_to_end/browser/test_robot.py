@@ -48,7 +48,11 @@ def test_the_camera_is_live(view: Page) -> None:
     expect(card(view, "Camera").get_by_text("no data")).to_have_count(0)
     expect(card(view, "Camera").get_by_text(re.compile("^The camera sees"))).to_be_visible()
     expect(view.locator("canvas.camera")).to_be_visible()
-    assert view.locator("canvas.camera").evaluate(COLOURS_IN_IT) > 20
+    for _ in range(50):  # the image is drawn in a frame after its words
+        if view.locator("canvas.camera").evaluate(COLOURS_IN_IT) > 20:
+            return
+        view.wait_for_timeout(100)
+    raise AssertionError("the camera's image is not drawn")
 
 
 def test_every_joint_is_told_in_numbers(view: Page, robot: ProcessStack) -> None:

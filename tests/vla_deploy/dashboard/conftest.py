@@ -9,33 +9,31 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.contracts.scripted import ManualClock
+from vla_deploy.client.access.accounts import AccountsFile
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, AccessRules
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
+from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard.live.message import LiveMessage
 from vla_deploy.ipc import RingReader, SharedSpace
+from vla_deploy.runtime.net import DashboardSettings
 
 
-class HandClock:
+def payload_of(message: LiveMessage) -> bytes:
+    """Return what a client receives by a message's frame."""
+    length = message.frame[1]
+    return message.frame[{126: 4, 127: 10}.get(length, 2) :]
+
+
+class HandClock(ManualClock):
     """Time passes when a test says so."""
 
-    def __init__(self) -> None:
-        self.time_ns = 1000 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-
     def pass_s(self, seconds: float) -> None:
-        self.time_ns += round(seconds * NS_PER_S)
+        self.ns += round(seconds * NS_PER_S)
 
     def wall_ns(self) -> int:
-        return self.time_ns + 1_800_000_000 * NS_PER_S
+        return self.ns + 1_800_000_000 * NS_PER_S
 
 
 @dataclass
@@ -86,7 +84,7 @@ class Dashboard:
 
 @pytest.fixture
 def hand_clock() -> HandClock:
-    return HandClock()
+    return HandClock(1000 * NS_PER_S)
 
 
 @pytest.fixture
@@ -97,7 +95,7 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
     clock = MonotonicClock()
     accounts = AccountsFile(tmp_path / "access" / "accounts.json")
     audit = AuditLog(AuditFile(tmp_path / "access" / "audit.jsonl"), clock, now_s=time.monotonic)
-    access = Access(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
+    access = AccessControl(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
     link = RobotLink(run_dir, clock)
     app = create_app(link, DashboardSettings(), access)
     client = TestClient(app, "http://127.0.0.1:8088", client=("127.0.0.1", 50_000))
@@ -107,3 +105,8 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
         part.stop()
     robot.space.close()
     link.close()
+
+
+@pytest.fixture
+def stranger(dashboard: Dashboard) -> TestClient:
+    return TestClient(dashboard.app, "http://127.0.0.1:8088", client=("192.0.2.7", 50_000))

@@ -1,10 +1,12 @@
-"""The node tells where the page is, and no part of it takes the others along."""
+"""The node opens its sockets, publishes where the page is, and isolates its parts."""
+
+import stat
 
 import pytest
 
-from vla_deploy.dashboard.errors import PortTaken
 from vla_deploy.dashboard.node import DashboardNode
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard.serving import open_socket
+from vla_deploy.runtime.net import DashboardSettings, PortTaken
 from vla_deploy.runtime.node import NodeContext
 
 
@@ -76,3 +78,17 @@ def test_a_broken_part_is_counted_and_told_while_the_others_go_on(make, hand_clo
 def test_one_that_could_not_start_is_stopped_all_the_same(make):
     with pytest.raises(PortTaken):
         make(host="192.0.2.1").start()
+
+
+def test_the_unix_socket_is_for_owner_and_group_also_in_a_deep_folder(tmp_path):
+    folder = tmp_path / ("deep" * 40)
+    folder.mkdir()
+    for _ in range(2):  # the second instance of a run finds the first one's
+        with open_socket(folder / "dashboard.sock"):
+            mode = stat.S_IMODE((folder / "dashboard.sock").stat().st_mode)
+            assert mode == 0o660
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(PortTaken, match="cannot listen there"):
+        open_socket(tmp_path / "gone" / "dashboard.sock")

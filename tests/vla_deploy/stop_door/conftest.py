@@ -9,34 +9,26 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.settings import DashboardSettings
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.runtime.net import DashboardSettings
 from vla_deploy.stop_door.node import StopDoorNode
 
 MOST_STEPS = 40
 
 
-class StepClock:
+class StepClock(ManualClock):
     """Stand still until a test moves it on."""
 
-    def __init__(self) -> None:
-        self._now_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self._now_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self._now_ns = max(self._now_ns, deadline_ns)
-
     def advance(self, duration_s: float) -> None:
-        self._now_ns += round(duration_s * NS_PER_S)
+        self.ns += round(duration_s * NS_PER_S)
 
 
 class Doorway:
     """Hold a stop door beside the shared memory that it presses into."""
 
     def __init__(self, folder: Path, settings: DashboardSettings | None = None) -> None:
-        self.clock = StepClock()
+        self.clock = StepClock(NS_PER_S)
         self.space = SharedSpace(folder / "ipc", self.clock)
         self.settings: Callable[[], DashboardSettings] = lambda: (
             settings or DashboardSettings(stop_port=0)

@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.dashboard.errors import SettingsInvalid
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.runtime.net import DashboardSettings, DashboardSettingsInvalid
 from vla_deploy.stop_door.node import StopDoorNode
 
 PRESS = b"POST /stop HTTP/1.1\r\n\r\n"
@@ -64,7 +63,9 @@ def test_where_its_port_is_taken_it_says_so_and_opens_as_soon_as_it_is_free(door
 
 def test_a_spoilt_settings_file_does_not_keep_the_door_shut(doorway, monkeypatch):
     def spoilt():
-        raise SettingsInvalid(("dashboard.toml: port: expected a port, 1 to 65535, got 'x'",))
+        raise DashboardSettingsInvalid(
+            ("dashboard.toml: port: expected a port, 1 to 65535, got 'x'",)
+        )
 
     monkeypatch.setattr(
         "vla_deploy.stop_door.node.DEFAULTS", replace(DashboardSettings(), stop_port=0)

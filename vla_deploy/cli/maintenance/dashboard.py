@@ -13,12 +13,16 @@ from drivers.clock import MonotonicClock
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession, attach, base_of
-from vla_deploy.dashboard.access.accounts import Accounts, User, new_token, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import LONGEST, SHORTEST, generated, stored_form
+from vla_deploy.client.access.accounts import (
+    Accounts,
+    AccountsFile,
+    User,
+    UserRole,
+    new_token,
+    wall_s,
+)
+from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
+from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generate_password, hash_password
 
 EXAMPLES = """  vla-deploy dashboard             print the page's address
   vla-deploy dashboard --open      open it in this computer's browser
@@ -26,7 +30,7 @@ EXAMPLES = """  vla-deploy dashboard             print the page's address
   curl --unix-socket /run/vla-deploy/current/dashboard.sock http://robot/api/v1/state
 """
 NAME: Final = "dashboard"
-ROLES: Final = tuple(role.value for role in Role if role is not Role.ANYONE)
+ROLES: Final = tuple(role.value for role in UserRole if role is not UserRole.ANYONE)
 _FIRST_USER: Final = "admin"
 _DAY_S: Final = 86_400.0
 _MAX_DAYS: Final = 3650
@@ -145,12 +149,14 @@ def set_password(arguments: argparse.Namespace) -> int:
         UsageError: the given password is too short or too long.
         AccountRefused: the name is not allowed.
     """
-    password = _password_from_stdin() if arguments.stdin else generated()
-    stored = stored_form(password)
+    password = _password_from_stdin() if arguments.stdin else generate_password()
+    stored = hash_password(password)
 
-    def change(held: Accounts) -> tuple[Accounts, Role]:
+    def change(held: Accounts) -> tuple[Accounts, UserRole]:
         known = held.users.get(arguments.user)
-        role = Role(arguments.role) if arguments.role else known.role if known else Role.ADMIN
+        role = (
+            UserRole(arguments.role) if arguments.role else known.role if known else UserRole.ADMIN
+        )
         user = User(role=role, password=stored, changed_s=wall_s())
         return held.with_user(arguments.user, user), role
 
@@ -205,7 +211,7 @@ def add_token(arguments: argparse.Namespace) -> int:
     if days is not None and not 0.0 < days <= _MAX_DAYS:
         raise UsageError(f"--days {days:g}: expected more than 0, at most {_MAX_DAYS}")
     lasts_s = None if days is None else days * _DAY_S
-    token_id, text, token = new_token(arguments.name, Role(arguments.role), wall_s(), lasts_s)
+    token_id, text, token = new_token(arguments.name, UserRole(arguments.role), wall_s(), lasts_s)
     _accounts_file(arguments).change(lambda held: (held.with_token(token_id, token), None))
     _log(arguments, "token add", name=arguments.name, role=arguments.role, days=days or "for ever")
     print(f"token {arguments.name} ({arguments.role}); this is shown once:", file=sys.stderr)
@@ -268,14 +274,14 @@ def _log(arguments: argparse.Namespace, act: str, **details: Any) -> None:
     user = pwd.getpwuid(os.getuid()).pw_name
     entry = AuditEntry(
         user=f"cli:{user}",
-        role=Role.ADMIN,
+        role=UserRole.ADMIN,
         way="cli",
         address="terminal",
         act=f"dashboard {act}",
-        outcome=Outcome.DONE,
+        outcome=AuditOutcome.DONE,
         details=details,
     )
-    _audit_log(arguments).tell(entry)
+    _audit_log(arguments).record(entry)
 
 
 def _audit_log(arguments: argparse.Namespace) -> AuditLog:

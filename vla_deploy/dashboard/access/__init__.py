@@ -1,33 +1,21 @@
 """Decide who may see the robot, command it, and change it; anyone may stop it."""
 
-from vla_deploy.dashboard.access.access import Access
-from vla_deploy.dashboard.access.errors import AccessError, RequestRefused
-from vla_deploy.dashboard.access.identity import Identity, Role, Way
-from vla_deploy.dashboard.access.requiring import (
-    Admin,
-    Anyone,
-    Operator,
-    Require,
-    Viewer,
-    guard,
-    require,
-)
-from vla_deploy.dashboard.access.rules import AccessRules
-from vla_deploy.dashboard.access.witness import note
+from vla_deploy.client.access.accounts import UserRole
+from vla_deploy.dashboard.access.access_control import AccessControl, AccessRules
+from vla_deploy.dashboard.access.audit_middleware import note
+from vla_deploy.dashboard.access.guard import Anyone, Operator, Require, Viewer, guard, require
+from vla_deploy.dashboard.access.identity import AuthMethod, Identity
 
 __all__ = [
-    "Access",
-    "AccessError",
+    "AccessControl",
     "AccessRules",
-    "Admin",
     "Anyone",
+    "AuthMethod",
     "Identity",
     "Operator",
-    "RequestRefused",
     "Require",
-    "Role",
+    "UserRole",
     "Viewer",
-    "Way",
     "guard",
     "note",
     "require",

@@ -1,4 +1,4 @@
-"""Take a request's body whole, within bounds, before any route sees a byte of it."""
+"""Read a request's whole body within bounds, before its route."""
 
 import asyncio
 import json
@@ -7,11 +7,11 @@ from typing import Any, Final, NoReturn
 
 from starlette.types import Message, Receive
 
-from vla_deploy.dashboard.access.asked import Asked
-from vla_deploy.dashboard.access.errors import BodyRefused, BodyTooLarge, BodyTooSlow
+from vla_deploy.dashboard.access.request import IncomingRequest
+from vla_deploy.dashboard.errors import AccessDenied, Denial
 
 MOST_BYTES: Final = 128 * 1024
-"""A plan fits into 64 KiB of shared memory; nothing that is asked needs more."""
+"""A plan matches into 64 KiB of shared memory; no request needs more."""
 WITHIN_S: Final = 5.0
 _MOST_DEPTH: Final = 32
 _STOP_BYTES: Final = 4096
@@ -19,19 +19,17 @@ _STOP_WITHIN_S: Final = 0.1
 _REASON_LETTERS: Final = 150
 
 
-async def read_body(asked: Asked, receive: Receive) -> bytes:
+async def read_body(request: IncomingRequest, receive: Receive) -> bytes:
     """Return the body of a change: JSON, or nothing.
 
     Raises:
-        BodyTooLarge: it has more than 128 KiB.
-        BodyTooSlow: it is not there within 5 s.
-        BodyRefused: it is no JSON, or JSON that cannot be told again.
+        AccessDenied: it has more than 128 KiB, takes more than 5 s, or is no valid JSON.
     """
-    if int(_length(asked) or 0) > MOST_BYTES:
+    if int(_length(request) or 0) > MOST_BYTES:
         _too_large()
     body = await _whole(receive, MOST_BYTES, WITHIN_S)
     if body:
-        kind = asked.first("content-type").partition(";")[0].strip().lower()
+        kind = request.first("content-type").partition(";")[0].strip().lower()
         if kind != "application/json":
             _refuse(f"content-type {kind!r:.60}, expected application/json")
         check_json(body)
@@ -39,18 +37,18 @@ async def read_body(asked: Asked, receive: Receive) -> bytes:
 
 
 async def read_stop_body(receive: Receive) -> bytes:
-    """Return what a stop says as its reason; one that is wrong, late or too long is left out."""
+    """Return the reason of a stop as JSON; one that is invalid, late or too long is left out."""
     try:
         said = json.loads(await _whole(receive, _STOP_BYTES, _STOP_WITHIN_S))
-    except (BodyTooLarge, BodyTooSlow, ValueError, RecursionError):
+    except (AccessDenied, ValueError, RecursionError):
         said = None
     given = said.get("reason") if isinstance(said, dict) else None
-    told = given[:_REASON_LETTERS] if isinstance(given, str) else ""
-    return json.dumps({"reason": told.encode(errors="replace").decode()}).encode()
+    reason = given[:_REASON_LETTERS] if isinstance(given, str) else ""
+    return json.dumps({"reason": reason.encode(errors="replace").decode()}).encode()
 
 
 def replay(body: bytes, receive: Receive) -> Receive:
-    """Return a channel that gives the body in one piece, then what follows it."""
+    """Return a channel that gives the body in one message, then the messages after it."""
     pending: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def next_message() -> Message:
@@ -60,10 +58,10 @@ def replay(body: bytes, receive: Receive) -> Receive:
 
 
 def check_json(body: bytes) -> None:
-    """Accept JSON of bounded depth, of finite numbers, of text that has an encoding.
+    """Accept JSON of bounded depth, with finite numbers and valid Unicode.
 
     Raises:
-        BodyRefused: it is something else.
+        AccessDenied: it is something else.
     """
     try:
         document = json.loads(body, parse_constant=_no_number)
@@ -80,7 +78,7 @@ def check_json(body: bytes) -> None:
 
 
 def _texts(document: Any) -> Iterator[tuple[str, int]]:
-    """Yield every text with its depth, and "" for every value that is none."""
+    """Yield every text with its depth, and "" for every other value."""
     left: list[tuple[Any, int]] = [(document, 0)]
     while left:
         value, depth = left.pop()
@@ -99,21 +97,21 @@ async def _whole(receive: Receive, most_bytes: int, within_s: float) -> bytes:
             more = True
             while more:
                 message = await receive()
-                if message["type"] != "http.request":  # the other end has hung up
+                if message["type"] != "http.request":  # the client has disconnected
                     break
                 body += message.get("body", b"")
                 more = message.get("more_body", False)
                 if len(body) > most_bytes:
                     _too_large(most_bytes)
     except TimeoutError:
-        raise BodyTooSlow(
-            f"the body was not there within {within_s:g} s", "send it faster"
+        raise AccessDenied(
+            Denial.BODY_TOO_SLOW, f"the body was not there within {within_s:g} s", "send it faster"
         ) from None
     return bytes(body)
 
 
-def _length(asked: Asked) -> str:
-    given = asked.first("content-length")
+def _length(request: IncomingRequest) -> str:
+    given = request.first("content-length")
     return given if given.isascii() and given.isdigit() and len(given) < 19 else ""
 
 
@@ -122,8 +120,10 @@ def _no_number(name: str) -> NoReturn:
 
 
 def _too_large(most_bytes: int = MOST_BYTES) -> NoReturn:
-    raise BodyTooLarge(f"more than {most_bytes} bytes", "send less")
+    raise AccessDenied(Denial.BODY_TOO_LARGE, f"more than {most_bytes} bytes", "send less")
 
 
 def _refuse(what: str) -> NoReturn:
-    raise BodyRefused(what, "send one JSON document, as /openapi.json describes it")
+    raise AccessDenied(
+        Denial.BODY_REFUSED, what, "send one JSON document, as /openapi.json describes it"
+    )

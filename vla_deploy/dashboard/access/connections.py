@@ -1,6 +1,6 @@
-"""Bound how many connections there are, and how long one may take to ask for something.
+"""Limit the number of connections, and the time that a request's head may take.
 
-uvicorn waits for ever for the first bytes of a request, which is all that a slow-loris needs.
+uvicorn waits without limit for a request's first bytes, which is all that a slow-loris needs.
 """
 
 import asyncio
@@ -11,105 +11,105 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from vla_deploy.dashboard.access.peer import Peer, peer_of
+from vla_deploy.dashboard.access.identity import Peer, peer_of
 
 MOST: Final = 256
-"""Of all addresses together; this computer's own connections are always let in besides."""
-MOST_PER_HOME: Final = 32
+"""Of all addresses together; connections of this computer do not count."""
+MOST_PER_ADDRESS: Final = 32
 HEAD_WITHIN_S: Final = 10.0
 HEAD_BYTES: Final = 32 * 1024
 
 
 class Connections:
-    """Count open connections by where they come from."""
+    """Count open connections by the address of the peer."""
 
     def __init__(
         self,
         most: int = MOST,
-        most_per_home: int = MOST_PER_HOME,
+        most_per_address: int = MOST_PER_ADDRESS,
         head_within_s: float = HEAD_WITHIN_S,
     ) -> None:
-        """Begin without any; `head_within_s` is how long a connection may ask for nothing."""
+        """Start without any; `head_within_s` is the time limit for a request's head."""
         self.head_within_s = head_within_s
         self._most = most
-        self._most_per_home = most_per_home
-        self._by_home: Counter[str] = Counter()
+        self._most_per_address = most_per_address
+        self._by_address: Counter[str] = Counter()
 
     @property
     def held(self) -> int:
-        """Return how many there are, those of this computer left out."""
-        return self._by_home.total()
+        """Return how many there are, without those of this computer."""
+        return self._by_address.total()
 
     def enter(self, peer: Peer) -> bool:
-        """Count one more, or return False where there are enough."""
+        """Count one more, or return False where there are too many."""
         if not (peer.is_loopback or peer.is_socket):
             is_full = self.held >= self._most
-            if is_full or self._by_home[peer.home] >= self._most_per_home:
+            if is_full or self._by_address[peer.rate_key] >= self._most_per_address:
                 return False
-            self._by_home[peer.home] += 1
+            self._by_address[peer.rate_key] += 1
         return True
 
     def leave(self, peer: Peer) -> None:
         """Count one less."""
-        self._by_home[peer.home] -= 1
-        if self._by_home[peer.home] <= 0:
-            del self._by_home[peer.home]
+        self._by_address[peer.rate_key] -= 1
+        if self._by_address[peer.rate_key] <= 0:
+            del self._by_address[peer.rate_key]
 
 
-class Place:
-    """Hold the place of one connection, across its change from HTTP to WebSocket."""
+class ConnectionSlot:
+    """Count one connection, across its upgrade from HTTP to WebSocket."""
 
     def __init__(self, connections: Connections, protocol: Any) -> None:
         self._connections = connections
         self._peer = peer_of({"server": protocol.server, "client": protocol.client})
         self.is_held = connections.enter(self._peer)
 
-    def give_up(self) -> None:
-        """Leave, once."""
+    def release(self) -> None:
+        """Count the connection no more; calling it twice is allowed."""
         if self.is_held:
             self.is_held = False
             self._connections.leave(self._peer)
 
 
 class BoundedHttp(H11Protocol):
-    """Speak HTTP/1.1; hang up on who does not finish a request's head in time."""
+    """Serve HTTP/1.1; abort connections whose request head is not complete in time."""
 
     bounds: Connections
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place, or hang up at once."""
+        """Take a slot, or abort at once."""
         super().connection_made(transport)
-        self._place = Place(self.bounds, self)
+        self._slot = ConnectionSlot(self.bounds, self)
         self._head_timer: asyncio.TimerHandle | None = None
-        if self._place.is_held:
+        if self._slot.is_held:
             self._await_head()
         else:
             transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave the place to another."""
-        self._place.give_up()
+        """Release the slot."""
+        self._slot.release()
         self._stop_waiting()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes; as many small ones as one likes do not extend the time for a head."""
+        """Take bytes; any number of small pieces does not extend the time limit."""
         super().data_received(data)
         self._await_head()
 
     def on_response_complete(self) -> None:
-        """Begin to wait for the next request."""
+        """Start to wait for the next request."""
         self._stop_waiting()
         super().on_response_complete()
         self._await_head()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Hand place and connection over to the WebSocket."""
+        """Pass slot and connection on to the WebSocket."""
         self._stop_waiting()
         super().handle_websocket_upgrade(event)
         websocket = self.transport.get_protocol()
         assert isinstance(websocket, BoundedWebSocket)
-        websocket.place = self._place
+        websocket.slot = self._slot
 
     def _await_head(self) -> None:
         is_answering = self.cycle is not None and not self.cycle.response_complete
@@ -125,17 +125,17 @@ class BoundedHttp(H11Protocol):
 
 
 class BoundedWebSocket(WebSocketsSansIOProtocol):
-    """Speak WebSocket in the place of the connection that asked for it."""
+    """Serve a WebSocket in the slot of the connection that was upgraded."""
 
-    place: Place | None = None
+    slot: ConnectionSlot | None = None
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave the place to another."""
-        if self.place is not None:
-            self.place.give_up()
+        """Release the slot."""
+        if self.slot is not None:
+            self.slot.release()
         super().connection_lost(exc)
 
 
 def bounded_by(connections: Connections) -> type[BoundedHttp]:
-    """Return the protocol of HTTP whose connections are counted together."""
+    """Return the HTTP protocol whose connections count together."""
     return type("BoundedHttp", (BoundedHttp,), {"bounds": connections})

@@ -1,60 +1,142 @@
-"""Stand before every route: judge who asks, bound what is sent, tell what was done."""
+"""Check every request before its route: the user, the body, and the role that it needs."""
 
-from typing import Final
+from typing import Annotated, Final
 
+from fastapi import Depends, FastAPI
+from starlette.requests import HTTPConnection
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket
 
-from vla_deploy.dashboard.access.access import Access
-from vla_deploy.dashboard.access.answers import refuse
-from vla_deploy.dashboard.access.asked import WEBSOCKET, Asked, asked_of
+from vla_deploy.client.access.accounts import UserRole
+from vla_deploy.dashboard.access.access_control import AccessControl
+from vla_deploy.dashboard.access.audit_middleware import AuditMiddleware, note_code, note_required
 from vla_deploy.dashboard.access.body import read_body, read_stop_body, replay
-from vla_deploy.dashboard.access.errors import RequestRefused
-from vla_deploy.dashboard.access.identity import IDENTITY, nobody
-from vla_deploy.dashboard.access.witness import Witness
+from vla_deploy.dashboard.access.identity import IDENTITY, Identity, unknown_user
+from vla_deploy.dashboard.access.request import WEBSOCKET, IncomingRequest, read_request
+from vla_deploy.dashboard.errors import AccessDenied, Denial, denial_response
+
+_DENIAL_EXTENSION: Final = "websocket.http.response"
+_POLICY_VIOLATION: Final = 1008
+_OF_BODY: Final = (b"content-type", b"content-length")
 
 
 class AccessGuard:
-    """Let through what may be asked, with `request.state.identity` told to the routes."""
+    """Pass on the requests that are admitted, with the identity in `request.state.identity`."""
 
-    def __init__(self, app: ASGIApp, access: Access) -> None:
+    def __init__(self, app: ASGIApp, access: AccessControl) -> None:
         self._app = app
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Judge one request or WebSocket."""
+        """Check one request or WebSocket."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        asked = asked_of(scope)
-        scope.setdefault("state", {})[IDENTITY] = nobody(asked.peer.address)
-        witness = Witness(scope, asked, send, self._access.audit)
+        request = read_request(scope)
+        scope.setdefault("state", {})[IDENTITY] = unknown_user(request.peer.address)
+        audited = AuditMiddleware(scope, request, send, self._access.audit)
         try:
-            receive = await self._admit(scope, receive, asked)
-        except RequestRefused as refusal:
-            await refuse(refusal, scope, receive, witness.send)
+            receive = await self._admit(scope, receive, request)
+        except AccessDenied as denied:
+            await _deny(denied, scope, receive, audited.send)
             return
-        with witness:
-            if asked.method == WEBSOCKET:
-                tenure = self._access.tenure(asked, receive, witness.send)
-                await self._app(scope, tenure.receive, tenure.send)
+        with audited:
+            if request.method == WEBSOCKET:
+                session = self._access.session_expiry(request, receive, audited.send)
+                await self._app(scope, session.receive, session.send)
             else:
-                await self._app(scope, receive, witness.send)
+                await self._app(scope, receive, audited.send)
 
-    async def _admit(self, scope: Scope, receive: Receive, asked: Asked) -> Receive:
-        if asked.is_stop:
-            scope["state"][IDENTITY] = self._access.admit_stop(asked)
+    async def _admit(self, scope: Scope, receive: Receive, request: IncomingRequest) -> Receive:
+        if request.is_stop:
+            scope["state"][IDENTITY] = self._access.admit_stop(request)
             scope["headers"] = _as_json(scope["headers"])
             return replay(await read_stop_body(receive), receive)
-        scope["state"][IDENTITY] = self._access.admit(asked)
-        if not asked.is_change:
+        scope["state"][IDENTITY] = self._access.admit(request)
+        if not request.is_change:
             return receive
-        return replay(await read_body(asked, receive), receive)
+        return replay(await read_body(request, receive), receive)
 
 
-_OF_BODY: Final = (b"content-type", b"content-length")
+class Require:
+    """Admit users who have a role; a test finds by it the routes that require none.
+
+    It is a coroutine, so that no request, and the stop least of all, waits for a thread: there are
+    40 of them, and answers that read slow disks may hold them all.
+    """
+
+    def __init__(self, role: UserRole) -> None:
+        self.role = role
+
+    async def __call__(self, connection: HTTPConnection) -> Identity:
+        """Return the identity of the user.
+
+        Raises:
+            AccessDenied: the user is not logged in, or the user's role is too low.
+        """
+        note_required(connection, self.role)
+        identity: Identity = getattr(connection.state, IDENTITY)
+        if identity.role.allows(self.role):
+            return identity
+        if identity.role is UserRole.ANYONE:
+            raise AccessDenied(
+                Denial.LOGIN_NEEDED,
+                f"this needs the role {self.role}",
+                "log in, or send a token; none yet? On the robot: vla-deploy dashboard password",
+            )
+        raise AccessDenied(
+            Denial.ROLE_TOO_LOW,
+            f"{identity.user} is {identity.role}, this needs {self.role}",
+            "ask an admin",
+        )
+
+
+_REQUIRED: Final = {role: Require(role) for role in UserRole}
+
+
+def require(role: UserRole) -> Require:
+    """Return the dependency of a route that needs a role: `Depends(require(UserRole.VIEWER))`."""
+    return _REQUIRED[role]
+
+
+Anyone = Annotated[Identity, Depends(require(UserRole.ANYONE))]
+Viewer = Annotated[Identity, Depends(require(UserRole.VIEWER))]
+Operator = Annotated[Identity, Depends(require(UserRole.OPERATOR))]
+
+
+def guard(app: FastAPI, access: AccessControl) -> None:
+    """Put access control before every route of an application."""
+    app.state.access = access
+    app.add_middleware(AccessGuard, access=access)
+    app.add_exception_handler(AccessDenied, _answer)
+
+
+async def _answer(connection: HTTPConnection, denied: Exception) -> JSONResponse:
+    """Return the response to a denial that a route raised; a WebSocket is denied here."""
+    assert isinstance(denied, AccessDenied)
+    note_code(connection.scope, denied.code)
+    if isinstance(connection, WebSocket):
+        await _deny_websocket(denied, connection)
+    return denial_response(denied)
+
+
+async def _deny(denied: AccessDenied, scope: Scope, receive: Receive, send: Send) -> None:
+    note_code(scope, denied.code)
+    if scope["type"] == "websocket":
+        await _deny_websocket(denied, WebSocket(scope, receive, send))
+    else:
+        await denial_response(denied)(scope, receive, send)
+
+
+async def _deny_websocket(denied: AccessDenied, websocket: WebSocket) -> None:
+    if _DENIAL_EXTENSION in websocket.scope.get("extensions", {}):
+        await websocket.send_denial_response(denial_response(denied))
+    else:
+        await websocket.close(_POLICY_VIOLATION, denied.what)
 
 
 def _as_json(headers: list[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
-    """Say that the body is JSON, as it now is."""
+    """Declare the body as JSON, which it is after `read_stop_body`."""
     kept = [one for one in headers if one[0].lower() not in _OF_BODY]
     return [*kept, (b"content-type", b"application/json")]

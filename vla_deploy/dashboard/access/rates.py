@@ -1,4 +1,4 @@
-"""Bound how often something may be asked, and slow down who guesses passwords."""
+"""Limit the rate of requests, and slow down password guesses."""
 
 import threading
 from collections import OrderedDict
@@ -8,31 +8,28 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 
 MOST_KEYS: Final = 4096
-"""More addresses than that at once are an attack: the one seen longest ago is forgotten."""
+"""More addresses at once are an attack: the least recently seen one is forgotten."""
 
 
-class Buckets:
-    """Let `burst` through at once, and `rate_hz` in the long run, for each key."""
+class TokenBuckets:
+    """Admit `burst` requests at once, and `rate_hz` in the long run, for each key."""
 
-    def __init__(
-        self, rate_hz: float, burst: int, clock: Clock, most_keys: int = MOST_KEYS
-    ) -> None:
+    def __init__(self, rate_hz: float, burst: int, clock: Clock) -> None:
         self._rate_hz = rate_hz
         self._burst = burst
         self._clock = clock
-        self._most_keys = most_keys
         self._lock = threading.Lock()
         self._by_key: OrderedDict[str, tuple[float, int]] = OrderedDict()
 
     def take(self, key: str) -> float:
-        """Take one; return 0, or the seconds until there is one to take."""
+        """Take one token; return 0, or the seconds until there is one."""
         with self._lock:
             now_ns = self._clock.now_ns()
             left, seen_ns = self._by_key.pop(key, (float(self._burst), now_ns))
             left = min(self._burst, left + self._rate_hz * (now_ns - seen_ns) / NS_PER_S)
             wait_s = 0.0 if left >= 1.0 else (1.0 - left) / self._rate_hz
             self._by_key[key] = (left - 1.0 if wait_s == 0.0 else left, now_ns)
-            _forget_beyond(self._by_key, self._most_keys)
+            _bound(self._by_key)
             return wait_s
 
 
@@ -52,18 +49,17 @@ class BackOffRule:
 class BackOff:
     """Make each key wait longer with every failure.
 
-    A try counts as a failure from its beginning on, so that many at once gain nothing.
+    An attempt counts as a failure from its start on, so that parallel ones gain nothing.
     """
 
-    def __init__(self, rule: BackOffRule, clock: Clock, most_keys: int = MOST_KEYS) -> None:
+    def __init__(self, rule: BackOffRule, clock: Clock) -> None:
         self._rule = rule
         self._clock = clock
-        self._most_keys = most_keys
         self._lock = threading.Lock()
         self._by_key: OrderedDict[str, tuple[int, int]] = OrderedDict()
 
     def wait_s(self, key: str) -> float:
-        """Return how long a key has to wait, 0 when it may try."""
+        """Return how long a key has to wait, 0 when it may try now."""
         with self._lock:
             failures, last_ns = self._by_key.get(key, (0, 0))
             passed_s = (self._clock.now_ns() - last_ns) / NS_PER_S
@@ -73,13 +69,13 @@ class BackOff:
             return max(0.0, min(self._rule.longest_s, doubled_s) - passed_s)
 
     def begin(self, key: str) -> None:
-        """Count a try, as failed until `succeeded` says otherwise."""
+        """Count an attempt as failed, until `succeeded` is called."""
         with self._lock:
             now_ns = self._clock.now_ns()
             failures, last_ns = self._by_key.pop(key, (0, now_ns))
             is_forgotten = (now_ns - last_ns) / NS_PER_S > self._rule.forget_s
             self._by_key[key] = (1 if is_forgotten else failures + 1, now_ns)
-            _forget_beyond(self._by_key, self._most_keys)
+            _bound(self._by_key)
 
     def succeeded(self, key: str) -> None:
         """Forget the failures of a key."""
@@ -87,6 +83,6 @@ class BackOff:
             self._by_key.pop(key, None)
 
 
-def _forget_beyond(held: "OrderedDict[str, Any]", most: int) -> None:
-    while len(held) > most:
+def _bound(held: "OrderedDict[str, Any]") -> None:
+    while len(held) > MOST_KEYS:
         held.popitem(last=False)

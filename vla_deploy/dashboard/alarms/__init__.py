@@ -1,1 +1,1 @@
-"""Say which part of the robot failed and why: conditions found, alarms raised, seen by whom."""
+"""Find what fails on the robot and why; raise alarms, and record who has acknowledged them."""

@@ -1,22 +1,22 @@
-"""Find why control stops or slows the robot, and whether control itself keeps time."""
+"""Find why control stops or slows the robot, late ticks, and faulty buses."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from vla_deploy.dashboard.alarms.finding import Finding, Severity
-from vla_deploy.dashboard.alarms.told import Document, Told
+from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
+from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
 from vla_deploy.safety import Cause, Reaction
 from vla_deploy.safety.causes import RULES
 
-BY_REACTION: Final[Mapping[Reaction, Severity]] = {
-    Reaction.NONE: Severity.INFO,
-    Reaction.BASE_SLOW: Severity.INFO,
-    Reaction.BASE_BLOCK: Severity.INFO,
-    Reaction.BASE_RAMP: Severity.WARNING,
-    Reaction.PROTECTIVE_STOP: Severity.WARNING,
-    Reaction.HOLD: Severity.ERROR,
-    Reaction.BASE_OFF: Severity.ERROR,
-    Reaction.GROUP_STOP: Severity.ERROR,
+BY_REACTION: Final[Mapping[Reaction, AlarmSeverity]] = {
+    Reaction.NONE: AlarmSeverity.INFO,
+    Reaction.BASE_SLOW: AlarmSeverity.INFO,
+    Reaction.BASE_BLOCK: AlarmSeverity.INFO,
+    Reaction.BASE_RAMP: AlarmSeverity.WARNING,
+    Reaction.PROTECTIVE_STOP: AlarmSeverity.WARNING,
+    Reaction.HOLD: AlarmSeverity.ERROR,
+    Reaction.BASE_OFF: AlarmSeverity.ERROR,
+    Reaction.GROUP_STOP: AlarmSeverity.ERROR,
 }
 UNITS: Final[Mapping[Cause, str]] = {
     Cause.STANDSTILL_MOTION: "rad/s",
@@ -51,53 +51,65 @@ UNITS: Final[Mapping[Cause, str]] = {
     Cause.OBSTACLE_LIMIT_ZONE: "m",
     Cause.OBSTACLE_APPROACH: "s",
 }
-"""Units of what each cause measures; fingers, which slide, are in metres where joints turn."""
+"""The unit that each cause measures; for sliding fingers read metres in place of radians."""
 LATE_RATIO: Final = 0.2
 UNJUDGED_TICKS: Final = 2
 _ADVICE: Final = {rule.cause: rule.advice for rule in RULES}
 _LATE_RISE_S: Final = 5.0
+_CABLE: Final = "check cable, termination and the device's power"
+_SHOWN: Final = 4
+_SERVOS: Final = {
+    "lost": ("has lost", AlarmSeverity.ERROR),
+    "degraded": ("gets too few answers of", AlarmSeverity.WARNING),
+}
+_NODES: Final = {
+    "lost_nodes": ("has lost nodes", AlarmSeverity.ERROR),
+    "degraded_nodes": ("has nodes that answer badly", AlarmSeverity.WARNING),
+    "bus_degraded": ("carries damaged frames", AlarmSeverity.WARNING),
+}
+"""Counters of a CAN bus that are zero in normal operation."""
 
 
-def active_cause(told: Told) -> Iterator[Finding]:
-    """Find what safety reports: the cause that wins over all others."""
-    status = told.document("control_status")
+def active_cause(robot: RobotStatus) -> Iterator[AlarmFinding]:
+    """Find the cause that safety reports, which has priority over all others."""
+    status = robot.document("control_status")
     if status is None:
         return
     if status["cause"]:
         yield _of_cause(status)
     elif status["state"] == "fault":
-        yield Finding(
+        yield AlarmFinding(
             process="control",
             field="state",
             text=f"control cannot be armed: {status['detail'] or 'no reason given'}",
-            severity=Severity.ERROR,
+            severity=AlarmSeverity.ERROR,
             advice="remove the cause, then: vla-deploy reset",
             rise_s=0.0,
         )
 
 
-def untimely_control(told: Told) -> Iterator[Finding]:
-    """Find a control that ticks late, or that safety does not judge."""
-    status = told.document("control_status")
-    if told.late_ratio is not None and told.late_ratio > LATE_RATIO:
-        yield Finding(
+def untimely_control(robot: RobotStatus) -> Iterator[AlarmFinding]:
+    """Find late ticks, and ticks that safety does not judge."""
+    status = robot.document("control_status")
+    if robot.late_ratio is not None and robot.late_ratio > LATE_RATIO:
+        yield AlarmFinding(
             process="control",
             field="late_ticks",
             text="control's ticks come late",
-            severity=Severity.WARNING,
+            severity=AlarmSeverity.WARNING,
             advice="grant SCHED_FIFO (vla-deploy doctor), or give the computer less to do",
-            measured=round(told.late_ratio, 3),
+            measured=round(robot.late_ratio, 3),
             limit=LATE_RATIO,
             unit="of all ticks",
             rise_s=_LATE_RISE_S,
         )
     unjudged = 0 if status is None else int(status["tick"]) - int(status["judged_tick"])
     if unjudged > UNJUDGED_TICKS:
-        yield Finding(
+        yield AlarmFinding(
             process="control",
             field="judged_tick",
             text="ticks go by that safety has not judged",
-            severity=Severity.CRITICAL,
+            severity=AlarmSeverity.CRITICAL,
             advice="stop the robot, then look into: vla-deploy logs control",
             measured=float(unjudged),
             limit=float(UNJUDGED_TICKS),
@@ -105,10 +117,10 @@ def untimely_control(told: Told) -> Iterator[Finding]:
         )
 
 
-def _of_cause(status: Document) -> Finding:
+def _of_cause(status: Document) -> AlarmFinding:
     cause = Cause(status["cause"])
     whose = f" ({status['subject']})" if status["subject"] else ""
-    return Finding(
+    return AlarmFinding(
         process="control",
         field=cause.value,
         subject=status["subject"],
@@ -121,3 +133,61 @@ def _of_cause(status: Document) -> Finding:
         age_s=status["age_s"],
         rise_s=0.0,
     )
+
+
+def troubled_buses(robot: RobotStatus) -> Iterator[AlarmFinding]:
+    """Find the faults that each bus counts.
+
+    None while the emergency stop is latched: the button may cut the power of the devices.
+    """
+    status = robot.document("control_status")
+    if status is None or status["estop_latched"]:
+        return
+    for name, counters in status["buses"].items():
+        if not counters:
+            text = f"bus {name} is not open"
+            yield _found(name, text, AlarmSeverity.ERROR, robot)
+            continue
+        yield from _budget(name, counters.get("budget", {}), robot)
+        yield from _nodes(name, counters, robot)
+
+
+def _budget(name: str, budget: Document, robot: RobotStatus) -> Iterator[AlarmFinding]:
+    if budget.get("bus") == "lost":
+        text = f"bus {name} is lost: too many answers missing or damaged"
+        yield _found(name, text, AlarmSeverity.ERROR, robot)
+    elif budget.get("bus") == "degraded":
+        text = f"bus {name} is degraded: answers go missing"
+        yield _found(name, text, AlarmSeverity.WARNING, robot)
+    for standing, (words, severity) in _SERVOS.items():
+        joints = budget.get(standing, ())
+        if joints:
+            text = f"bus {name} {words}: {_listed(joints)}"
+            yield _found(f"{name}.{standing}", text, severity, robot, count=len(joints))
+
+
+def _nodes(name: str, counters: Document, robot: RobotStatus) -> Iterator[AlarmFinding]:
+    for counter, (words, severity) in _NODES.items():
+        count = int(counters.get(counter, 0))
+        if count:
+            yield _found(f"{name}.{counter}", f"bus {name} {words}", severity, robot, count=count)
+
+
+def _found(
+    field: str, text: str, severity: AlarmSeverity, robot: RobotStatus, count: int | None = None
+) -> AlarmFinding:
+    return AlarmFinding(
+        process="control",
+        field=f"buses.{field}",
+        text=text,
+        severity=severity,
+        advice=_CABLE,
+        measured=None if count is None else float(count),
+        limit=None if count is None else 0.0,
+        age_s=robot.age_s("control_status"),
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - _SHOWN
+    return ", ".join(names[:_SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -1,32 +1,25 @@
-"""List every rule by which conditions are found: pure functions of what was told."""
+"""List the alarm rules, which are pure functions of the robot's status."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from vla_deploy.dashboard.alarms import (
-    budget_rules,
-    bus_rules,
-    control_rules,
-    part_rules,
-    process_rules,
-    topic_rules,
-)
-from vla_deploy.dashboard.alarms.finding import Finding, Key, Severity
-from vla_deploy.dashboard.alarms.told import Told
+from vla_deploy.dashboard.alarms import control_rules, part_rules, process_rules
+from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity, Key
+from vla_deploy.dashboard.alarms.robot_status import RobotStatus
 
-Rule = Callable[[Told], Iterator[Finding]]
+Rule = Callable[[RobotStatus], Iterator[AlarmFinding]]
 
 RULES: Final[tuple[Rule, ...]] = (
     process_rules.silent_supervisor,
     process_rules.lost_processes,
     process_rules.odd_topics,
-    topic_rules.old_topics,
+    process_rules.old_topics,
     control_rules.active_cause,
     control_rules.untimely_control,
-    bus_rules.troubled_buses,
-    budget_rules.exceeded_budgets,
-    budget_rules.steps_taken,
-    budget_rules.slow_twin,
+    control_rules.troubled_buses,
+    part_rules.exceeded_budgets,
+    part_rules.steps_taken,
+    part_rules.slow_twin,
     part_rules.hearing,
     part_rules.seeing,
     part_rules.planning,
@@ -35,22 +28,22 @@ RULES: Final[tuple[Rule, ...]] = (
 )
 
 
-def find(told: Told) -> dict[Key, Finding]:
-    """Return every condition that holds."""
-    return {finding.key: finding for rule in RULES for finding in _judged(rule, told)}
+def find(robot: RobotStatus) -> dict[Key, AlarmFinding]:
+    """Return the findings of all rules."""
+    return {finding.key: finding for rule in RULES for finding in _findings_of(rule, robot)}
 
 
-def _judged(rule: Rule, told: Told) -> Iterable[Finding]:
-    """Return what a rule finds; one that does not understand what it reads is found itself."""
+def _findings_of(rule: Rule, robot: RobotStatus) -> Iterable[AlarmFinding]:
+    """Return what a rule finds; a rule that fails on its input is a finding itself."""
     try:
-        return tuple(rule(told))
+        return tuple(rule(robot))
     except (KeyError, TypeError, ValueError) as error:
         name = rule.__name__.replace("_", " ")
-        found = Finding(
+        found = AlarmFinding(
             process="dashboard",
             field=rule.__name__,
             text=f"nobody judges {name}: what is told has another form than expected ({error!r})",
-            severity=Severity.ERROR,
+            severity=AlarmSeverity.ERROR,
             advice="processes of two versions run beside each other: start the run anew",
         )
         return (found,)

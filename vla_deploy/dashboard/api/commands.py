@@ -1,4 +1,4 @@
-"""Give the robot commands, and tell what became of them."""
+"""Give the robot commands, and answer how they ended."""
 
 from http import HTTPStatus
 from typing import Annotated, Any, Final
@@ -8,20 +8,20 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import CommandRecord
-from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, note, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 
-_Viewer: Final = Depends(require(Role.VIEWER))
-_Operator: Final = Depends(require(Role.OPERATOR))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
+_Operator: Final = Depends(require(UserRole.OPERATOR))
 CommandId = Annotated[str, Path(max_length=128)]
 _Words = Annotated[str, Field(min_length=1, max_length=MOST_CHARACTERS)]
 
 
-class Command(BaseModel):
-    """Hold words, or a plan in any of the known dialects; the planner's validator judges both."""
+class CommandBody(BaseModel):
+    """Hold words, or a plan in any of the known dialects; the planner's validator checks both."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"text": "stop"}]})
 
@@ -29,36 +29,36 @@ class Command(BaseModel):
     plan: dict[str, Any] | None = None
 
     @model_validator(mode="after")
-    def _is_one(self) -> "Command":
+    def _is_one(self) -> "CommandBody":
         if (self.text is None) == (self.plan is None):
             raise ValueError("expected either text or plan")
         return self
 
 
-class Answer(BaseModel):
-    """Hold the words that answer what the robot has asked."""
+class AnswerBody(BaseModel):
+    """Hold the words that answer the robot's question."""
 
     model_config = ConfigDict(extra="forbid")
 
     text: _Words
 
 
-class Given(BaseModel):
-    """Name what was given: its events carry this id."""
+class CommandAccepted(BaseModel):
+    """Hold the id that the events of the command carry."""
 
     command_id: str
 
 
 @router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[_Operator])
-async def give(command: Command, request: Request) -> Given:
-    """Give a command; what becomes of it, also a refusal, is told under its id."""
+async def give(command: CommandBody, request: Request) -> CommandAccepted:
+    """Give a command; its events, a refusal included, carry its id."""
     return _uttered(request, **command.model_dump(exclude_none=True))
 
 
 @router.post("/answer", status_code=HTTPStatus.ACCEPTED, dependencies=[_Operator])
-async def answer(given: Answer, request: Request) -> Given:
-    """Answer what the robot has asked; where nothing was asked, nothing is done."""
-    return _uttered(request, text=given.text, answer=True)
+async def answer(body: AnswerBody, request: Request) -> CommandAccepted:
+    """Answer the robot's question; without a question nothing is done."""
+    return _uttered(request, text=body.text, answer=True)
 
 
 @router.get("", dependencies=[_Viewer])
@@ -71,16 +71,16 @@ async def history(
 
 @router.get("/{command_id}", dependencies=[_Viewer])
 async def one(command_id: CommandId, request: Request) -> dict[str, Any]:
-    """Return one command and what became of it."""
+    """Return one command with its events."""
     return _found(request, command_id).document()
 
 
 @router.post("/{command_id}/cancel", status_code=HTTPStatus.ACCEPTED, dependencies=[_Operator])
-async def cancel(command_id: CommandId, request: Request) -> Given:
-    """Cancel a command that has not ended: the robot comes to rest, and drops all that waits."""
+async def cancel(command_id: CommandId, request: Request) -> CommandAccepted:
+    """Cancel a command that has not ended: the robot comes to rest and drops waiting commands."""
     standing = _found(request, command_id).standing
     if standing.is_final:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.CONFLICT,
             "ended",
             f"command {command_id} has already ended: {standing}",
@@ -89,10 +89,10 @@ async def cancel(command_id: CommandId, request: Request) -> Given:
     return _uttered(request, cancel=True)
 
 
-def _uttered(request: Request, **utterance: Any) -> Given:
+def _uttered(request: Request, **utterance: Any) -> CommandAccepted:
     command_id = request.app.state.link.utter(**utterance)
     note(request, given=command_id, text=utterance.get("text", ""))
-    return Given(command_id=command_id)
+    return CommandAccepted(command_id=command_id)
 
 
 def _history(request: Request) -> CommandHistory:
@@ -103,7 +103,7 @@ def _history(request: Request) -> CommandHistory:
 def _found(request: Request, command_id: str) -> CommandRecord:
     record = _history(request).find(command_id)
     if record is None:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_command",
             f"no command {command_id!r} among the newest {MOST_COMMANDS}",

@@ -1,4 +1,4 @@
-"""Tell which platform profile is in force and what another would change; ask for another."""
+"""Answer which platform profile is in force and how others differ; request another one."""
 
 import uuid
 from http import HTTPStatus
@@ -10,18 +10,18 @@ from pydantic import BaseModel, ConfigDict, Field
 from platforms.errors import ProfileError
 from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
-from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.access import UserRole, note, require
+from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.supervisor.profiles.profile_choice import detect
 
 router = APIRouter(prefix="/profile", tags=["profile"])
 
-_Viewer: Final = Depends(require(Role.VIEWER))
+_Viewer: Final = Depends(require(UserRole.VIEWER))
 _TO_INHERIT_FROM: Final = "base"
 
 
-class Wanted(BaseModel):
-    """Name the wanted profile; `dry_run` prepares everything and changes nothing."""
+class ProfileBody(BaseModel):
+    """Name the requested profile; `dry_run` prepares everything and changes nothing."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -30,17 +30,17 @@ class Wanted(BaseModel):
     dry_run: bool = False
 
 
-class Asked(BaseModel):
-    """Name the request: `last.request_id` of the topic `profile_status` is this once it ended."""
+class ProfileRequested(BaseModel):
+    """Hold the request's id, which `profile_status` has as `last.request_id` after its end."""
 
     request_id: str
 
 
 @router.get("", dependencies=[_Viewer])
 def profile(request: Request) -> dict[str, Any]:
-    """Return the profile in force, a change under way, what fits this computer, what there is."""
+    """Return the profile in force with a current change, the fitting one, and all available."""
     name, why = detect()
-    current = _told(request)
+    current = _profile_status(request)
     return {
         "current": current,
         "detected": {"name": name, "why": why},
@@ -52,57 +52,58 @@ def profile(request: Request) -> dict[str, Any]:
 
 @router.get("/{name:path}/difference", dependencies=[_Viewer])
 def difference(name: str, request: Request) -> dict[str, Any]:
-    """Return per key what is in force and what the named profile says, where they differ.
+    """Return the keys in which the named profile differs from the one in force, with both values.
 
     Raises:
-        Refused: there is no such profile, nobody tells which one is in force, or a file of theirs
-            cannot be read, as that of an own profile that was moved meanwhile.
+        ApiError: there is no such profile, the supervisor is silent, or a profile's file cannot be
+            read, as after it was moved.
     """
-    told = _told(request)
-    _check(name, told)
-    if told is None:
-        raise Refused(
+    status = _profile_status(request)
+    _check(name, status)
+    if status is None:
+        raise ApiError(
             HTTPStatus.SERVICE_UNAVAILABLE,
             "no_profile",
             "the supervisor does not tell which profile is in force",
             "vla-deploy status",
         )
-    mine, its = (_values(one) for one in (told["profile"], name))
+    mine, its = (_values(one) for one in (status["profile"], name))
     keys = sorted(key for key in mine | its if mine.get(key) != its.get(key))
     return {
-        "current": told["profile"],
+        "current": status["profile"],
         "name": name,
         "keys": {key: {"current": mine.get(key), "wanted": its.get(key)} for key in keys},
     }
 
 
-@router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[Depends(require(Role.ADMIN))])
-async def use(wanted: Wanted, request: Request) -> Asked:
-    """Take the robot to another profile; it goes back by itself when that does not work."""
-    _check(wanted.name, _told(request))
+@router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[Depends(require(UserRole.ADMIN))])
+async def use(body: ProfileBody, request: Request) -> ProfileRequested:
+    """Request another profile; the robot returns to the old one by itself if it fails."""
+    _check(body.name, _profile_status(request))
     request_id = uuid.uuid4().hex
     request.app.state.link.publish(
         "profile_request",
         {
             "request_id": request_id,
-            "profile": wanted.name,
-            "allow_restart": wanted.may_restart,
-            "dry_run": wanted.dry_run,
+            "profile": body.name,
+            "allow_restart": body.may_restart,
+            "dry_run": body.dry_run,
         },
     )
-    note(request, profile=wanted.name, dry_run=wanted.dry_run)
-    return Asked(request_id=request_id)
+    note(request, profile=body.name, dry_run=body.dry_run)
+    return ProfileRequested(request_id=request_id)
 
 
-def _told(request: Request) -> dict[str, Any] | None:
-    told: dict[str, Any] | None = request.app.state.link.document("profile_status", age_limit_s=3.0)
-    return told
+def _profile_status(request: Request) -> dict[str, Any] | None:
+    link = request.app.state.link
+    status: dict[str, Any] | None = link.document("profile_status", age_limit_s=3.0)
+    return status
 
 
 def _parents(name: str) -> tuple[str, ...]:
     try:
         return read_source(name).parents
-    except ProfileError:  # an own file that is gone or broken: whoever looks closer is told why
+    except ProfileError:  # a custom file that is missing or broken: `difference` says why
         return ()
 
 
@@ -110,23 +111,23 @@ def _values(name: str) -> dict[str, Any]:
     try:
         return dict(flat(read_source(name).values))
     except ProfileError as error:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.CONFLICT, "profile_unreadable", str(error), f"vla-deploy profile show {name}"
         ) from error
 
 
-def _names(told: dict[str, Any] | None) -> list[str]:
-    """Return the shipped profiles, and the own one that the run has begun with."""
+def _names(status: dict[str, Any] | None) -> list[str]:
+    """Return the shipped profiles, and the custom one with which the run began."""
     shipped = [name for name in profile_names() if not name.endswith(_TO_INHERIT_FROM)]
-    begun_with = str((told or {}).get("begun_with", ""))
+    begun_with = str((status or {}).get("begun_with", ""))
     return shipped if begun_with in ("", *shipped) else [begun_with, *shipped]
 
 
-def _check(name: str, told: dict[str, Any] | None) -> None:
-    """Accept what is offered: any other path would read any file."""
-    names = _names(told)
+def _check(name: str, status: dict[str, Any] | None) -> None:
+    """Accept only offered names: a path could read any file."""
+    names = _names(status)
     if name not in names:
-        raise Refused(
+        raise ApiError(
             HTTPStatus.NOT_FOUND,
             "no_such_profile",
             f"no profile {name!r:.120}; there are {', '.join(names)}",

@@ -9,11 +9,9 @@ import pytest
 
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.maintenance import dashboard
-from vla_deploy.dashboard.access.accounts import wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.errors import AccountRefused, AccountsUnusable
-from vla_deploy.dashboard.access.identity import Role
-from vla_deploy.dashboard.access.passwords import Cost, fits, stored_form
+from vla_deploy.client.access.accounts import AccountsFile, UserRole, wall_s
+from vla_deploy.client.access.errors import AccountRefused, AccountsUnusable
+from vla_deploy.client.access.passwords import Cost, hash_password, matches
 
 URL = "http://127.0.0.1:8088"
 CHEAP = Cost(log2_rounds=10, block=1, parallel=1)
@@ -53,7 +51,7 @@ def test_without_a_browser_the_address_is_told_for_another_computer(session, rob
 
 @pytest.fixture
 def base(tmp_path, monkeypatch):
-    monkeypatch.setattr(dashboard, "stored_form", lambda password: stored_form(password, CHEAP))
+    monkeypatch.setattr(dashboard, "hash_password", lambda password: hash_password(password, CHEAP))
     return tmp_path / "base"
 
 
@@ -80,8 +78,8 @@ def accounts(base):
 def test_the_first_password_is_generated_shown_once_and_stored_as_a_hash(run, base):
     password = run("password")
     admin = accounts(base).users["admin"]
-    assert admin.role is Role.ADMIN
-    assert fits(password, admin.password)
+    assert admin.role is UserRole.ADMIN
+    assert matches(password, admin.password)
     assert len(password) >= 20
     written = b"".join(path.read_bytes() for path in (base.parent / "base-state").rglob("*.*"))
     assert password.encode() not in written
@@ -95,13 +93,13 @@ def test_two_passwords_are_never_the_same(run):
 def test_a_new_password_leaves_the_role_as_it_was(run, base):
     run("password", "ann", "--role", "operator")
     run("password", "ann")
-    assert accounts(base).users["ann"].role is Role.OPERATOR
+    assert accounts(base).users["ann"].role is UserRole.OPERATOR
 
 
 def test_a_password_of_ones_own_comes_by_standard_input(run, base, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("four plain old words\n"))
     run("password", "ann", "--role", "viewer", "--stdin")
-    assert fits("four plain old words", accounts(base).users["ann"].password)
+    assert matches("four plain old words", accounts(base).users["ann"].password)
 
 
 @pytest.mark.parametrize("given", ["short\n", "", "x" * 300])
@@ -130,7 +128,7 @@ def test_a_token_is_shown_once_counts_for_its_days_and_can_be_revoked(run, base)
     held = accounts(base)
     now_s = wall_s()
     token = held.token_of(text, now_s)
-    assert token.role is Role.VIEWER
+    assert token.role is UserRole.VIEWER
     assert held.token_of(text, now_s + 2.1 * 86_400) is None
     assert text not in run("token", "list") + run("audit", "--json")
     run("token", "revoke", "prometheus")

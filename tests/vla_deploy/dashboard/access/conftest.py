@@ -8,21 +8,19 @@ import pytest
 from fastapi import Depends, FastAPI, WebSocket, WebSocketDisconnect
 from starlette.testclient import TestClient
 
+from vla_deploy.client.access.accounts import AccountsFile, User, new_token
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
+from vla_deploy.client.access.passwords import Cost, hash_password
 from vla_deploy.dashboard.access import (
-    Access,
+    AccessControl,
     AccessRules,
     Anyone,
     Operator,
-    Role,
+    UserRole,
     Viewer,
     guard,
     require,
 )
-from vla_deploy.dashboard.access.accounts import User, new_token
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
-from vla_deploy.dashboard.access.passwords import Cost, stored_form
 from vla_deploy.dashboard.access.routes import router
 
 HERE = "127.0.0.1"
@@ -31,7 +29,7 @@ CHEAP = Cost(log2_rounds=10, block=1, parallel=1)
 PASSWORD = "the robot wears blue socks"
 
 
-def small_app(access: Access) -> FastAPI:
+def small_app(access: AccessControl) -> FastAPI:
     """One route for each role, the stop, and a WebSocket: all that the guard has to tell apart."""
     app = FastAPI()
 
@@ -43,7 +41,7 @@ def small_app(access: Access) -> FastAPI:
     async def commands(body: dict[str, Any], who: Operator) -> dict[str, Any]:
         return {"user": who.user, "body": body}
 
-    @app.post("/api/v1/profile", dependencies=[Depends(require(Role.ADMIN))])
+    @app.post("/api/v1/profile", dependencies=[Depends(require(UserRole.ADMIN))])
     async def profile() -> dict[str, bool]:
         return {"done": True}
 
@@ -73,7 +71,7 @@ def small_app(access: Access) -> FastAPI:
 class World:
     """A guarded application, its clocks and its accounts."""
 
-    access: Access
+    access: AccessControl
     app: FastAPI
     clock: Any
     wall: list[float]
@@ -85,11 +83,11 @@ class World:
         url = f"{scheme}://{name}:8088"
         return TestClient(self.app, url, client=(address, 50_000), **settings)
 
-    def add_user(self, name: str, role: Role, password: str = PASSWORD) -> None:
-        user = User(role=role, password=stored_form(password, CHEAP), changed_s=self.wall[0])
+    def add_user(self, name: str, role: UserRole, password: str = PASSWORD) -> None:
+        user = User(role=role, password=hash_password(password, CHEAP), changed_s=self.wall[0])
         self.access.accounts.change(lambda held: (held.with_user(name, user), None))
 
-    def add_token(self, name: str, role: Role, lasts_s: float | None = None) -> str:
+    def add_token(self, name: str, role: UserRole, lasts_s: float | None = None) -> str:
         token_id, text, token = new_token(name, role, self.wall[0], lasts_s)
         self.access.accounts.change(lambda held: (held.with_token(token_id, token), None))
         return text
@@ -105,7 +103,7 @@ def world(tmp_path: Path, hand_clock: Any) -> Callable[..., World]:
         accounts = AccountsFile(tmp_path / "access" / "accounts.json")
         file = AuditFile(tmp_path / "access" / "audit.jsonl")
         audit = AuditLog(file, hand_clock, now_s=lambda: wall[0])
-        access = Access(
+        access = AccessControl(
             AccessRules(**rules), accounts, audit, hand_clock, now_s=lambda: wall[0], cost=CHEAP
         )
         return World(access, small_app(access), hand_clock, wall)

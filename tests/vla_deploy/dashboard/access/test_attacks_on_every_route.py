@@ -23,17 +23,15 @@ from schemathesis import GenerationMode
 from starlette.testclient import TestClient
 
 from drivers.clock import MonotonicClock
+from vla_deploy.client.access.accounts import AccountsFile, User, new_token, wall_s
+from vla_deploy.client.access.audit_log import AuditFile, AuditLog
+from vla_deploy.client.access.passwords import Cost, hash_password
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.access import Access, AccessRules, Role
-from vla_deploy.dashboard.access.accounts import User, new_token, wall_s
-from vla_deploy.dashboard.access.accounts_file import AccountsFile
-from vla_deploy.dashboard.access.audit import AuditLog
-from vla_deploy.dashboard.access.audit_file import AuditFile
-from vla_deploy.dashboard.access.passwords import Cost, stored_form
+from vla_deploy.dashboard.access import AccessControl, AccessRules, UserRole
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import RingReader, SharedSpace
 from vla_deploy.ipc.topics import TOPICS, TopicKind
+from vla_deploy.runtime.net import DashboardSettings
 
 PASSWORD = "the robot wears blue socks"
 BAIT = "what no route may ever show"
@@ -42,12 +40,12 @@ SECRETS = (BAIT, PASSWORD, "scrypt$", "Traceback", "site-packages", "accounts.js
 OPEN = {STOP, "/api/v1/login", "/api/v1/logout", "/api/v1/session", "/healthz"}
 RINGS = [topic.name for topic in TOPICS if topic.kind is TopicKind.RING]
 ALLOWED_ACTS = {
-    Role.ANYONE: {"estop"},
-    Role.VIEWER: {"estop"},
-    Role.OPERATOR: {"estop", "reset", "arm", "disarm"},
-    Role.ADMIN: {"estop", "reset", "arm", "disarm"},
+    UserRole.ANYONE: {"estop"},
+    UserRole.VIEWER: {"estop"},
+    UserRole.OPERATOR: {"estop", "reset", "arm", "disarm"},
+    UserRole.ADMIN: {"estop", "reset", "arm", "disarm"},
 }
-ROLES = list(Role)
+ROLES = list(UserRole)
 
 
 @dataclass
@@ -58,33 +56,33 @@ class Target:
     client: httpx.AsyncClient
     runner: asyncio.Runner
     folder: Path
-    tokens: dict[Role, str]
+    tokens: dict[UserRole, str]
     rings: dict[str, RingReader]
     strategies: dict[Any, Any]
     asked: int = 0
 
-    def ask(self, role: Role, method: str, url: str, **content: Any) -> Any:
+    def ask(self, role: UserRole, method: str, url: str, **content: Any) -> Any:
         """Ask once; every answer has to keep the promises that hold for all."""
         headers = {str(name): value for name, value in (content.pop("headers", None) or {}).items()}
         headers = {name: value for name, value in headers.items() if _may_be_sent(name, value)}
-        if role is not Role.ANYONE:
+        if role is not UserRole.ANYONE:
             headers["Authorization"] = f"Bearer {self.tokens[role]}"
         answer = self.runner.run(self.client.request(method, url, headers=headers, **content))
         self.asked += 1
         self._judge(role, method, url, answer)
         return answer
 
-    def _judge(self, role: Role, method: str, url: str, answer: Any) -> None:
+    def _judge(self, role: UserRole, method: str, url: str, answer: Any) -> None:
         where = f"{role} {method} {url!r:.200} -> {answer.status_code} {answer.text:.300}"
         assert answer.status_code < 500 or answer.status_code == 503, where
         shown = answer.text + str(answer.headers)
-        own = (str(self.folder),) if role is Role.ANYONE else ()
+        own = (str(self.folder),) if role is UserRole.ANYONE else ()
         for secret in (*SECRETS, *self.tokens.values(), *own):
             assert secret not in shown, where
         if answer.status_code >= 400 and answer.content:
             assert set(answer.json()["error"]) >= {"code", "what", "try"}, where
         path = url.partition("?")[0]
-        if role is Role.ANYONE and path.startswith("/api/") and path not in OPEN:
+        if role is UserRole.ANYONE and path.startswith("/api/") and path not in OPEN:
             assert answer.status_code >= 400, where
 
     def arrived(self) -> dict[str, list[dict[str, Any]]]:
@@ -114,9 +112,11 @@ def target(tmp_path_factory):
     accounts = AccountsFile(folder / "access" / "accounts.json")
     audit = AuditLog(AuditFile(folder / "access" / "audit.jsonl"), clock)
     rules = AccessRules(acts_hz=1000.0, acts_burst=10_000)
-    access = Access(rules, accounts, audit, clock, cost=Cost(log2_rounds=10, block=1, parallel=1))
-    access._strangers._burst = 10**9  # the attack is to reach the routes, not the brakes
-    user = User(role=Role.ADMIN, password=stored_form(PASSWORD), changed_s=0.0)
+    access = AccessControl(
+        rules, accounts, audit, clock, cost=Cost(log2_rounds=10, block=1, parallel=1)
+    )
+    access._unknown._burst = 10**9  # the attack is to reach the routes, not the brakes
+    user = User(role=UserRole.ADMIN, password=hash_password(PASSWORD), changed_s=0.0)
     accounts.change(lambda held: (held.with_user("ann", user), None))
     tokens = {}
     for role in ROLES[1:]:
@@ -149,7 +149,7 @@ def operations(target):
 
 
 def described(app: FastAPI) -> dict[Any, Any]:
-    """Return what to send to each operation: what fits its description, and what does not."""
+    """Return what to send to each operation: what matches its description, and what does not."""
     schema = schemathesis.openapi.from_dict(app.openapi())
     found = [one.ok() for one in schema.get_all_operations()]
     return {
@@ -159,7 +159,7 @@ def described(app: FastAPI) -> dict[Any, Any]:
 
 
 def attack(target, role, most_examples):
-    """Send what fits the description of every operation, and what does not."""
+    """Send what matches the description of every operation, and what does not."""
     bounds = settings(
         max_examples=most_examples,
         derandomize=True,
@@ -191,9 +191,9 @@ def _path(url):
 def check_rings(role, arrived):
     acts = {event["act"] for event in arrived.pop("operator", [])}
     assert acts <= ALLOWED_ACTS[role]
-    if not role.allows(Role.OPERATOR):
+    if not role.allows(UserRole.OPERATOR):
         assert arrived == {}
-    if role is not Role.ADMIN:
+    if role is not UserRole.ADMIN:
         assert "profile_request" not in arrived
     assert not set(arrived) & {"plan", "motion_command", "motion_result"}
 
@@ -217,8 +217,8 @@ def test_nor_does_ten_minutes_of_it(target, role):
 def test_who_may_operate_reaches_the_robot_by_what_fits(target):
     """The attacks above reach the routes: this is how one that is allowed arrives."""
     target.arrived()
-    target.ask(Role.OPERATOR, "POST", "/api/v1/arm", json={})
-    target.ask(Role.OPERATOR, "POST", "/api/v1/commands", json={"text": "wave"})
+    target.ask(UserRole.OPERATOR, "POST", "/api/v1/arm", json={})
+    target.ask(UserRole.OPERATOR, "POST", "/api/v1/commands", json={"text": "wave"})
     arrived = target.arrived()
     assert [event["act"] for event in arrived["operator"]] == ["arm"]
     assert [event["text"] for event in arrived["utterance"]] == ["wave"]
@@ -248,7 +248,7 @@ def test_bodies_that_are_none_do_nothing(target, kind):
         path = re.sub(r"\{[^}]+\}", "1", operation.path)
         for body in BODIES if kind == "application/json" else BODIES[1:4]:
             sent = {"content": body, "headers": {"content-type": kind} if kind else {}}
-            target.ask(Role.ADMIN, operation.method.upper(), path, **sent)
+            target.ask(UserRole.ADMIN, operation.method.upper(), path, **sent)
     arrived = target.arrived()
     assert not any(event.get("plan") for event in arrived.get("utterance", []))
     assert "profile_request" not in arrived
@@ -268,12 +268,12 @@ def test_no_name_in_a_path_leads_out_of_its_folder(target):
             continue
         for name in NAMES:
             path = re.sub(r"\{[^}]+\}", quote(name, safe=""), operation.path)
-            answer = target.ask(Role.ADMIN, operation.method.upper(), path)
+            answer = target.ask(UserRole.ADMIN, operation.method.upper(), path)
             assert answer.status_code >= 400, path
             assert "set-cookie" not in answer.headers
     for name in NAMES:
         for folder in ("/static/", "/static/vendor/", "/api/v1/", "/"):
-            answer = target.ask(Role.ADMIN, "GET", folder + quote(name, safe=""))
+            answer = target.ask(UserRole.ADMIN, "GET", folder + quote(name, safe=""))
             assert "root:x:" not in answer.text
 
 
@@ -282,9 +282,9 @@ def test_methods_that_no_route_has_are_refused(target):
     for operation in operations(target):
         path = re.sub(r"\{[^}]+\}", "1", operation.path)
         for method in ("PUT", "PATCH", "DELETE", "TRACE", "PROPFIND", "X" * 50):
-            assert target.ask(Role.ADMIN, method, path).status_code in (404, 405)
+            assert target.ask(UserRole.ADMIN, method, path).status_code in (404, 405)
     for method in ("GET", "HEAD", "OPTIONS"):
-        assert target.ask(Role.ADMIN, method, STOP).status_code == 405
+        assert target.ask(UserRole.ADMIN, method, STOP).status_code == 405
     assert target.arrived() == {}
 
 
@@ -308,6 +308,6 @@ def test_no_other_page_moves_the_robot_through_a_browser_that_sits_at_it(target)
 
 
 def test_the_description_itself_tells_no_secret(target):
-    answer = target.ask(Role.ADMIN, "GET", "/api/v1/openapi.json")
+    answer = target.ask(UserRole.ADMIN, "GET", "/api/v1/openapi.json")
     assert answer.status_code == 200
     assert "/api/v1/arm" in answer.json()["paths"]

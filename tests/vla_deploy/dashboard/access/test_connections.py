@@ -1,5 +1,6 @@
 """What uvicorn itself lets through, over real sockets."""
 
+import asyncio
 import contextlib
 import select
 import socket
@@ -13,11 +14,11 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from drivers.clock import MonotonicClock
-from vla_deploy.dashboard.access import Role, connections
+from vla_deploy.dashboard.access import UserRole, connections
 from vla_deploy.dashboard.access.connections import Connections
-from vla_deploy.dashboard.access.peer import Peer, peer_at
-from vla_deploy.dashboard.access.tenure import LOOK_NS
-from vla_deploy.dashboard.serving import Door, serve
+from vla_deploy.dashboard.access.identity import Peer, peer_at
+from vla_deploy.dashboard.access.session_expiry import CHECK_NS
+from vla_deploy.dashboard.serving import HttpSocket, serve
 
 FAR = peer_at("192.168.1.7")
 HEAD_WITHIN_S = 0.3
@@ -79,10 +80,9 @@ def robot(world):
     listener = socket.create_server(("127.0.0.1", 0))
     bounds = Connections(3, 2, HEAD_WITHIN_S)
     ended = threading.Event()
-    door = Door("tcp", listener)
-    thread = threading.Thread(
-        target=serve, args=(made.app, [door], Idle(), MonotonicClock(), ended.is_set, bounds)
-    )
+    sockets = [HttpSocket(listener)]
+    serving = serve(made.app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds)
+    thread = threading.Thread(target=asyncio.run, args=(serving,))
     thread.start()
     yield Robot(listener.getsockname()[1], bounds, made)
     ended.set()
@@ -197,13 +197,13 @@ def test_a_page_of_another_site_gets_no_websocket(robot):
 
 
 def test_a_websocket_ends_with_the_token_that_opened_it(robot):
-    token = robot.world.add_token("eyes", Role.VIEWER)
+    token = robot.world.add_token("eyes", UserRole.VIEWER)
     url = f"ws://127.0.0.1:{robot.port}/api/v1/echo"
     with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as echo:
         echo.send("one")
         assert echo.recv() == "one"
         robot.world.access.accounts.change(lambda held: (held.without_token("eyes"), None))
-        robot.world.clock.pass_s(LOOK_NS / 1e9)
+        robot.world.clock.pass_s(CHECK_NS / 1e9)
         with pytest.raises(ConnectionClosed) as closed:
             echo.send("two")
             echo.recv()

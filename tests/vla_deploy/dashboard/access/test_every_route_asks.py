@@ -3,8 +3,9 @@
 import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 
-from vla_deploy.dashboard.access import Require, Role
-from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
+from vla_deploy.dashboard.access import Require, UserRole
+from vla_deploy.dashboard.access.request import API_PREFIX
+from vla_deploy.dashboard.app import API_ROUTERS, ROOT_ROUTERS
 
 OPEN = {
     "/",
@@ -31,8 +32,8 @@ def roles_of(route):
 def test_a_route_names_the_role_that_it_needs(path, route):
     assert isinstance(route, (APIRoute, APIWebSocketRoute)), f"{path}: nothing asks who comes"
     roles = roles_of(route)
-    assert roles, f"{path}: add Depends(require(Role...))"
-    assert (max(roles, key=list(Role).index) is Role.ANYONE) == (path in OPEN)
+    assert roles, f"{path}: add Depends(require(UserRole...))"
+    assert (max(roles, key=list(UserRole).index) is UserRole.ANYONE) == (path in OPEN)
 
 
 def test_what_changes_something_needs_more_than_a_viewer():
@@ -42,6 +43,6 @@ def test_what_changes_something_needs_more_than_a_viewer():
         if isinstance(route, APIRoute)
         and route.methods - {"GET", "HEAD"}
         and path not in OPEN
-        and not any(role.allows(Role.OPERATOR) for role in roles_of(route))
+        and not any(role.allows(UserRole.OPERATOR) for role in roles_of(route))
     ]
     assert lax == []

@@ -1,7 +1,7 @@
 import pytest
 from starlette.testclient import TestClient
 
-from vla_deploy.dashboard.access import Role
+from vla_deploy.dashboard.access import UserRole
 
 ELSEWHERE = "192.168.1.7"
 PASSWORD = "the robot wears blue socks"
@@ -15,7 +15,7 @@ def log_in(client, user="ann", password=PASSWORD):
 @pytest.fixture
 def made(world):
     made = world()
-    made.add_user("ann", Role.OPERATOR)
+    made.add_user("ann", UserRole.OPERATOR)
     return made
 
 
@@ -46,7 +46,7 @@ def test_the_cookie_is_for_no_script_and_no_other_site(made):
 
 def test_under_https_the_cookie_never_leaves_in_the_clear(world):
     made = world(is_https=True)
-    made.add_user("ann", Role.OPERATOR)
+    made.add_user("ann", UserRole.OPERATOR)
     cookie = log_in(made.client(ELSEWHERE)).headers["set-cookie"]
     assert cookie.startswith("__Host-vla_session=")
     assert "Secure" in cookie
@@ -120,14 +120,14 @@ def test_a_session_ends_some_day_however_it_is_used(made):
 def test_a_new_password_ends_the_sessions_of_the_old_one(made):
     client = made.client(ELSEWHERE)
     log_in(client)
-    made.add_user("ann", Role.OPERATOR, "the robot wears red socks now")
+    made.add_user("ann", UserRole.OPERATOR, "the robot wears red socks now")
     assert client.get(STATE).status_code == 401
 
 
 def test_a_role_that_is_taken_away_is_gone_at_once(made):
     client = made.client(ELSEWHERE)
     csrf = log_in(client).json()["csrf"]
-    user = made.access.accounts.read().users["ann"].model_copy(update={"role": Role.VIEWER})
+    user = made.access.accounts.read().users["ann"].model_copy(update={"role": UserRole.VIEWER})
     made.access.accounts.change(lambda held: (held.with_user("ann", user), None))
     refused = client.post(COMMANDS, json={}, headers={"x-csrf-token": csrf})
     assert (refused.status_code, refused.json()["error"]["code"]) == (403, "role_too_low")
@@ -169,7 +169,7 @@ def bearer(client: TestClient, token: str):
 
 
 def test_a_token_lets_in_with_its_role(made):
-    token = made.add_token("grafana", Role.VIEWER)
+    token = made.add_token("grafana", UserRole.VIEWER)
     client = made.client(ELSEWHERE)
     assert bearer(client, token).json() == {
         "user": "token:grafana", "role": "viewer", "way": "token"
@@ -190,14 +190,14 @@ def test_a_token_lets_in_with_its_role(made):
     ],
 )
 def test_anything_but_the_token_itself_is_refused_also_on_loopback(made, spoil):
-    token = spoil(made.add_token("grafana", Role.VIEWER))
+    token = spoil(made.add_token("grafana", UserRole.VIEWER))
     expected = 200 if token.endswith(" ") else 401
     assert bearer(made.client(ELSEWHERE), token).status_code == expected
     assert bearer(made.client(), token).status_code == expected
 
 
 def test_a_revoked_token_is_refused_from_then_on(made):
-    token = made.add_token("grafana", Role.VIEWER)
+    token = made.add_token("grafana", UserRole.VIEWER)
     client = made.client(ELSEWHERE)
     assert bearer(client, token).status_code == 200
     made.access.accounts.change(lambda held: (held.without_token("grafana"), None))
@@ -205,7 +205,7 @@ def test_a_revoked_token_is_refused_from_then_on(made):
 
 
 def test_a_token_ends_when_it_was_to_end_and_no_clock_revives_it(made):
-    token = made.add_token("grafana", Role.VIEWER, lasts_s=3600)
+    token = made.add_token("grafana", UserRole.VIEWER, lasts_s=3600)
     client = made.client(ELSEWHERE)
     made.wall[0] += 3599
     assert bearer(client, token).status_code == 200
@@ -216,7 +216,7 @@ def test_a_token_ends_when_it_was_to_end_and_no_clock_revives_it(made):
 
 
 def test_neither_file_nor_log_holds_a_password_or_a_token(made):
-    token = made.add_token("grafana", Role.VIEWER)
+    token = made.add_token("grafana", UserRole.VIEWER)
     client = made.client(ELSEWHERE)
     log_in(client)
     log_in(client, PASSWORD, PASSWORD)  # typed into the wrong field

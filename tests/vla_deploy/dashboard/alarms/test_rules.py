@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from vla_deploy.dashboard.alarms.alarm import AlarmSeverity
 from vla_deploy.dashboard.alarms.control_rules import BY_REACTION, LATE_RATIO, UNITS
-from vla_deploy.dashboard.alarms.finding import Severity
 from vla_deploy.dashboard.alarms.process_rules import GIVEN_UP
+from vla_deploy.dashboard.alarms.robot_status import RobotStatus, TopicStatus
 from vla_deploy.dashboard.alarms.rules import find
-from vla_deploy.dashboard.alarms.told import Told, Word
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.safety import Cause, Reaction
 from vla_deploy.supervisor.table import GivingUp
@@ -36,10 +36,10 @@ class Words:
 
     def findings(self):
         words = {
-            topic: Word(age_s=age_s, document=self.documents.get(topic))
+            topic: TopicStatus(age_s=age_s, document=self.documents.get(topic))
             for topic, age_s in self.ages_s.items()
         }
-        return list(find(Told(words=words, late_ratio=self.late_ratio)).values())
+        return list(find(RobotStatus(topics=words, late_ratio=self.late_ratio)).values())
 
     def only(self):
         (finding,) = self.findings()
@@ -56,7 +56,7 @@ def test_an_armed_robot_in_order_has_no_alarm(words):
 
 
 def test_before_anybody_has_told_anything_there_is_none():
-    assert find(Told()) == {}
+    assert find(RobotStatus()) == {}
 
 
 # --- real cases ------------------------------------------------------------------------------
@@ -65,7 +65,7 @@ def test_before_anybody_has_told_anything_there_is_none():
 def test_a_lost_servo_bus_names_cause_bus_and_servos():
     found = {one.field: one for one in Words("lost_bus").findings()}
     cause = found["servo_bus_lost"]
-    assert (cause.process, cause.severity) == ("control", Severity.ERROR)
+    assert (cause.process, cause.severity) == ("control", AlarmSeverity.ERROR)
     assert cause.advice == "check the bus cable and the servo's power"
     lost = found["buses.servos.lost"]
     assert (lost.measured, lost.limit) == (16.0, 0.0)
@@ -107,17 +107,17 @@ def test_a_silent_supervisor_hides_what_its_old_table_says():
     words = Words("planner_killed")
     words.ages_s["process_table"] = 3.1
     silent = words.only()
-    assert (silent.process, silent.severity) == ("supervisor", Severity.CRITICAL)
+    assert (silent.process, silent.severity) == ("supervisor", AlarmSeverity.CRITICAL)
     assert (silent.measured, silent.limit) == (3.1, 3.0)
 
 
 @pytest.mark.parametrize(
     ("process", "severity"),
     [
-        ("control", Severity.CRITICAL),
-        ("executor", Severity.ERROR),
-        ("stop_door", Severity.WARNING),
-        ("some_newer_part", Severity.WARNING),
+        ("control", AlarmSeverity.CRITICAL),
+        ("executor", AlarmSeverity.ERROR),
+        ("stop_door", AlarmSeverity.WARNING),
+        ("some_newer_part", AlarmSeverity.WARNING),
     ],
 )
 def test_who_was_given_up_is_as_grave_as_what_that_means(words, process, severity):
@@ -148,7 +148,7 @@ def test_a_control_that_no_longer_tells_its_joints_is_critical(words):
     words.ages_s["joint_state"] = 0.06
     silent = words.only()
     assert (silent.process, silent.field, silent.limit) == ("control", "joint_state", 0.05)
-    assert silent.severity is Severity.CRITICAL
+    assert silent.severity is AlarmSeverity.CRITICAL
 
 
 def test_whoever_is_told_to_work_slowly_has_more_time(words):
@@ -175,7 +175,7 @@ def test_a_sensor_that_is_away_is_one_alarm_that_says_why(words):
     words.ages_s["scan"] = 2.9
     words.documents["scene"]["away"] = {"lidar": "/dev/lidar does not exist"}
     away = words.only()
-    assert (away.field, away.subject, away.severity) == ("away", "lidar", Severity.ERROR)
+    assert (away.field, away.subject, away.severity) == ("away", "lidar", AlarmSeverity.ERROR)
     assert away.text == "the lidar gives nothing: /dev/lidar does not exist"
 
 
@@ -211,7 +211,7 @@ def test_a_control_that_ticks_late_or_unjudged_is_told(words):
     assert (words.only().measured, words.only().unit) == (0.25, "of all ticks")
     words.late_ratio = None
     words.documents["control_status"]["judged_tick"] -= 3
-    assert (words.only().severity, words.only().measured) == (Severity.CRITICAL, 3.0)
+    assert (words.only().severity, words.only().measured) == (AlarmSeverity.CRITICAL, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -302,7 +302,7 @@ def test_a_lost_place_on_the_map_says_why(words):
     words.ages_s["pose"] = 0.02
     words.documents["pose"] = {"state": "lost", "doubt": "poor_match", "match_ratio": 0.2}
     lost = words.only()
-    assert (lost.severity, lost.measured) == (Severity.ERROR, 0.2)
+    assert (lost.severity, lost.measured) == (AlarmSeverity.ERROR, 0.2)
     assert lost.text.endswith("lost its place on the map: what the lidar sees does not fit the map")
 
 

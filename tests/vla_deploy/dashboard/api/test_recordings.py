@@ -1,31 +1,73 @@
-"""Recordings are begun and ended by request, listed and handed out by name alone."""
+"""Flights and recordings are served by name alone; recorder and replay take requests."""
 
 import pytest
 
+from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.telemetry.recording.folder import recordings_dir_of
 
-NAME = "000003-20261122T221500Z-kitchen.mcap"
+FLIGHT = "000007-estop.mcap"
+RECORDING = "000003-20261122T221500Z-kitchen.mcap"
 
 
-@pytest.fixture
-def folder(dashboard):
-    path = recordings_dir_of(dashboard.base)
-    path.mkdir(parents=True)
-    (path / NAME).write_bytes(b"recording")
-    (path.parent / "secret").write_text("secret")
-    (path / ".000004-now.mcap.part").write_bytes(b"half")
-    return path
+@pytest.fixture(autouse=True)
+def folders(dashboard):
+    found = {
+        "flights": state_dir_of(dashboard.base) / "flights",
+        "recordings": recordings_dir_of(dashboard.base),
+    }
+    for folder in found.values():
+        folder.mkdir(parents=True)
+        (folder.parent / "secret").write_text("secret")
+        (folder / "000008-link.mcap").symlink_to(folder.parent / "secret")
+        (folder / ".000009-half.mcap.part").write_bytes(b"half")
+    (found["flights"] / FLIGHT).write_bytes(b"flight")
+    (found["recordings"] / RECORDING).write_bytes(b"recording")
+    return found
 
 
-def test_a_recording_is_listed_and_comes_whole(dashboard, folder):
-    (one,) = dashboard.get("recordings")
-    assert (one["name"], one["bytes"]) == (NAME, 9)
-    assert dashboard.client.get(f"/api/v1/recordings/{NAME}").content == b"recording"
+@pytest.mark.parametrize(
+    ("kind", "name", "content"),
+    [("flights", FLIGHT, b"flight"), ("recordings", RECORDING, b"recording")],
+)
+def test_a_file_is_listed_and_comes_whole(dashboard, kind, name, content):
+    (listed,) = [one for one in dashboard.get(kind) if one["name"] == name]
+    assert listed["bytes"] == len(content)
+    answer = dashboard.client.get(f"/api/v1/{kind}/{name}")
+    assert answer.content == content
+    assert answer.headers["content-disposition"] == f'attachment; filename="{name}"'
 
 
-@pytest.mark.parametrize("name", ["..%2fsecret", "/etc/passwd", ".000004-now.mcap.part", "latest"])
-def test_no_name_leads_anywhere_else(dashboard, folder, name):
-    assert dashboard.client.get(f"/api/v1/recordings/{name}").status_code == 404
+def test_a_flight_that_goes_while_it_is_listed_is_left_out(dashboard, folders):
+    (folders["flights"] / "000010-gone.mcap").symlink_to(folders["flights"] / "nothing")
+    names = [one["name"] for one in dashboard.get("flights")]
+    assert FLIGHT in names
+    assert "000010-gone.mcap" not in names
+
+
+@pytest.mark.parametrize("kind", ["flights", "recordings"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../secret",
+        "..%2fsecret",
+        "%2e%2e%2fsecret",
+        "..%252fsecret",
+        "%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd",
+        "/etc/passwd",
+        "%2fetc%2fpasswd",
+        "000008-link.mcap",
+        ".000009-half.mcap.part",
+        "latest",
+        "7",
+        "%00",
+        "000007-estop.mcap%00.txt",
+        "..\\secret",
+    ],
+)
+def test_no_name_leads_anywhere_else(dashboard, kind, name):
+    answer = dashboard.client.get(f"/api/v1/{kind}/{name}")
+    assert answer.status_code == 404
+    assert b"root:" not in answer.content
 
 
 def test_a_start_reaches_the_recorder_as_it_was_asked_for(dashboard):
@@ -67,3 +109,45 @@ def test_the_status_is_the_recorders_own(dashboard):
     assert dashboard.get("recordings/status") == {"state": "silent"}
     dashboard.robot.shows("recording_status", state="off", refused="", last={})
     assert dashboard.get("recordings/status")["state"] == "off"
+
+
+ACTS = [
+    {"act": "pause", "value": 0.0},
+    {"act": "resume", "value": 0.0},
+    {"act": "seek", "value": 12.5},
+    {"act": "speed", "value": 4.0},
+]
+
+
+@pytest.fixture
+def shown(dashboard):
+    dashboard.robot.shows("replay_status", file="run.mcap", state="playing")
+    return dashboard
+
+
+@pytest.mark.parametrize("act", ACTS)
+def test_what_is_asked_reaches_the_replay(shown, act):
+    assert shown.post("replay", 200, act) == {"asked": True}
+    assert shown.robot.hears("replay_request") == [act]
+
+
+def test_beside_a_robot_it_is_refused_and_reaches_nobody(dashboard):
+    error = dashboard.post("replay", 409, {"act": "pause"})["error"]
+    assert error["code"] == "no_replay"
+    assert dashboard.robot.hears("replay_request") == []
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        {"act": "arm"},
+        {"act": "seek", "value": -1},
+        {"act": "seek", "value": 1e300},
+        {"act": "speed", "value": "fast"},
+        {"act": "pause", "file": "/etc/passwd"},
+        {},
+    ],
+)
+def test_anything_else_is_refused_by_its_form(shown, act):
+    shown.post("replay", 422, act)
+    assert shown.robot.hears("replay_request") == []

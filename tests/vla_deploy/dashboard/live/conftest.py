@@ -12,9 +12,11 @@ from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.access import Role, require
-from vla_deploy.dashboard.live import LiveHub, Message, Moment, endpoint, json_message
-from vla_deploy.dashboard.live.wire import LiveProtocol
+from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.dashboard.live import endpoint
+from vla_deploy.dashboard.live.endpoint import LiveProtocol
+from vla_deploy.dashboard.live.hub import LiveHub
+from vla_deploy.dashboard.live.message import LiveMessage, LookTime, json_message
 from vla_deploy.ipc import SharedSpace
 
 WALL_NS = 1_800_000_000 * NS_PER_S
@@ -34,7 +36,7 @@ class Script:
         if self._queued:
             self.waiting.clear()
 
-    def look(self, now: Moment) -> Sequence[Message]:
+    def look(self, now: LookTime) -> Sequence[LiveMessage]:
         self.looks += 1
         waiting, self.waiting = self.waiting, []
         return [
@@ -94,17 +96,15 @@ def serve() -> Any:
     """Serve a hub at a port of this computer, as the process does."""
 
     @contextlib.asynccontextmanager
-    async def serving(
-        hub: LiveHub, protocol: Any = LiveProtocol, prepare: Any = None
-    ) -> AsyncIterator[Served]:
+    async def serving(hub: LiveHub, prepare: Any = None) -> AsyncIterator[Served]:
         app = FastAPI()
         app.state.live = hub
         app.include_router(endpoint.router)
-        app.dependency_overrides[require(Role.VIEWER)] = lambda: None
+        app.dependency_overrides[require(UserRole.VIEWER)] = lambda: None
         if prepare is not None:
             prepare(app)
         config = uvicorn.Config(
-            app, log_config=None, lifespan="off", ws=protocol, ws_per_message_deflate=False
+            app, log_config=None, lifespan="off", ws=LiveProtocol, ws_per_message_deflate=False
         )
         server = uvicorn.Server(config)
         with socket.create_server(("127.0.0.1", 0)) as listener:

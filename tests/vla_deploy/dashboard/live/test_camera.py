@@ -11,9 +11,9 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.dashboard.live.camera import CameraFeed
-from vla_deploy.dashboard.live.detections import Detections
-from vla_deploy.dashboard.live.message import Message, Moment
+from tests.vla_deploy.dashboard.conftest import payload_of
+from vla_deploy.dashboard.live.camera import CameraFeed, Detections
+from vla_deploy.dashboard.live.message import LiveMessage, LookTime
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
@@ -77,8 +77,8 @@ class Rig:
         pixels = np.full(width * height * 5, shade, np.uint8)
         self.frames.put(pixels.tobytes(), width=width, height=height, stamp_ns=self.clock.ns)
 
-    def look(self) -> list[Message]:
-        return list(self.feed.look(Moment(run_ns=self.clock.ns, wall_ns=self.clock.ns)))
+    def look(self) -> list[LiveMessage]:
+        return list(self.feed.look(LookTime(run_ns=self.clock.ns, wall_ns=self.clock.ns)))
 
 
 @pytest.fixture
@@ -87,8 +87,8 @@ def rig(space: SharedSpace, clock: ManualClock) -> Rig:
     return Rig(space, clock)
 
 
-def opened(message: Message) -> tuple[dict[str, Any], Any]:
-    whole = message.content
+def opened(message: LiveMessage) -> tuple[dict[str, Any], Any]:
+    whole = payload_of(message)
     assert isinstance(whole, bytes)
     kind, length = struct.unpack_from("<BI", whole)
     assert kind == 1
@@ -165,5 +165,5 @@ def test_without_scene_or_pose_a_picture_comes_without_boxes(
     feed = CameraFeed(space, Detections(space, ROBOT, read_tree(ROBOT.mjcf_path)))
     pixels = bytes(WIDE * HIGH * 5)
     space.frame_writer("rgbd").put(pixels, width=WIDE, height=HIGH, stamp_ns=clock.ns)
-    (message,) = feed.look(Moment(run_ns=0, wall_ns=0))
+    (message,) = feed.look(LookTime(run_ns=0, wall_ns=0))
     assert opened(message)[0]["detections"] == []

@@ -1,0 +1,1 @@
+"""Keep accounts, tokens and audit log: the dashboard uses them, the command line edits them."""
