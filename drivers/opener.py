@@ -8,7 +8,7 @@ from typing import Protocol
 import can
 
 from drivers.base import ByteTransport
-from drivers.can_interface import open_can_bus
+from drivers.can.interface import open_can_bus
 from drivers.clock import Clock
 from drivers.errors import DeviceMissing
 from drivers.estop.gpio_button import Contact

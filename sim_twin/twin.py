@@ -2,7 +2,7 @@
 
 from typing import TypeVar
 
-from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
 from sim_twin.can import CanWire, robot_drives

@@ -6,8 +6,8 @@ The patterns and commands are those of CiA 402-2 (IEC 61800-7-201), state contro
 from enum import IntEnum
 from typing import Final
 
-from drivers.drive_bus import DriveGoal as DriveGoal
-from drivers.drive_bus import PowerState as PowerState
+from drivers.wheel_drives.bus import DriveGoal as DriveGoal
+from drivers.wheel_drives.bus import PowerState as PowerState
 
 
 class ControlCommand(IntEnum):

@@ -35,8 +35,8 @@ from drivers.canopen.parameters import DriveParameters, Expected
 from drivers.canopen.sdo import Writing
 from drivers.canopen.spec import DriveSpec
 from drivers.clock import Clock
-from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceFault, NoReply, ProtocolError, WrongDevice
+from drivers.wheel_drives.bus import ResetRule
 
 SLOW_DOWN_THEN_DISABLE: Final = 2
 HEARTBEATS_PER_LIMIT: Final = 4

@@ -14,8 +14,8 @@ from drivers.canopen.objects import (
 )
 from drivers.canopen.spec import DriveSpec
 from drivers.clock import NS_PER_S
-from drivers.drive_bus import PowerState, ResetRule
 from drivers.errors import ProtocolError
+from drivers.wheel_drives.bus import PowerState, ResetRule
 
 _STATUS: Final = 0b01
 _POSITION: Final = 0b10

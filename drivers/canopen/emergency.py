@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from drivers.canopen.error_codes import code_text, reset_rule
 from drivers.canopen.objects import EMERGENCY_WIRE
-from drivers.drive_bus import ResetRule
 from drivers.errors import ProtocolError
+from drivers.wheel_drives.bus import ResetRule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

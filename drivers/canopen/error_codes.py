@@ -5,7 +5,7 @@ A code that is not listed itself is what its group is: its first two digits, or 
 
 from typing import Final
 
-from drivers.drive_bus import ResetRule
+from drivers.wheel_drives.bus import ResetRule
 
 CODE_TEXTS: Final[dict[int, str]] = {
     0x0000: "error reset",

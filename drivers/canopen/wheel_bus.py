@@ -23,10 +23,10 @@ from drivers.canopen.objects import (
 )
 from drivers.canopen.spec import HOST_NODE_ID, DriveSpec
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveGoal, ResetRule
-from drivers.drive_cycle import DriveCycle
 from drivers.errors import NoReply
 from drivers.stepping import listening, side_by_side, until
+from drivers.wheel_drives.bus import DriveGoal, ResetRule
+from drivers.wheel_drives.cycle import DriveCycle
 
 BOOT_TIMEOUT_NS: Final = 5 * NS_PER_S // 2
 ANSWER_TIMEOUT_NS: Final = 300_000_000

@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.cycle import ServoCycle
 from drivers.dynamixel.fault_policy import FaultPolicy
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.layout import BlockLayout
-from drivers.dynamixel.link import PacketLink
-from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
+from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
+from drivers.dynamixel.tables.layout import BlockLayout
+from drivers.dynamixel.tables.registers import Registers
 from drivers.dynamixel.torque import disable_torque, enable_torque, write_kept
 from drivers.dynamixel.watchdog import (
     WatchdogEvent,
@@ -26,6 +25,7 @@ from drivers.dynamixel.watchdog import (
     WatchdogState,
     watchdog_units,
 )
+from drivers.dynamixel.wire.link import PacketLink
 from drivers.errors import DriverError
 
 

@@ -5,21 +5,21 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.goals import GoalWriter
 from drivers.dynamixel.group import ServoRead
 from drivers.dynamixel.handshake import ServoSetup
 from drivers.dynamixel.health import HealthPoll
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.layout import DIRECT
-from drivers.dynamixel.link import ReplyPatience
 from drivers.dynamixel.reader import StateReader
-from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.settings import bring_back
 from drivers.dynamixel.state import BusState
+from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
+from drivers.dynamixel.tables.layout import DIRECT
+from drivers.dynamixel.tables.registers import Registers
+from drivers.dynamixel.tables.settings import bring_back
 from drivers.dynamixel.watchdog import WatchdogEvent, WatchdogGuard, WatchdogState
+from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import LinkLost
 
 _GAP_WARNING_RATIO: Final = 0.8

@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.codec import StatusError
+from drivers.dynamixel.wire.codec import StatusError
 from drivers.errors import DeviceFault, DriverError, NoReply, ProtocolError, WrongDevice
 
 

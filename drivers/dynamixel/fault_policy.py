@@ -10,7 +10,7 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.control_table import HardwareError
+from drivers.dynamixel.tables.control_table import HardwareError
 
 
 class FaultAction(IntEnum):

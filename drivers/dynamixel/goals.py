@@ -7,7 +7,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.handshake import ServoSetup
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import PWM_FULL
+from drivers.dynamixel.tables.registers import Registers
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     HEADER,
     STUFFED_PATTERN,
@@ -15,11 +19,7 @@ from drivers.dynamixel.codec import (
     crc16,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import PWM_FULL
-from drivers.dynamixel.handshake import ServoSetup
-from drivers.dynamixel.link import PacketLink, ReplyPatience
-from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
 from drivers.errors import DriverError, LinkLost
 
 _GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])

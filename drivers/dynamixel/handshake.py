@@ -3,18 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.dynamixel.baud_search import where_they_answer
-from drivers.dynamixel.control_table import (
+from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import (
     MODELS_BY_NUMBER,
     WATCHDOG_TRIPPED,
     OperatingMode,
     StatusReturnLevel,
 )
-from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
-from drivers.dynamixel.layout import Block, BlockLayout, block_of
-from drivers.dynamixel.registers import Registers, decode
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.settings import IMAGE_BYTES, differences, write_differences, write_map
+from drivers.dynamixel.tables.layout import Block, BlockLayout, block_of
+from drivers.dynamixel.tables.registers import Registers, decode
+from drivers.dynamixel.tables.settings import IMAGE_BYTES, differences, write_differences, write_map
+from drivers.dynamixel.wire.baud_search import where_they_answer
 from drivers.errors import NoReply
 
 _EXTENDED_RANGE = (-1_048_575, 1_048_575)

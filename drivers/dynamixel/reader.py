@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.completion import complete
 from drivers.dynamixel.group import Group, News, ServoRead
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.link import PacketLink
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.state import BusState
+from drivers.dynamixel.wire.completion import complete
+from drivers.dynamixel.wire.link import PacketLink
 
 _NEVER_NS: Final = -1
 

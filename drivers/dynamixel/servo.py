@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from drivers.dynamixel.codec import MAX_SERVO_ID
-from drivers.dynamixel.control_table import (
+from drivers.dynamixel.tables.control_table import (
     CENTRE_PULSE,
     MODELS,
     PULSE_RAD,
     OperatingMode,
     ServoDatasheet,
 )
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import HardwareError
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import HardwareError
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -8,12 +8,12 @@ read or write, being a broadcast, feeds the Bus Watchdog of every servo meanwhil
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.errors import NotKept, ServoFault, ServoSilent, WatchdogTripped
-from drivers.dynamixel.link import ReplyPatience
-from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import hardware_error_text
+from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
+from drivers.dynamixel.tables.registers import Registers, decode
+from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import DriverError, LinkLost
 
 _ATTEMPTS: Final = 3

@@ -7,7 +7,7 @@ from math import ceil
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.control_table import WATCHDOG_MAX, WATCHDOG_UNIT_S
+from drivers.dynamixel.tables.control_table import WATCHDOG_MAX, WATCHDOG_UNIT_S
 
 
 class WatchdogState(Enum):

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveGoal, DriveState, PowerState, ResetRule
-from drivers.drive_cycle import STILL_RAD_S, DriveCycle
 from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.axis_setup import FEEDBACK_MS, LACKS, AxisSetup
 from drivers.odrive.codec import AxisState, OdriveCommand, split_id
 from drivers.odrive.endpoints import ENCODER_RATE, EndpointTable, read_endpoints
 from drivers.odrive.spec import AxisSpec
 from drivers.stepping import listening, side_by_side
+from drivers.wheel_drives.bus import DriveGoal, DriveState, PowerState, ResetRule
+from drivers.wheel_drives.cycle import STILL_RAD_S, DriveCycle
 
 STATE_REQUEST_NS: Final = 50_000_000
 POLL_NS: Final = 25_000_000

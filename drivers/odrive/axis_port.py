@@ -5,11 +5,11 @@ from collections.abc import Callable
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.drive_bus import PowerState
 from drivers.errors import ProtocolError
 from drivers.odrive.codec import AxisState, OdriveCommand, decode
 from drivers.odrive.faults import AxisFault
 from drivers.odrive.spec import AxisSpec
+from drivers.wheel_drives.bus import PowerState
 
 HEARTBEAT_LIMIT_NS: Final = 350_000_000  # three of the axis' heartbeats at their default rate
 _POWER_STATES: Final = {

@@ -5,7 +5,6 @@ from collections.abc import Callable, Generator, Iterator
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceFault, NoReply, WrongDevice
 from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.codec import (
@@ -28,6 +27,7 @@ from drivers.odrive.endpoints import (
     EndpointTable,
 )
 from drivers.stepping import until
+from drivers.wheel_drives.bus import ResetRule
 
 HEARTBEAT_TIMEOUT_NS: Final = 3 * NS_PER_S // 2
 ANSWER_TIMEOUT_NS: Final = 100_000_000

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.drive_bus import ResetRule
 from drivers.odrive.codec import AxisError
+from drivers.wheel_drives.bus import ResetRule
 
 AUTOMATIC_ERRORS: Final = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
 REPAIR_ERRORS: Final = (

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from drivers.drive_bus import DriveBus, DriveState
+from drivers.wheel_drives.bus import DriveBus, DriveState
 from sim_twin.contracts.bench import Bench
 
 TICK_S: Final = 0.01

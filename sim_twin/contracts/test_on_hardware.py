@@ -9,8 +9,8 @@ import pytest
 
 from drivers import registry
 from drivers.clock import Clock
-from drivers.drive_bus import DriveBus
 from drivers.dynamixel import DynamixelBus
+from drivers.wheel_drives.bus import DriveBus
 from sim_twin.contracts.bench import HardwareBench
 from sim_twin.contracts.camera import RgbdCameraContract
 from sim_twin.contracts.drive_bus import DriveBusContract, DrivePowerContract

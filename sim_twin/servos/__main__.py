@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from drivers.dynamixel.codec import MAX_SERVO_ID
-from drivers.dynamixel.control_table import BAUD_RATES, MODELS
+from drivers.dynamixel.tables.control_table import BAUD_RATES, MODELS
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from sim_twin.priority import claim_priority
 from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.server import FreeServos, make_specs, serve

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.tables.control_table import MODELS
 from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.firmware.rotor import FreeRotors

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.tables.control_table import MODELS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,9 @@ from typing import Any
 import can
 import pytest
 
-from drivers.can_errors import describe
-from drivers.can_serial import parse_line
-from drivers.can_words import describe_canopen, describe_odrive
+from drivers.can.errors import describe
+from drivers.can.slcan import parse_line
+from drivers.can.words import describe_canopen, describe_odrive
 from drivers.canopen import DriveSpec
 from drivers.canopen.drive_port import DrivePort
 from drivers.canopen.emergency import decode_emergency

@@ -5,8 +5,8 @@ from pathlib import Path
 import can
 import pytest
 
+from drivers.can.interface import open_can_bus
 from drivers.can_hub import HubBus
-from drivers.can_interface import open_can_bus
 from drivers.errors import DeviceMissing
 from sim_twin.can import CanHub, CanWire
 

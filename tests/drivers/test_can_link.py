@@ -6,8 +6,8 @@ import can
 import numpy as np
 import pytest
 
-from drivers.can_errors import BusOff, ControllerState, describe
-from drivers.can_link import CanLink
+from drivers.can.errors import BusOff, ControllerState, describe
+from drivers.can.link import CanLink
 from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive

@@ -3,7 +3,7 @@
 import can
 import pytest
 
-from drivers.can_words import Words, describe_canopen, describe_odrive
+from drivers.can.words import Words, describe_canopen, describe_odrive
 from drivers.odrive.codec import AxisState, OdriveCommand, can_id, encode
 
 

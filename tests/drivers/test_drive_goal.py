@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.drive_bus import DriveGoal
-from drivers.drive_goal import BRAKE_TIMEOUT_NS, FAULT_RESET_NS, DrivesSeen, GoalKeeper
+from drivers.wheel_drives.bus import DriveGoal
+from drivers.wheel_drives.goal import BRAKE_TIMEOUT_NS, FAULT_RESET_NS, DrivesSeen, GoalKeeper
 
 WELL = DrivesSeen(all_enabled=True, any_lost=False, any_faulted=False, any_braking=False)
 OFF = replace(WELL, all_enabled=False)

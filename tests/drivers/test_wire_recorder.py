@@ -8,14 +8,14 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing, LinkLost, ProtocolError
-from drivers.recording_opener import RecordingOpener, recorded_if_asked
-from drivers.wire_recorder import (
+from drivers.recording.opener import RecordingOpener, recorded_if_asked
+from drivers.recording.recorder import (
     MIN_MAX_BYTES,
     RecordingCanBus,
     RecordingTransport,
     WireRecorder,
 )
-from drivers.wire_recording import (
+from drivers.recording.recording import (
     HEAD,
     MAGIC,
     MAX_PAYLOAD_BYTES,
@@ -245,7 +245,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_wire(
     def full(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("drivers.wire_recorder.os.write", full)
+    monkeypatch.setattr("drivers.recording.recorder.os.write", full)
     for _ in range(3):
         wire.write(b"ab")
     assert wire.read(6, 0) == b"bababa"

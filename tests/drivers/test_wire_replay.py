@@ -7,9 +7,9 @@ import pytest
 from drivers.clock import NS_PER_S
 from drivers.dynamixel import DynamixelBus, ServoSpec
 from drivers.errors import LinkLost
-from drivers.wire_recorder import RecordingTransport, WireRecorder
-from drivers.wire_recording import RecordKind, WireRecord, read_recording
-from drivers.wire_replay import ReplayDiverged, WireReplay
+from drivers.recording.recorder import RecordingTransport, WireRecorder
+from drivers.recording.recording import RecordKind, WireRecord, read_recording
+from drivers.recording.replay import ReplayDiverged, WireReplay
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos

@@ -7,8 +7,8 @@ import pytest
 
 from drivers.base import ByteTransport
 from drivers.camera.rgbd_stream import RgbdCamera
-from drivers.dynamixel.codec import Instruction, encode_instruction
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.tables.control_table import MODELS
+from drivers.dynamixel.wire.codec import Instruction, encode_instruction
 from drivers.errors import DeviceMissing
 from sim_twin.harness.lockstep import Lockstep, MemoryOpener
 from sim_twin.servos import WireTiming

@@ -17,7 +17,7 @@ from drivers.audio.base import AudioFormat
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.clock import MonotonicClock
-from drivers.dynamixel.codec import Instruction, encode_instruction
+from drivers.dynamixel.wire.codec import Instruction, encode_instruction
 from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
 from sim_twin.errors import RefereeRefusal, TwinUnreachable

@@ -5,7 +5,7 @@ import sys
 from typing import Final
 
 from drivers.opener import PathOpener
-from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
+from drivers.recording.opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot

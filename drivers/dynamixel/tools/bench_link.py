@@ -6,20 +6,20 @@ from typing import Final
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.counters import BusCounters
+from drivers.dynamixel.errors import ServoSilent, WrongServo
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import MODELS_BY_NUMBER, ServoDatasheet
+from drivers.dynamixel.tables.registers import Registers
+from drivers.dynamixel.wire.codec import (
     MAX_SERVO_ID,
     Instruction,
     Packet,
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import MODELS_BY_NUMBER, ServoDatasheet
-from drivers.dynamixel.counters import BusCounters
-from drivers.dynamixel.errors import ServoSilent, WrongServo
-from drivers.dynamixel.link import PacketLink, ReplyPatience
-from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
+from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
+from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
 
 PING_ANSWER_BYTES: Final = 3
 ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.registers import Registers
 from drivers.dynamixel.tools.bench_link import THREE_TRIES
 from drivers.dynamixel.tools.travel import (
     JointRange,

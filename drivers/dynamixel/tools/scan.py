@@ -8,10 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.dynamixel.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
 from drivers.dynamixel.errors import CorruptReply, ServoSilent
-from drivers.dynamixel.link import ReplyPatience
-from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.dynamixel.tools.bench_link import (
     ONE_TRY,
     PING_ANSWER_BYTES,
@@ -19,6 +16,9 @@ from drivers.dynamixel.tools.bench_link import (
     BenchLink,
     FoundServo,
 )
+from drivers.dynamixel.wire.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
+from drivers.dynamixel.wire.link import ReplyPatience
+from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.errors import NoReply, ProtocolError
 
 ALL_IDS: Final = range(MAX_SERVO_ID + 1)

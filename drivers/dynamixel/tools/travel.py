@@ -11,7 +11,7 @@ from math import degrees, pi
 from statistics import median_low
 from typing import Final
 
-from drivers.dynamixel.control_table import CENTRE_PULSE, PULSE_RAD, PULSES_PER_REV
+from drivers.dynamixel.tables.control_table import CENTRE_PULSE, PULSE_RAD, PULSES_PER_REV
 
 STILL_PULSES: Final = 6
 """Spread of a held joint: half a degree."""

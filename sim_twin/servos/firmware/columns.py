@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from drivers.dynamixel.control_table import MODELS, Register
+from drivers.dynamixel.tables.control_table import MODELS, Register
 from sim_twin.servos.protocol.register_file import RegisterFile
 
 IntColumn = NDArray[np.int32]

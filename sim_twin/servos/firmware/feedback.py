@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.control_table import VOLTAGE_UNIT_V, OperatingMode
+from drivers.dynamixel.tables.control_table import VOLTAGE_UNIT_V, OperatingMode
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.motion import ServoMotion
 from sim_twin.servos.firmware.profile import PULSES_S_PER_UNIT, Floats

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.control_table import (
+from drivers.dynamixel.tables.control_table import (
     Register,
     StatusReturnLevel,
 )

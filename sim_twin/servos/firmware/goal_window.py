@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import OperatingMode
+from drivers.dynamixel.tables.control_table import OperatingMode
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.profile import TIME_BASED
 

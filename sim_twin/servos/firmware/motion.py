@@ -13,13 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.model import (
+from drivers.dynamixel.tables.model import (
     PULSE_RAD,
     PULSES_PER_REV,
     PWM_FULL,
     OperatingMode,
 )
-from drivers.dynamixel.models import X330_CURRENT_UNIT_A
+from drivers.dynamixel.tables.models import X330_CURRENT_UNIT_A
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.coupling import Coupling
 from sim_twin.servos.firmware.profile import (

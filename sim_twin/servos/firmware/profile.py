@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import PULSES_PER_REV
+from drivers.dynamixel.tables.control_table import PULSES_PER_REV
 from sim_twin.servos.firmware.columns import TableColumns
 
 PULSES_S_PER_UNIT: Final = 0.229 * PULSES_PER_REV / 60

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.dynamixel.model import ServoDatasheet
+from drivers.dynamixel.tables.model import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
 
 

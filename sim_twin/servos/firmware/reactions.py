@@ -11,7 +11,7 @@
 from collections.abc import Callable
 from typing import Final
 
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED, OperatingMode
+from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED, OperatingMode
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.motion import ServoMotion
 from sim_twin.servos.firmware.watchdog import BusWatchdog

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.dynamixel.control_table import ServoDatasheet
+from drivers.dynamixel.tables.control_table import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
 
 

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from drivers.dynamixel.model import ServoDatasheet
+from drivers.dynamixel.tables.model import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
 
 SPECIFIC_HEAT_J_G_K: Final = 0.8

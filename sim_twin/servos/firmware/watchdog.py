@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.control_table import WATCHDOG_UNIT_S
+from drivers.dynamixel.tables.control_table import WATCHDOG_UNIT_S
 from sim_twin.servos.firmware.columns import TableColumns
 
 _UNIT_NS: Final = round(WATCHDOG_UNIT_S * NS_PER_S)

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from drivers.dynamixel.codec import MAX_SERVO_ID
-from drivers.dynamixel.control_table import BAUD_RATES, StatusReturnLevel
+from drivers.dynamixel.tables.control_table import BAUD_RATES, StatusReturnLevel
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from sim_twin.servos.firmware.firmware import Firmware
 from sim_twin.servos.spec import FirmwareOptions
 

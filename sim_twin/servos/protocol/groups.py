@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     ALERT,
     MAX_LENGTH,
     Instruction,

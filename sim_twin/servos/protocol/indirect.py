@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import Register
-from drivers.dynamixel.model import IndirectBank
+from drivers.dynamixel.tables.control_table import Register
+from drivers.dynamixel.tables.model import IndirectBank
 
 ADDRESS_PREFIX: Final = "indirect_address_"
 _LOWEST_TARGET: Final = 64

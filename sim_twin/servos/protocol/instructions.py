@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     HEADER,
     MAX_LENGTH,

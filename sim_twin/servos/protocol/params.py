@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from drivers.dynamixel.codec import Instruction, StatusError
+from drivers.dynamixel.wire.codec import Instruction, StatusError
 from sim_twin.servos.protocol.registers import AccessRefused
 
 _RANGE: Final = struct.Struct("<HH")

@@ -10,8 +10,8 @@ import struct
 from collections.abc import Callable
 from typing import Final
 
-from drivers.dynamixel.codec import ALERT, BROADCAST_ID, Instruction, Packet, StatusError
-from drivers.dynamixel.control_table import Register, StatusReturnLevel
+from drivers.dynamixel.tables.control_table import Register, StatusReturnLevel
+from drivers.dynamixel.wire.codec import ALERT, BROADCAST_ID, Instruction, Packet, StatusError
 from sim_twin.servos.firmware.firmware import Firmware
 from sim_twin.servos.protocol.audience import Audience
 from sim_twin.servos.protocol.groups import FAST_READS, GroupAccess

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
 
-from drivers.dynamixel.codec import StatusError
-from drivers.dynamixel.control_table import MODELS, OperatingMode, Register, ServoDatasheet
+from drivers.dynamixel.tables.control_table import MODELS, OperatingMode, Register, ServoDatasheet
+from drivers.dynamixel.wire.codec import StatusError
 from sim_twin.servos.protocol.indirect import ADDRESS_PREFIX, indirect_registers
 from sim_twin.servos.spec import EmulatedServoSpec
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from drivers.dynamixel.codec import ALERT, encode_status
-from drivers.dynamixel.control_table import Register
+from drivers.dynamixel.tables.control_table import Register
+from drivers.dynamixel.wire.codec import ALERT, encode_status
 from sim_twin.servos.firmware.firmware import Firmware
 from sim_twin.servos.protocol.registers import SENSED, AccessRefused
 from sim_twin.servos.protocol.timing import Reply

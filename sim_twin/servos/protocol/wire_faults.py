@@ -9,7 +9,7 @@ from random import Random
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.codec import MAX_SERVO_ID
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 
 _MAX_NOISE_BYTES: Final = 6
 

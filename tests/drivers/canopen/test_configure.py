@@ -18,8 +18,8 @@ from drivers.canopen.objects import (
     SUPPORTED_MODES,
     TPDO2,
 )
-from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceMissing, WrongDevice
+from drivers.wheel_drives.bus import ResetRule
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 

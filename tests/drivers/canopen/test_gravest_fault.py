@@ -7,8 +7,8 @@ import pytest
 from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.canopen.drive_port import DrivePort
 from drivers.canopen.objects import EMERGENCY_WIRE
-from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceFault
+from drivers.wheel_drives.bus import ResetRule
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 

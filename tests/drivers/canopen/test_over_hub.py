@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.can_interface import open_can_bus
+from drivers.can.interface import open_can_bus
 from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.clock import MonotonicClock
-from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
+from drivers.wheel_drives.bus import DriveState
 
 pytestmark = pytest.mark.stack
 

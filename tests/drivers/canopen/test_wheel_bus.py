@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.canopen.objects import HEARTBEAT_PRODUCER, RPDO1
 from drivers.canopen.wheel_bus import HOST_NODE_ID
-from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
+from drivers.wheel_drives.bus import DriveState
 from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 

@@ -8,8 +8,8 @@ import pytest
 
 from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.canopen.objects import HEARTBEAT_COB, RPDO1, TPDO1, TPDO2
-from drivers.drive_bus import PowerState
 from drivers.errors import NoReply
+from drivers.wheel_drives.bus import PowerState
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 

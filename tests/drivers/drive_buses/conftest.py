@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drivers.canopen import DriveSpec, WheelDriveBus
-from drivers.drive_bus import DriveBus, DriveState
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.odrive.codec import AxisError
+from drivers.wheel_drives.bus import DriveBus, DriveState
 from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive.axis import ODriveAxis

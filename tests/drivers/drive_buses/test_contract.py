@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.drive_bus import PowerState, ResetRule
 from drivers.errors import DeviceFault, NoReply
+from drivers.wheel_drives.bus import PowerState, ResetRule
 
 FORWARD = (5.0, 5.0)
 STOP_S = 1.0

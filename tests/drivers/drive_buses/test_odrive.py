@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceMissing, NoReply, ProtocolError, WrongDevice
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.odrive.codec import (
@@ -29,6 +28,7 @@ from drivers.odrive.endpoints import (
     read_endpoints,
 )
 from drivers.odrive.faults import AxisFault
+from drivers.wheel_drives.bus import ResetRule
 from sim_twin.can import MemoryBus
 from sim_twin.can.odrive.axis import _REACTIONS
 from sim_twin.can.odrive.meters import ODriveMeters

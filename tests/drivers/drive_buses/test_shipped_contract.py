@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from drivers.drive_bus import DriveBus
+from drivers.wheel_drives.bus import DriveBus
 from sim_twin.contracts.drive_bus import DriveBusContract, DrivePowerContract
 
 

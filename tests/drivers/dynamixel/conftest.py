@@ -5,7 +5,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
-from drivers.dynamixel.codec import Instruction, PacketParser
+from drivers.dynamixel.wire.codec import Instruction, PacketParser
 from drivers.errors import LinkLost
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank

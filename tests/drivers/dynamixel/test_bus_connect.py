@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from drivers.dynamixel import DynamixelBus, OperatingMode, ServoSpec, WatchdogState
-from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.errors import ServoSilent, WrongServo
+from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import DriverError, NoReply, WrongDevice
 from sim_twin.servos import EmulatedServoSpec
 

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec
-from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import LinkLost
 
 MakeBench = Callable[..., Any]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec, WatchdogState
-from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.dynamixel.errors import WrongServo
-from drivers.dynamixel.layout import DIRECT, block_of
-from drivers.dynamixel.model import IndirectBank
-from drivers.dynamixel.models import MODELS
+from drivers.dynamixel.tables.layout import DIRECT, block_of
+from drivers.dynamixel.tables.model import IndirectBank
+from drivers.dynamixel.tables.models import MODELS
+from drivers.dynamixel.wire.codec import Instruction, encode_instruction
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
 
 MakeBench = Callable[..., Any]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from drivers.dynamixel import HardwareError, WatchdogState
-from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.errors import (
     NotKept,
     RejectedAccess,
@@ -17,6 +16,7 @@ from drivers.dynamixel.errors import (
     ServoSilent,
     WatchdogTripped,
 )
+from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import LinkLost
 
 MakeBench = Callable[..., Any]

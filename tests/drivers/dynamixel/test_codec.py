@@ -5,7 +5,7 @@ from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     HEADER,
     MAX_LENGTH,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.dynamixel.control_table import (
+from drivers.dynamixel.tables.control_table import (
     BAUD_RATES,
     MODELS,
     MODELS_BY_NUMBER,

@@ -12,8 +12,9 @@ from random import Random
 
 import pytest
 
-from drivers.dynamixel.block import BlockRead
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.tables.layout import DIRECT
+from drivers.dynamixel.wire.block import BlockRead
+from drivers.dynamixel.wire.codec import (
     HEADER,
     Packet,
     PacketParser,
@@ -22,8 +23,7 @@ from drivers.dynamixel.codec import (
     table_crc16,
     unstuff,
 )
-from drivers.dynamixel.layout import DIRECT
-from drivers.dynamixel.sync_read import Entry, ReplyCollector
+from drivers.dynamixel.wire.sync_read import Entry, ReplyCollector
 
 IDS = (1, 2, 3, 4)
 CAMPAIGN = [

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from can.interfaces.slcan import slcanBus
 
-from drivers.can_interface import open_can_bus
-from drivers.can_serial import SerialCanBus
+from drivers.can.interface import open_can_bus
+from drivers.can.slcan import SerialCanBus
 from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
-from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
+from drivers.wheel_drives.bus import DriveState
 from sim_twin.can import MotorMounting, WheelDrive
 from sim_twin.can.bus.slcan import SlcanAdapter
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld

@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivers.can_interface import open_can_bus
+from drivers.can.interface import open_can_bus
 from drivers.canopen.cia402 import FAULT_STATES
 from drivers.canopen.objects import HEARTBEAT_COB
 from drivers.canopen.spec import HOST_NODE_ID

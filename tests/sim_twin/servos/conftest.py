@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.tables.control_table import MODELS, OperatingMode
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     Instruction,
     Packet,
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import MODELS, OperatingMode
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 from sim_twin.servos.firmware.rotor import FreeRotors
 

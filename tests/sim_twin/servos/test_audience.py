@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.tables.control_table import BAUD_RATES, HardwareError
+from drivers.dynamixel.wire.codec import (
     ALERT,
     BROADCAST_ID,
     Instruction,
@@ -14,7 +15,6 @@ from drivers.dynamixel.codec import (
     StatusError,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import BAUD_RATES, HardwareError
 from sim_twin.servos import EmulatedServoSpec, ServoBank
 
 THREE = ("XM430-W350", "XL430-W250", "XM540-W270")

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import BROADCAST_ID, Instruction, StatusError, encode_instruction
+from drivers.dynamixel.wire.codec import BROADCAST_ID, Instruction, StatusError, encode_instruction
 
 BACK_UP, RESTORE = b"\x01CTRL", b"\x02CTRL"
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel.codec import BROADCAST_ID, Instruction, encode_instruction
-from drivers.dynamixel.control_table import OperatingMode
+from drivers.dynamixel.tables.control_table import OperatingMode
+from drivers.dynamixel.wire.codec import BROADCAST_ID, Instruction, encode_instruction
 
 MODELS = ("XM430-W350", "XL430-W250", "XM540-W270")
 IDS = (1, 2, 3)

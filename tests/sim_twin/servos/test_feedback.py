@@ -3,8 +3,8 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import Instruction
-from drivers.dynamixel.control_table import OperatingMode
+from drivers.dynamixel.tables.control_table import OperatingMode
+from drivers.dynamixel.wire.codec import Instruction
 
 CENTRE = 2048
 

@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.wire.codec import Instruction
 from sim_twin.servos import EmulatedServoSpec, ServoBank
 
 CENTRE = 2048

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     HEADER,
     MAX_LENGTH,

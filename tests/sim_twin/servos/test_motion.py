@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.control_table import OperatingMode
+from drivers.dynamixel.tables.control_table import OperatingMode
 from sim_twin.servos import FirmwareOptions
 
 CENTRE = 2048

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import OperatingMode
-from drivers.dynamixel.model import PULSE_RAD, PWM_FULL
+from drivers.dynamixel.tables.control_table import OperatingMode
+from drivers.dynamixel.tables.model import PULSE_RAD, PWM_FULL
 from sim_twin.servos import FirmwareOptions
 
 CENTRE = 2048

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     ALERT,
     BROADCAST_ID,
     Instruction,

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import BROADCAST_ID, Instruction, StatusError, encode_instruction
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.tables.control_table import MODELS
+from drivers.dynamixel.wire.codec import BROADCAST_ID, Instruction, StatusError, encode_instruction
 from sim_twin.servos import EmulatedServoSpec, ServoBank
 
 ADDRESS_PAST_THE_END = 662

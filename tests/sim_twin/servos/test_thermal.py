@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel.control_table import HardwareError, OperatingMode
-from drivers.dynamixel.models import MODELS
+from drivers.dynamixel.tables.control_table import HardwareError, OperatingMode
+from drivers.dynamixel.tables.models import MODELS
 from sim_twin.servos.firmware.thermal import (
     WINDING_SHARE,
     WINDING_TIME_CONSTANT_S,

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.codec import BROADCAST_ID, Instruction, encode_instruction
-from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.tables.control_table import BAUD_RATES
+from drivers.dynamixel.wire.codec import BROADCAST_ID, Instruction, encode_instruction
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos.protocol.timing import FIFO_BYTES, WireTiming
 from sim_twin.servos.server import FreeServos, make_specs

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     Instruction,
     Packet,

@@ -8,8 +8,8 @@ from typing import Any as Rig  # the class in conftest.py, which no test can imp
 import numpy as np
 import pytest
 
-from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
+from drivers.wheel_drives.bus import PowerState
 from platforms import load_profile
 from vla_deploy.control.output.payload import PRESS_M
 from vla_deploy.control.output.servos import ServoLine

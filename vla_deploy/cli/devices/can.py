@@ -9,10 +9,10 @@ from typing import Any
 
 import can
 
-from drivers.can_interface import SERIAL_PREFIX, open_can_bus
-from drivers.can_link import CanLink
-from drivers.can_scan import BusScan, FoundAxis, FoundNode, ScanReport
-from drivers.can_words import Words, describe_canopen, describe_odrive
+from drivers.can.interface import SERIAL_PREFIX, open_can_bus
+from drivers.can.link import CanLink
+from drivers.can.scan import BusScan, FoundAxis, FoundNode, ScanReport
+from drivers.can.words import Words, describe_canopen, describe_odrive
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import ProtocolError
 from drivers.stepping import wait_for

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock, MonotonicClock
-from drivers.dynamixel.codec import MAX_SERVO_ID
-from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.dynamixel.tools import BenchLink
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.errors import DeviceMissing
+from drivers.recording.recorder import RecordingTransport, WireRecorder
 from drivers.serial_port import SerialPort
-from drivers.wire_recorder import RecordingTransport, WireRecorder
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.robots import RobotDescription, load_robot
 

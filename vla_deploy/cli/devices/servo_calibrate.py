@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from drivers.dynamixel.control_table import PULSES_PER_REV
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import PULSES_PER_REV
 from drivers.dynamixel.tools import BenchLink
 from drivers.dynamixel.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
 from drivers.dynamixel.tools.travel import ServoMounting, TravelRefused

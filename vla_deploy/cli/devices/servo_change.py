@@ -4,8 +4,8 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.dynamixel.tools import BenchLink
 from drivers.dynamixel.tools.bench_link import Keep
 from drivers.dynamixel.tools.scan import is_clash, is_taken

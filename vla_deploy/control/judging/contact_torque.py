@@ -10,7 +10,7 @@ now and then would show a torque that is not there.
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.models import MODELS
+from drivers.dynamixel.tables.models import MODELS
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from drivers.dynamixel.models import MODELS
+from drivers.dynamixel.tables.models import MODELS
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.robots import RobotDescription

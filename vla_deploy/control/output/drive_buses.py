@@ -6,8 +6,8 @@ import can
 
 from drivers.canopen import EDS_PATH, DriveMode, DriveSpec, WheelDriveBus
 from drivers.clock import Clock
-from drivers.drive_bus import DriveBus
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
+from drivers.wheel_drives.bus import DriveBus
 from platforms import Profile
 from vla_deploy.robots.description import CanBus
 

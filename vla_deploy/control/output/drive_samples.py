@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from drivers.drive_bus import DriveState, PowerState
+from drivers.wheel_drives.bus import DriveState, PowerState
 from vla_deploy.control.output.wheel_tracking import WheelTracking
 from vla_deploy.safety import DriveSample
 

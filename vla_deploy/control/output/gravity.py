@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.dynamixel.control_table import PULSE_RAD, PWM_FULL
+from drivers.dynamixel.tables.control_table import PULSE_RAD, PWM_FULL
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.control.output.servos import GAINS
 from vla_deploy.robots import RobotDescription

@@ -6,10 +6,10 @@ from collections.abc import Generator
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveBus, DriveState
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from drivers.stepping import wait_for
+from drivers.wheel_drives.bus import DriveBus, DriveState
 from platforms import Profile
 from vla_deploy.control.output.drive_buses import drive_bus
 from vla_deploy.control.output.drive_samples import drive_samples

@@ -1,7 +1,7 @@
 import pytest
 
-from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.dynamixel.tools import scan_speed
+from drivers.dynamixel.wire.codec import Instruction, encode_instruction
 
 PING_ALL = encode_instruction(254, Instruction.PING)
 

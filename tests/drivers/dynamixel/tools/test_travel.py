@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.dynamixel.control_table import CENTRE_PULSE, PULSE_RAD
+from drivers.dynamixel.tables.control_table import CENTRE_PULSE, PULSE_RAD
 from drivers.dynamixel.tools.travel import (
     JointRange,
     ServoMounting,

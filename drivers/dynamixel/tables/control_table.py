@@ -1,6 +1,6 @@
 """Offer the control tables of the X series: `model` has the types, `models` the data."""
 
-from drivers.dynamixel.model import (
+from drivers.dynamixel.tables.model import (
     BAUD_RATES,
     CENTRE_PULSE,
     CURRENT_UNIT_A,
@@ -20,7 +20,7 @@ from drivers.dynamixel.model import (
     ServoDatasheet,
     StatusReturnLevel,
 )
-from drivers.dynamixel.models import MODELS, MODELS_BY_NUMBER
+from drivers.dynamixel.tables.models import MODELS, MODELS_BY_NUMBER
 
 __all__ = [
     "BAUD_RATES",

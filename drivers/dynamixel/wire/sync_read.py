@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     HEADER,
     Instruction,

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from drivers.drive_bus import DriveFault, PowerState
+from drivers.wheel_drives.bus import DriveFault, PowerState
 
 
 class DriveIdentity(Protocol):

@@ -10,7 +10,7 @@ from typing import Final
 
 from drivers.clock import Clock
 from drivers.errors import LinkLost, ProtocolError
-from drivers.wire_recording import RecordKind, WireRecord
+from drivers.recording.recording import RecordKind, WireRecord
 
 _PLAYED: Final = frozenset({RecordKind.WRITE, RecordKind.READ, RecordKind.LOST})
 

@@ -6,8 +6,8 @@ behind it. Only that one is to blame; the ones behind it are asked again at once
 
 from typing import Final
 
-from drivers.dynamixel.link import PacketLink
-from drivers.dynamixel.sync_read import Entry, SyncRead
+from drivers.dynamixel.wire.link import PacketLink
+from drivers.dynamixel.wire.sync_read import Entry, SyncRead
 
 _LEAST_MARGIN_RATIO: Final = 0.1
 """What of the margin must be left for the second question, or it is not asked."""

@@ -5,7 +5,7 @@ Source: ROBOTIS e-manual, control tables of the X series. Indirect slots are not
 
 from typing import Final
 
-from drivers.dynamixel.model import PWM_FULL, WATCHDOG_MAX, IndirectBank, Register
+from drivers.dynamixel.tables.model import PWM_FULL, WATCHDOG_MAX, IndirectBank, Register
 
 # fmt: off
 #     name, address, size, access, eeprom, signed, initial, minimum, maximum

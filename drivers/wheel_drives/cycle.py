@@ -9,14 +9,14 @@ import can
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.can_link import CanLink
+from drivers.can.link import CanLink
 from drivers.clock import Clock
-from drivers.cyclic_port import CyclicPort
-from drivers.drive_bus import DriveGoal, DriveState, PowerState, ResetRule
-from drivers.drive_goal import DrivesSeen, GoalKeeper
 from drivers.errors import LinkLost, ProtocolError
-from drivers.node_budget import NodeBudget
 from drivers.stepping import wait_for
+from drivers.wheel_drives.bus import DriveGoal, DriveState, PowerState, ResetRule
+from drivers.wheel_drives.cyclic_port import CyclicPort
+from drivers.wheel_drives.goal import DrivesSeen, GoalKeeper
+from drivers.wheel_drives.node_budget import NodeBudget
 
 STILL_RAD_S = 0.05
 _WITH_POWER = (PowerState.OPERATION_ENABLED, PowerState.QUICK_STOP_ACTIVE)

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.codec import (
+from drivers.dynamixel.errors import REJECTIONS, CorruptReply, Rejected, ServoSilent
+from drivers.dynamixel.wire.codec import (
     ALERT,
     BROADCAST_ID,
     Instruction,
@@ -12,9 +13,8 @@ from drivers.dynamixel.codec import (
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.errors import REJECTIONS, CorruptReply, Rejected, ServoSilent
-from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, Entry, ReplyCollector, SyncRead
-from drivers.dynamixel.wire import Wire
+from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES, Entry, ReplyCollector, SyncRead
+from drivers.dynamixel.wire.wire import Wire
 
 PING_REPLY_BYTES: Final = STATUS_OVERHEAD_BYTES + 3
 

@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.codec import crc16, encode_fast_status, encode_status
-from drivers.dynamixel.layout import Block, Field
-from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, Entry, SyncRead
+from drivers.dynamixel.tables.layout import Block, Field
+from drivers.dynamixel.wire.codec import crc16, encode_fast_status, encode_status
+from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES, Entry, SyncRead
 
 _HEAD_BYTES: Final = 8
 """Header, id, length and instruction; in a plain reply each servo sends them."""

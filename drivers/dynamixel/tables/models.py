@@ -11,14 +11,14 @@ from math import pi
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.model import (
+from drivers.dynamixel.tables.model import (
     CURRENT_UNIT_A,
     IndirectBank,
     OperatingMode,
     Register,
     ServoDatasheet,
 )
-from drivers.dynamixel.table_rows import (
+from drivers.dynamixel.tables.table_rows import (
     COMMON,
     CURRENT_SENSING,
     EXTERNAL_PORTS,

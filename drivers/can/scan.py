@@ -9,7 +9,7 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
-from drivers.can_link import CanLink
+from drivers.can.link import CanLink
 from drivers.canopen.objects import (
     DEVICE_TYPE,
     FUNCTION_CODE_MASK,

@@ -10,8 +10,8 @@ from drivers.clock import Clock
 from drivers.errors import DeviceMissing
 from drivers.estop.gpio_button import Contact
 from drivers.opener import DeviceOpener
-from drivers.wire_recorder import RecordingCanBus, RecordingTransport, WireRecorder
-from drivers.wire_recording import older_part
+from drivers.recording.recorder import RecordingCanBus, RecordingTransport, WireRecorder
+from drivers.recording.recording import older_part
 
 RECORD_VARIABLE: Final = "VLA_DEPLOY_RECORD"
 """The environment variable by which a person asks the robot's processes for recordings."""

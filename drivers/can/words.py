@@ -6,7 +6,7 @@ from typing import Final
 
 import can
 
-from drivers.can_errors import describe as describe_error
+from drivers.can.errors import describe as describe_error
 from drivers.canopen.cia402 import decode_statusword
 from drivers.canopen.emergency import decode_emergency
 from drivers.canopen.objects import (

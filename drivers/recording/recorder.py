@@ -18,7 +18,7 @@ import can
 from drivers.base import BurstTransport, ByteTransport, CheckedTransport, TunableTransport
 from drivers.clock import Clock
 from drivers.errors import DeviceMissing, LinkLost
-from drivers.wire_recording import (
+from drivers.recording.recording import (
     MAGIC,
     MAX_PAYLOAD_BYTES,
     RecordKind,

@@ -5,7 +5,7 @@ from typing import Final
 
 import can
 
-from drivers.can_errors import BusOff, ControllerState, ControllerWatch
+from drivers.can.errors import BusOff, ControllerState, ControllerWatch
 from drivers.clock import NS_PER_S, Clock
 from drivers.errors import LinkLost, ProtocolError
 

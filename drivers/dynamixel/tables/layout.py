@@ -10,7 +10,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.model import ServoDatasheet
+from drivers.dynamixel.tables.model import ServoDatasheet
 
 
 class BlockLayout(Enum):

@@ -6,8 +6,8 @@ from typing import Final
 
 import can
 
+from drivers.can.slcan import SerialCanBus
 from drivers.can_hub import HubBus
-from drivers.can_serial import SerialCanBus
 from drivers.errors import DeviceMissing
 
 SERIAL_PREFIX: Final = "slcan:"

@@ -5,7 +5,7 @@ from typing import Final
 from drivers.base import BurstTransport, ByteTransport, CheckedTransport, TunableTransport
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel.counters import BusCounters
-from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, SyncRead
+from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES, SyncRead
 from drivers.errors import LinkLost
 
 _BITS_PER_BYTE: Final = 10

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Final
 
-from drivers.dynamixel.control_table import BAUD_RATES
-from drivers.dynamixel.link import ReplyPatience
-from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import BAUD_RATES
+from drivers.dynamixel.tables.registers import Registers
+from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import NoReply, ProtocolError
 
 _ONCE: Final = ReplyPatience(margin_s=0.02, attempts=1)

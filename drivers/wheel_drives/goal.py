@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.drive_bus import DriveGoal
+from drivers.wheel_drives.bus import DriveGoal
 
 FAULT_RESET_NS: Final = NS_PER_S // 2
 BRAKE_TIMEOUT_NS: Final = 5 * NS_PER_S
