@@ -3,8 +3,8 @@
 The robot runs on its twin by the wall clock; a listener in a process of its own takes joint states
 at 100 Hz, odometry, frames, the scan, diagnostics, and both images at 10 Hz. Beside that: a node
 that publishes the same joint states and nothing else (`peer_core_share`), and control's late ticks
-of a robot without the gateway, in a run just before (`late_ratio_without`): `late_ticks_added` is
-what the gateway's run had more, of as many ticks.
+by turns of a few seconds with the gateway at work and with it frozen, so that what else the
+computer does meets both alike: `late_ticks_added` is what the gateway's turns had more.
 """
 
 import json
@@ -23,8 +23,7 @@ from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, realtime
 from benchmarks.live_robot import arm, live_stack
 from benchmarks.percentiles import percentile
-from platforms import load_profile
-from sim_twin.harness.process_stack import ProcessStack
+from drivers.clock import NS_PER_S
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.robots import load_robot
@@ -38,71 +37,83 @@ joint_state_rate_hz = {RATE_HZ:g}
 image_rate_hz = 10
 """
 _SETTLE_S: Final = 3.0
+_SHORT_S: Final = 0.5
+_WINDOW_S: Final = 7.0
+"""With what precedes it shorter than the silence by which the supervisor takes it for hung."""
 _HERE: Final = Path(__file__).parent
+Environment = tuple[Path, Mapping[str, str]]
 
 
-def measure(seconds: float) -> dict[str, Any]:
-    """Return the figures."""
+def measure(seconds: float, rounds: int) -> dict[str, Any]:
+    """Return the figures; `seconds` are for share and latency, `rounds` for late ticks."""
     with tempfile.TemporaryDirectory(prefix="vla-") as name:
         folder = Path(name)
         robot = _robot(folder / "butler")
-        profile = _profile()
-        with live_stack(folder, profile, "--robot", str(robot)) as (_, session):
-            arm(session)
-            without = _late_ratio(session, seconds, lambda: session.pause(seconds))
         options = ("--robot", str(robot), "--ros")
-        with live_stack(folder, profile, *options) as (stack, session):
+        with live_stack(folder, _profile(), *options) as (stack, session):
             arm(session)
-            report = _with_gateway(stack, session, folder, seconds)
-            ticks = load_profile("desktop").control_rate_hz * seconds
-            added = max(0.0, report["late_ratio_with"] - without) * ticks
-            return report | {
-                "seconds": seconds,
-                "goal_core_share": GOAL_CORE_SHARE,
-                "late_ratio_without": without,
-                "late_ticks_added": round(added),
-            }
+            session.pause(_SETTLE_S)
+            process = psutil.Process(int(stack.row("ros")["pid"]))
+            environment = _environment(folder)
+            report = _share_and_latency(session, process, environment, seconds)
+            return report | _late_ticks(session, process, environment, rounds)
 
 
-def _with_gateway(
-    stack: ProcessStack, session: RobotSession, folder: Path, seconds: float
+def _share_and_latency(
+    session: RobotSession, process: psutil.Process, environment: Environment, seconds: float
 ) -> dict[str, Any]:
-    python, variables = _environment(folder)
-    session.pause(_SETTLE_S)
-    process = psutil.Process(int(stack.row("ros")["pid"]))
-    listener = _begin(python, variables, "ros_listener.py", seconds)
+    listener = _begin(environment, "ros_listener.py", seconds)
     session.pause(_SETTLE_S)  # until it has found everything
-    before_s, told = _spent_s(process), {}
-    span_s = seconds - 2 * _SETTLE_S
-
-    def wait() -> None:
-        began_ns = session.clock.now_ns()
-        session.pause(span_s)
-        told["span_s"] = (session.clock.now_ns() - began_ns) / 1e9
-
-    late = _late_ratio(session, span_s, wait)
-    share = (_spent_s(process) - before_s) / told["span_s"]
-    memory_mb = process.memory_info().rss / 1e6
+    began_ns, before_s = session.clock.now_ns(), _spent_s(process)
+    session.pause(seconds - 2 * _SETTLE_S)
+    share = (_spent_s(process) - before_s) / ((session.clock.now_ns() - began_ns) / NS_PER_S)
     heard = json.loads(listener.communicate()[0])
-    peer = _begin(python, variables, "ros_peer.py", 10.0, RATE_HZ, 16)
+    peer = _begin(environment, "ros_peer.py", 10.0, RATE_HZ, 16)
     ages_s = sorted(heard["ages_s"])
     return {
         "core_share": share,
+        "goal_core_share": GOAL_CORE_SHARE,
         "peer_core_share": json.loads(peer.communicate()[0])["core_share"],
-        "memory_mb": memory_mb,
-        "late_ratio_with": late,
+        "memory_mb": process.memory_info().rss / 1e6,
         "latency_p50_s": percentile(ages_s, 50),
         "latency_p99_s": percentile(ages_s, 99),
         "heard": heard["counts"],
+        "seconds": seconds,
     }
 
 
-def _late_ratio(session: RobotSession, seconds: float, wait: Any) -> float:
+def _late_ticks(
+    session: RobotSession, process: psutil.Process, environment: Environment, rounds: int
+) -> dict[str, Any]:
+    """Count control's late ticks by turns: with the gateway at work, and with it frozen."""
+    listener = _begin(environment, "ros_listener.py", rounds * 2 * (_SETTLE_S + _WINDOW_S))
+    late = {"with": 0, "without": 0}
+    ticks = 0
+    for _ in range(rounds):
+        process.suspend()
+        session.pause(_SHORT_S)
+        late["without"] += _counted(session)[0]
+        process.resume()
+        session.pause(_SETTLE_S)
+        more, counted = _counted(session)
+        late["with"] += more
+        ticks += counted
+    listener.terminate()
+    listener.communicate()
+    return {
+        "late_ticks_with": late["with"],
+        "late_ticks_without": late["without"],
+        "late_ticks_added": max(0, late["with"] - late["without"]),
+        "ticks": ticks,
+    }
+
+
+def _counted(session: RobotSession) -> tuple[int, int]:
+    """Return how many ticks of a window were late, and how many it had."""
     before = session.document("control_status") or {}
-    wait()
+    session.pause(_WINDOW_S)
     after = session.document("control_status") or {}
-    ticks = after["tick"] - before["tick"]
-    return float((after["late_ticks"] - before["late_ticks"]) / ticks)
+    return after["late_ticks"] - before["late_ticks"], after["tick"] - before["tick"]
 
 
 def _robot(folder: Path) -> Path:
@@ -120,14 +131,13 @@ def _profile() -> str:
     return f'inherits = "desktop"\nrealtime_priority = {priority}\n{rates}'
 
 
-def _environment(folder: Path) -> tuple[Path, Mapping[str, str]]:
+def _environment(folder: Path) -> Environment:
     python, variables = launch_environment(RosSettings(), folder)
     return python, {**os.environ, **variables}
 
 
-def _begin(
-    python: Path, variables: Mapping[str, str], script: str, *arguments: float
-) -> "subprocess.Popen[str]":
+def _begin(environment: Environment, script: str, *arguments: float) -> "subprocess.Popen[str]":
+    python, variables = environment
     words = [str(python), str(_HERE / script), *(f"{one:g}" for one in arguments)]
     return subprocess.Popen(words, env=dict(variables), stdout=subprocess.PIPE, text=True)
 
@@ -140,9 +150,10 @@ def _spent_s(process: psutil.Process) -> float:
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures."""
     arguments = parser("ros", __doc__)
-    arguments.add_argument("--seconds", type=float, default=30.0, help="of each robot")
+    arguments.add_argument("--seconds", type=float, default=30.0, help="for share and latency")
+    arguments.add_argument("--rounds", type=int, default=6, help="with and without, by turns")
     options = arguments.parse_args(argv)
-    show(measure(options.seconds), as_json=options.json)
+    show(measure(options.seconds, options.rounds), as_json=options.json)
     return 0
 
 

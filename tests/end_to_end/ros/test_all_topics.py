@@ -175,8 +175,12 @@ ACTS = (
     + """
 listen(RobotState, "/vla_deploy/state", LATCHED)
 state = lambda: came["/vla_deploy/state"][-1].control_state if came["/vla_deploy/state"] else ""
+stop = publisher("/emergency_stop", Bool)
 until(lambda: state() == "armed", "armed")
-publisher("/emergency_stop", Bool).publish(Bool(data=True))
+# DDS tells a node's name after its publishers, and a stop waits for no name.
+known_s = time.monotonic() + 2.0
+until(lambda: time.monotonic() > known_s, "a name")
+stop.publish(Bool(data=True))
 until(lambda: came["/vla_deploy/state"][-1].estop_latched and state() == "stopped", "the stop")
 told = {}
 for act in ("reset", "arm"):

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerSession, fresh_desk
+from benchmarks.planner_session import PlannerSession, fresh_session
 from drivers.clock import MonotonicClock
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, StandingOrder
@@ -57,7 +57,7 @@ def test_orders_are_read_from_whole_sentences(text: str, order: StandingOrder | 
 
 
 def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         (said,) = (desk.say("don't touch the keys")[1].plan or {})["actions"]
         assert said["parameters"] == {"text": "All right, I will not touch the keys."}
@@ -104,14 +104,14 @@ def test_what_is_not_seen_is_not_taken_where_it_may_be_the_forbidden(
     ],
 )
 def test_what_is_under_way_ends_where_something_is_forbidden(command: str, order: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         assert desk.say(command)[1].outcome == "plan"
         assert desk.say(order)[1].outcome == "stop"
 
 
 def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         desk.say("stay out of the kitchen")
         refused(desk, "go to the kitchen")
@@ -135,7 +135,7 @@ def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
 def test_a_search_leaves_out_what_may_not_be_entered(
     orders: tuple[str, ...], text: str, outcome: str, keeps_out: list[str] | None
 ) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         for order in orders:
             desk.say(order)
@@ -147,7 +147,7 @@ def test_a_search_leaves_out_what_may_not_be_entered(
 
 
 def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         desk.say("don't touch the keys")
         plan = {"goal": "keys", "actions": [{"id": "a", "skill": "pick_up",
@@ -156,7 +156,7 @@ def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:
 
 
 def test_another_profiles_planner_holds_to_it_too() -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         in_the_flat(desk)
         desk.say("stay out of the kitchen")
         desk.node.commit(Planner(MonotonicClock()))

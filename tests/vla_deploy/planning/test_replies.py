@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import fresh_desk
+from benchmarks.planner_session import fresh_session
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ from benchmarks.planner_session import fresh_desk
     ],
 )
 def test_what_is_said_gets_a_true_answer(text: str, outcome: str, said: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         answer = desk.say(text)[1]
         told = [one["parameters"].get("text", "") for one in (answer.plan or {}).get("actions", ())]

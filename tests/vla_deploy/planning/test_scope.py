@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerAnswer, fresh_desk
+from benchmarks.planner_session import PlannerAnswer, fresh_session
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.knowledge import world_of
@@ -28,7 +28,7 @@ CHANGES: Final = (
 
 
 def asked(text: str) -> PlannerAnswer:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         return desk.say(text)[1]
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerSession, fresh_desk
+from benchmarks.planner_session import PlannerSession, fresh_session
 from benchmarks.planner_told import scene_document
 
 CLEAR: Final = ("plan", "ask", "refuse")
@@ -15,7 +15,7 @@ CLEAR: Final = ("plan", "ask", "refuse")
 
 @pytest.fixture
 def desk() -> Iterator[PlannerSession]:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         yield desk
 

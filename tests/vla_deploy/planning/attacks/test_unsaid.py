@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import fresh_desk
+from benchmarks.planner_session import fresh_session
 
 SENTENCES = (
     "take the ball to the kitchen, I changed my mind",
@@ -41,7 +41,7 @@ SENTENCES = (
 
 @pytest.mark.parametrize("sentence", SENTENCES)
 def test_it_does_not_move_at_once(sentence: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         answer = desk.say(sentence)[1]
     assert answer.outcome != "plan" or not moves(answer.plan or {}), answer
@@ -56,7 +56,7 @@ def test_it_does_not_move_at_once(sentence: str) -> None:
     ],
 )  # fmt: skip
 def test_more_or_less_of_what_was_done_is_not_done_at_once(said: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["tidy"].world(home()))
         desk.say("turn left 30 degrees")
         assert desk.say(said)[1].outcome in ("ask", "refuse")
@@ -71,7 +71,7 @@ def test_more_or_less_of_what_was_done_is_not_done_at_once(said: str) -> None:
     ],
 )
 def test_another_thing_that_is_told_of_is_not_taken_at_once(sentence: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["row"].world(home()))
         answer = desk.say(sentence)[1]
     assert answer.outcome != "plan", answer
@@ -90,7 +90,7 @@ def test_another_thing_that_is_told_of_is_not_taken_at_once(sentence: str) -> No
     ],
 )
 def test_an_answer_that_excludes_or_asks_picks_nothing(answer: str) -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["cups"].world(home()))
         assert desk.say("bring me the cup from the coffee table")[1].outcome == "ask"
         said = desk.say(answer)[1]
@@ -98,7 +98,7 @@ def test_an_answer_that_excludes_or_asks_picks_nothing(answer: str) -> None:
 
 
 def test_an_answer_with_more_words_is_asked_for_again() -> None:
-    with fresh_desk() as desk:
+    with fresh_session() as desk:
         desk.tell(scenes()["cups"].world(home()))
         desk.say("bring me the cup from the coffee table")
         said = desk.say("the red fella, it suits my mood")[1]

@@ -1,54 +1,37 @@
 """Replay flights of the twin and recordings: the topics of a run come alive, and nothing else."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from vla_deploy.telemetry.replay.decoding import shifted
-from vla_deploy.telemetry.replay.pace import Pace
-from vla_deploy.telemetry.replay.source import Recorded, Source
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import ReplayOnly, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
+from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.errors import FlightUnreadable, ReplayRefused
+from vla_deploy.telemetry.recorded_file import RecordedMessage, read_file
 from vla_deploy.telemetry.recording.once import OneRecording
-from vla_deploy.telemetry.recording.recording_file import RecordedRun
-from vla_deploy.telemetry.recording.request import RecordingWish
-from vla_deploy.telemetry.replay.feeder import Feeder
-from vla_deploy.telemetry.replay.node import ReplayNode
+from vla_deploy.telemetry.recording.request import RecordingRequest
+from vla_deploy.telemetry.replay.feeder import TopicFeeder, shifted
+from vla_deploy.telemetry.replay.node import PlaybackPosition, ReplayNode
 from vla_deploy.telemetry.robot_state import collect
 
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
 
-class StepClock:
-    """Stand still until told otherwise."""
-
-    def __init__(self) -> None:
-        self.time_ns = 50 * NS_PER_S
-        self.each: Callable[[], None] = lambda: None
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-        self.each()
-
-
 class Shown:
-    """Hold a replay and somebody who looks at it."""
+    """Hold a replay and a reader of its topics."""
 
-    def __init__(self, run_dir: Path, file: Path, **options: Any) -> None:
-        self.clock = StepClock()
+    def __init__(self, run_dir: Path, file: Path, clock: Any, **options: Any) -> None:
+        self.clock = clock
         run_dir.mkdir(parents=True, exist_ok=True)
-        self.node = ReplayNode(run_dir, Source(file), self.clock, **options)
+        self.node = ReplayNode(run_dir, read_file(file), self.clock, **options)
         self.link = RobotLink(run_dir, self.clock)
         self.node.start()
         self.requests = self.link.space.ring_writer("replay_request")
@@ -58,7 +41,7 @@ class Shown:
             self.clock.time_ns += 20_000_000
             self.node.step()
 
-    def told(self) -> Any:
+    def status(self) -> Any:
         self.run(0.3)
         return self.link.document("replay_status")
 
@@ -68,8 +51,8 @@ class Shown:
 
 
 @pytest.fixture
-def shown(tmp_path: Path) -> Iterator[Shown]:
-    shown = Shown(tmp_path / "run", FLIGHT)
+def shown(tmp_path: Path, clock: Any) -> Iterator[Shown]:
+    shown = Shown(tmp_path / "run", FLIGHT, clock)
     yield shown
     shown.close()
 
@@ -114,17 +97,18 @@ def test_what_stands_still_stays_fresh(shown: Shown) -> None:
         assert shown.link.fresh(topic, 0.5) is not None, topic
     shown.requests.publish({"act": "resume"})
     shown.run(20.0)
-    assert shown.told()["state"] == "ended"
+    assert shown.status()["state"] == "ended"
     assert shown.link.fresh("control_status", 0.5) is not None
 
 
-def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path) -> None:
-    clock = StepClock()
+def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path, clock: Any) -> None:
     space = SharedSpace(tmp_path / "ipc", clock, is_replay=True)
-    feeder, cell = Feeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
+    feeder, cell = TopicFeeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
     fields = {"stamp_ns": 1, "x_m": 2.0}
     feeder.feed(
-        Recorded(channel="pose", at_ns=0, stamp_ns=0, sequence=1, text=json.dumps(fields).encode())
+        RecordedMessage(
+            channel="pose", at_ns=0, stamp_ns=0, sequence=1, text=json.dumps(fields).encode()
+        )
     )
     for at_s, is_fresh in ((0.1, True), (5.0, False)):
         clock.time_ns += 2 * NS_PER_S
@@ -154,25 +138,25 @@ def test_what_was_so_before_is_shown_from_any_moment_on(shown: Shown) -> None:
 
 
 def test_a_replay_pauses_goes_on_and_changes_its_speed(shown: Shown) -> None:
-    first = shown.told()["position_s"]
+    first = shown.status()["position_s"]
     shown.requests.publish({"act": "pause"})
-    paused = shown.told()
+    paused = shown.status()
     shown.run(2.0)
-    assert paused["state"] == shown.told()["state"] == "paused"
-    assert shown.told()["position_s"] == paused["position_s"] >= first
+    assert paused["state"] == shown.status()["state"] == "paused"
+    assert shown.status()["position_s"] == paused["position_s"] >= first
     shown.requests.publish({"act": "speed", "value": 0.5})
     shown.requests.publish({"act": "resume"})
     shown.run(0.5)
-    assert shown.told()["position_s"] == pytest.approx(paused["position_s"] + 0.4, abs=0.15)
+    assert shown.status()["position_s"] == pytest.approx(paused["position_s"] + 0.4, abs=0.15)
 
 
-def test_a_replay_begins_again_at_its_end_where_that_is_wanted(tmp_path: Path) -> None:
-    shown = Shown(tmp_path / "run", FLIGHT, loop=True)
-    length_s = shown.told()["duration_s"]
+def test_a_replay_begins_again_at_its_end_where_that_is_wanted(tmp_path: Path, clock: Any) -> None:
+    shown = Shown(tmp_path / "run", FLIGHT, clock, loop=True)
+    length_s = shown.status()["duration_s"]
     shown.requests.publish({"act": "seek", "value": length_s - 0.2})
     shown.run(1.0)
-    assert shown.told()["position_s"] < 2.0
-    assert shown.told()["state"] == "playing"
+    assert shown.status()["position_s"] < 2.0
+    assert shown.status()["state"] == "playing"
     shown.close()
 
 
@@ -193,25 +177,22 @@ def test_what_a_replay_cannot_do_is_refused_and_it_goes_on(
     shown: Shown, request_: dict[str, Any]
 ) -> None:
     shown.requests.publish(request_)
-    told = shown.told()
+    told = shown.status()
     assert told["refused"]
     assert told["state"] == "playing"
 
 
-def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
+def test_images_logs_and_events_come_back_as_they_were(
+    tmp_path: Path, context: NodeContext, clock: Any
+) -> None:
     """Record a run that this test plays, then replay the file."""
-    clock, run_dir = StepClock(), tmp_path / "recorded"
-    (run_dir / "logs").mkdir(parents=True)
-    space = SharedSpace(run_dir / "ipc", clock)
-    run = RecordedRun(run_id="r", robot="butler", profile="desktop")
+    space = SharedSpace(context.run_dir / "ipc", clock)
     one = OneRecording(
-        run_dir,
-        run,
-        RecordingWish(duration_s=2.0),
+        context,
+        RecordingRequest(duration_s=2.0),
         tmp_path / "x.mcap",
         image_period_s=0.1,
-        clock=clock,
-        wall_ns=lambda: 1_800_000_000 * NS_PER_S + clock.now_ns(),
+        wall_ns=clock.wall_ns,
     )
     pixels = np.zeros((48, 64, 3), np.uint8)
     cv2.circle(pixels, (30, 20), 10, (250, 10, 10), -1)
@@ -229,12 +210,12 @@ def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
         ring.publish({"command_id": "c-1", "event": "said", "text": "hello"})
         scene.put_document({"stamp_ns": now_ns, "objects": [], "surfaces": [], "bystanders": []})
         line = {"stamp_ns": now_ns, "level": "WARNING", "process": "planner", "message": "slow"}
-        (run_dir / "logs" / "planner.log").write_text(json.dumps(line) + "\n")
+        (context.run_dir / "logs" / "planner.log").write_text(json.dumps(line) + "\n")
 
     clock.each = once
     one.run(lambda: False)
     space.close()
-    shown = Shown(tmp_path / "run", tmp_path / "x.mcap")
+    shown = Shown(tmp_path / "run", tmp_path / "x.mcap", clock)
     events = shown.link.events("task_event", from_start=True)
     shown.run(3.0)
     frame = shown.link.frame("rgbd", 10.0)
@@ -249,7 +230,7 @@ def test_images_logs_and_events_come_back_as_they_were(tmp_path: Path) -> None:
     assert document["stamp_ns"] == pytest.approx(sample.stamp_ns, abs=1e8)
     (line,) = (tmp_path / "run" / "logs" / "planner.log").read_text().splitlines()
     assert json.loads(line)["message"] == "slow"
-    assert shown.told()["unfit"] == 0
+    assert shown.status()["unfit"] == 0
     shown.close()
 
 
@@ -264,8 +245,8 @@ def test_only_stamps_are_moved_into_this_runs_clock() -> None:
 
 
 def test_a_pace_goes_on_from_where_it_was_changed() -> None:
-    pace = Pace(1000 * NS_PER_S, 1100 * NS_PER_S, 0)
-    pace.go_at(10 * NS_PER_S, 4.0)
+    pace = PlaybackPosition(1000 * NS_PER_S, 1100 * NS_PER_S, 0)
+    pace.set_speed(10 * NS_PER_S, 4.0)
     assert pace.position_ns(15 * NS_PER_S) == 1030 * NS_PER_S
     pace.pause(15 * NS_PER_S, paused=True)
     assert pace.position_ns(99 * NS_PER_S) == 1030 * NS_PER_S
@@ -280,4 +261,4 @@ def test_what_is_no_recording_of_ours_is_refused_with_its_name(tmp_path: Path) -
         path = tmp_path / "x.mcap"
         path.write_bytes(data)
         with pytest.raises(FlightUnreadable, match=r"x\.mcap: no whole recording"):
-            Source(path)
+            read_file(path)
