@@ -98,7 +98,7 @@ def _late_ticks(
         more, counted = _counted(session)
         late["with"] += more
         ticks += counted
-    listener.terminate()
+    listener.kill()
     listener.communicate()
     return {
         "late_ticks_with": late["with"],
