@@ -22,8 +22,8 @@ from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
 from sim_twin.harness.stack import LockstepStack
 from vla_deploy.perception.images.detection import Detection
-from vla_deploy.perception.objects.assignment import assign
 from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.matching import assign
 from vla_deploy.perception.objects.track import Sighting
 from vla_deploy.perception.objects.tracker import Tracker
 from vla_deploy.world import Snapshot, read_snapshot, relations_of
@@ -216,7 +216,7 @@ def _update_cost(seed: int) -> dict[str, Any]:
             for number, at in enumerate(places)
         ]
         began_s = time.thread_time()
-        tracker.update(sightings, {}, stamp_ns)
+        tracker.update(sightings, (), stamp_ns)
         times_s.append(time.thread_time() - began_s)
     p50_s, p95_s = np.percentile(times_s[UPDATES // 10 :], (50, 95))
     return {

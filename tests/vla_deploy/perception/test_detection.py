@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.body import BodyMask
+from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.geometry.cloud import make_cloud
 from vla_deploy.perception.geometry.supports import find_supports
 from vla_deploy.perception.images.detection import Detection, detect

@@ -3,14 +3,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.perception.geometry.noise import covariance_of
 from vla_deploy.perception.images.detection import Detection
-from vla_deploy.perception.objects.filtering import Estimate
-from vla_deploy.perception.objects.in_view import PlaceView
-from vla_deploy.perception.objects.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
+from vla_deploy.perception.objects.filtering import Estimate, covariance_of
+from vla_deploy.perception.objects.track import KNOWN_LOOKS, MAX_ODD_SIGHTINGS, Sighting
 from vla_deploy.perception.objects.tracker import Tracker
-
-CLEAR, HIDDEN = PlaceView.CLEAR, PlaceView.HIDDEN
 
 
 def seen(
@@ -48,11 +44,11 @@ class Watcher:
         self.tracker = Tracker()
         self.images = 0
 
-    def image(self, *detections: Detection, view: PlaceView = CLEAR) -> list[dict[str, Any]]:
+    def image(self, *detections: Detection, in_view: bool = True) -> list[dict[str, Any]]:
         self.images += 1
-        views = {id(track): view for track in self.tracker.tracks}
+        clear = self.tracker.tracks if in_view else []
         stamp_ns = self.images * 200_000_000
-        self.tracker.update([sighting(one, stamp_ns) for one in detections], views, stamp_ns)
+        self.tracker.update([sighting(one, stamp_ns) for one in detections], clear, stamp_ns)
         return [track.document() for track in self.tracker.objects]
 
 
@@ -102,7 +98,7 @@ def test_what_is_hidden_stays_in_memory() -> None:
     watcher.image(seen())
     watcher.image(seen())
     for _ in range(50):
-        objects = watcher.image(view=HIDDEN)
+        objects = watcher.image(in_view=False)
     assert [o["id"] for o in objects] == ["cup_1"]
     assert objects[0]["last_seen_ns"] == 400_000_000
 
@@ -215,7 +211,7 @@ def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
     for _ in range(3):
         watcher.image(far)
     for _ in range(3):
-        boxes = watcher.image(near, view=HIDDEN)
+        boxes = watcher.image(near, in_view=False)
     assert [(box["id"], box["colour"]) for box in boxes] == [("box_1", "orange")]
 
 
@@ -236,7 +232,7 @@ def test_half_hidden_sights_of_its_box_make_a_cup_no_larger() -> None:
     wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
     shard = seen("object", "orange", at=(1.02, 2.0, 0.5), size_m=(0.16, 0.08, 0.1), truncated=True)
     for _ in range(30):
-        objects = watcher.image(box, wall, shard, view=HIDDEN)
+        objects = watcher.image(box, wall, shard, in_view=False)
     kept = {one["id"]: one for one in objects}
     assert kept["cup_1"]["size_m"] == [0.066, 0.066, 0.095]
 
@@ -247,7 +243,7 @@ def test_a_cup_that_is_seen_as_one_with_its_box_now_and_then_gets_no_larger() ->
     for _ in range(KNOWN_LOOKS):
         watcher.image(seen())
     for _ in range(3):
-        for _ in range(MOST_ODD_SIGHTS):
+        for _ in range(MAX_ODD_SIGHTINGS):
             (cup,) = watcher.image(both)
             assert cup["size_m"] == [0.066, 0.066, 0.095]
         watcher.image(seen(occluded=True))
@@ -257,7 +253,7 @@ def test_a_size_that_was_wrong_from_the_start_is_given_up() -> None:
     watcher = Watcher()
     for _ in range(2 * KNOWN_LOOKS):
         watcher.image(seen(size_m=(0.215, 0.215, 0.126)))
-    for _ in range(MOST_ODD_SIGHTS + 15):
+    for _ in range(MAX_ODD_SIGHTINGS + 15):
         (cup,) = watcher.image(seen())
     assert cup["size_m"] == pytest.approx([0.066, 0.066, 0.095], rel=0.1)
 
@@ -292,7 +288,7 @@ def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
     assert cup["colours"] == {"red": 1.0}
     assert max(cup["sigma_m"]) < 0.015
     for _ in range(300):
-        (later,) = watcher.image(view=HIDDEN)
+        (later,) = watcher.image(in_view=False)
     assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `grown` tells of the present
 
 
@@ -301,10 +297,10 @@ def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_ol
     watcher.image(seen())
     watcher.image(seen())
     for _ in range(20):
-        watcher.image(view=HIDDEN)
+        watcher.image(in_view=False)
     elsewhere = seen(at=(4.0, 0.5, 0.6))
     for _ in range(2):
-        both = watcher.image(elsewhere, view=HIDDEN)
+        both = watcher.image(elsewhere, in_view=False)
     assert {o["id"] for o in both} == {"cup_1", "cup_2"}
     for _ in range(5):
         objects = watcher.image(elsewhere)
@@ -319,9 +315,9 @@ def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_
     for move in range(1, 9):
         at = places[move % 2]
         for _ in range(20):
-            watcher.image(view=HIDDEN)
+            watcher.image(in_view=False)
         for _ in range(2):
-            watcher.image(seen(at=at), view=HIDDEN)
+            watcher.image(seen(at=at), in_view=False)
         for _ in range(5):
             watcher.image(seen(at=at))
     (cup,) = watcher.tracker.objects
@@ -386,8 +382,8 @@ def test_the_memory_of_tracks_is_bounded() -> None:
     watcher = Watcher()
     for number in range(200):
         spot = seen("object", at=(number * 1.0, 0.0, 0.5))
-        watcher.image(spot, view=HIDDEN)
-        watcher.image(spot, view=HIDDEN)
+        watcher.image(spot, in_view=False)
+        watcher.image(spot, in_view=False)
     assert len(watcher.tracker.tracks) <= 128
     assert len(watcher.tracker.objects) <= 64
 
@@ -408,13 +404,13 @@ def test_what_a_hand_has_lost_is_not_found_in_whatever_else_lies_there(other: De
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.6), 500_000_000)
     watcher.tracker.lose("left", "it slipped out")
     for _ in range(3):
-        told = watcher.image(other, view=HIDDEN)
+        told = watcher.image(other, in_view=False)
     lost = next(one for one in told if one["id"] == "cup_1")
     assert lost["cause"] == "it slipped out"
     assert (lost["class"], lost["colour"]) == ("cup", "red")
     assert lost["last_seen_ns"] == 500_000_000
 
-    found = watcher.image(seen(at=(1.1, 2.0, 0.4)), view=HIDDEN)
+    found = watcher.image(seen(at=(1.1, 2.0, 0.4)), in_view=False)
     cup = next(one for one in found if one["id"] == "cup_1")
     assert "cause" not in cup
     assert cup["position_m"][0] == pytest.approx(1.1, abs=0.02)

@@ -14,7 +14,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.perception.camera_tools.board import Image
 from vla_deploy.perception.camera_tools.errors import BadImages
-from vla_deploy.perception.objects.history import JointHistory
+from vla_deploy.perception.objects.body_state import JointHistory
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import CameraDescription
 from vla_deploy.robots.kinematics.model import full_positions

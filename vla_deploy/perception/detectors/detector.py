@@ -22,7 +22,7 @@ class Detector:
     """Hold one open model and read its outputs."""
 
     def __init__(self, session: ModelSession) -> None:
-        """Take a session over; `close` closes it.
+        """Own a session; `close` closes it.
 
         Raises:
             ModelMismatch: the adapter is unknown, or the outputs are not what it reads.
@@ -47,7 +47,7 @@ class Detector:
         """Return the boxes in an RGB image (h, w, 3), in its pixels, the surest first.
 
         Raises:
-            RunFailed: the model failed, or told what cannot be.
+            RunFailed: the model failed, or its outputs cannot be.
         """
         tensor, placement = fit_image(rgb, self._detection.image, self._input.dtype)
         outputs = self._session.run({self._input.name: tensor})
@@ -79,7 +79,7 @@ class Detector:
             ) from error
 
     def _check(self, boxes: Boxes) -> None:
-        """Refuse what would name a thing wrongly or hold noise for sure."""
+        """Refuse classes and scores that cannot be."""
         name, count = self._session.model.manifest.name, len(self.classes)
         if not len(boxes):
             return

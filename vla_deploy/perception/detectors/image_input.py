@@ -16,7 +16,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputPlacement:
-    """Say where the image lies in the input: pixel p of it is at p * scale + offset."""
+    """Hold where the image lies in the input: pixel p of it is at p * scale + offset."""
 
     scale_x: float
     scale_y: float

@@ -1,4 +1,4 @@
-"""Cut what stands on a support into separate things."""
+"""Segment what stands on a support into separate things."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from vla_deploy.perception.geometry.cloud import Cloud, Floats, Mask
 from vla_deploy.perception.geometry.supports import Support, inside
 from vla_deploy.perception.naming.colour import colour_names
 
-# What is this high is a thing; what adjoins it and is that high belongs to it.
+# From the first height on it is a thing; what adjoins it belongs to it from the second on.
 MIN_HEIGHT_M, EDGE_HEIGHT_M = 0.004, 0.002
 # Rugs and thresholds are floor.
 MIN_HEIGHT_ON_FLOOR_M = 0.012
@@ -26,7 +26,7 @@ NEAR_M = 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
 TOP_HIDDEN_SHARE = 0.5
-# Of a thing's left or right edge: a hand may hide a third of a box and touch little of its outline.
+# Of a thing's left or right edge: a hand may hide a third of a box and little of its outline.
 END_HIDDEN_SHARE = 0.3
 PART_SHARE = 0.15
 OUTLINE_PX = 3
@@ -66,7 +66,7 @@ class _Hidden:
 
 
 def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
-    """Return the things on each support; furniture and walls are none."""
+    """Return the clusters on each support, without furniture and walls."""
     clusters: list[Cluster] = []
     flat_points = cloud.points.reshape(-1, 3)
     sigma_m = cloud.sigma_m()
@@ -116,7 +116,7 @@ def _split(
             continue
         member = labels == label
         extent = np.ptp(points[member][:, :2], axis=0)
-        # What hangs in the air is carried by a hand, or is a part of the robot.
+        # What floats above the support is carried by a hand, or is a part of the robot.
         lowest_m = float(np.percentile(heights[rows[member], columns[member]], 5.0))
         if extent.max() < MAX_EXTENT_M and lowest_m < FLOATING_M:
             clusters.append(_cluster(cloud, support, heights, standing[member]))
@@ -165,7 +165,7 @@ def split_apart(cluster: Cluster, cloud: Cloud, member: Mask) -> list[Cluster]:
 
 
 def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
-    """Return the parts of a cluster that have a colour of their own: things that touch."""
+    """Return the parts of a cluster that differ in colour: things that touch."""
     names = colour_names(cluster.rgb)
     counts = np.bincount(names)
     large = np.flatnonzero(counts >= max(MIN_PIXELS, PART_SHARE * names.size))

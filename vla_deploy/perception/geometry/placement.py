@@ -1,4 +1,4 @@
-"""Place a thing: its middle, size and yaw by the form that its class has, and how sure that is."""
+"""Estimate a thing's middle, size and yaw by the form that its class has, and their errors."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 from vla_deploy.perception.geometry.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.geometry.clusters import Cluster
-from vla_deploy.perception.geometry.forms import TurnedFit, fit_lying, fit_upright, sight_frame
+from vla_deploy.perception.geometry.revolution import (
+    RevolutionFit,
+    fit_lying,
+    fit_upright,
+    sight_frame,
+)
 from vla_deploy.perception.geometry.shapes import MeasuredShape, Rectangle, half_turn, rectangle_of
 from vla_deploy.perception.geometry.uncertainty import (
     UNKNOWN_YAW_SIGMA_RAD,
@@ -25,7 +30,7 @@ ROUND_AGREEMENT = 0.3
 # Share of a pixel that is left in the middle of, and in the distance between, two edges.
 MIDDLE_PX = 0.3
 EXTENT_PX = 0.6
-# What fills its rectangle badly has no clear middle and direction; thin parts of it are not seen.
+# What fills its rectangle badly has no clear middle and direction, since thin parts are not seen.
 FULL_RATIO, RAGGED_RATIO, RAGGED_RAD, SKIRT_RATIO = 0.96, 0.3, 1.0, 0.8
 # A disc fills pi / 4 of its square, and has no direction.
 DISC_SQUARENESS, DISC_FILL_RATIO = 0.85, 0.87
@@ -38,10 +43,10 @@ AXIS_PX = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """Hold where a thing is, in the frame of its cloud; covariance and sigmas are one sigma.
+    """Hold where a thing is, in the frame of its cloud.
 
-    `yaw_sigma_rad` is that of the direction of the sides: which of two like sides is the length is
-    a toss. `size_m` is length along yaw, width, height.
+    `size_m` is length along yaw, width, height. `yaw_sigma_rad` is that of the direction of the
+    sides: of two like sides, either may count as the length.
     """
 
     position_m: Vector
@@ -56,7 +61,7 @@ class Placement:
 class _Spot:
     """Hold a form on the floor plan; the sigmas are along and across `direction_rad`.
 
-    `height_m` is None where the highest points tell it best.
+    `height_m` is None where the highest points give it best.
     """
 
     xy: tuple[float, float]
@@ -88,7 +93,7 @@ class _Sight:
 
 
 def place(cluster: Cluster, shape: MeasuredShape, class_name: str, cloud: Cloud) -> Placement:
-    """Return the place of one thing of a class; "object" where the class is not known."""
+    """Return where a thing of a class is; the class is "object" where it is not known."""
     sight = _Sight(cluster, shape, cloud)
     spot = _lying(sight) if class_name not in NEVER_LIE else None
     spot = spot or FORMS.get(class_name, _block)(sight)
@@ -128,7 +133,7 @@ def _lying(sight: _Sight) -> _Spot | None:
     if not low < sight.shape.height_m / max(base.width_m, 1e-6) < high:
         return None
     sigma_m = DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2
-    best: TurnedFit | None = None
+    best: RevolutionFit | None = None
     for turn in (0.0, math.pi / 2):
         fit = fit_lying(sight.cluster, base.yaw_rad + turn, sight.grain_m, sigma_m)
         if fit is not None and (best is None or fit.agreement > best.agreement):
@@ -149,7 +154,7 @@ def _upright(sight: _Sight) -> _Spot:
 
 
 def _spot(
-    sight: _Sight, fit: TurnedFit, direction_rad: float, width_m: float | None = None
+    sight: _Sight, fit: RevolutionFit, direction_rad: float, width_m: float | None = None
 ) -> _Spot:
     return _Spot(
         xy=fit.xy,
@@ -220,7 +225,7 @@ def _block(sight: _Sight) -> _Spot:
 def _rectangle(sight: _Sight, base: Rectangle) -> _Spot:
     ragged = max(0.0, FULL_RATIO - base.fill_ratio)
     whole = sight.shape.whole
-    # Low parts, such as the blades of keys, are not what one grips, but belong to the thing.
+    # Low parts, such as the blades of keys, are not gripped, but belong to the thing.
     skirt_m = math.dist(base.centre, whole.centre)
     skirt_rad = abs(half_turn(whole.yaw_rad - base.yaw_rad)) if skirt_m > sight.grain_m else 0.0
     middle_m = MIDDLE_PX * sight.grain_m + RAGGED_RATIO * ragged * base.length_m

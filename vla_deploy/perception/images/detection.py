@@ -1,4 +1,4 @@
-"""Find things in an RGB-D image: clusters on supports, named by form and network, with a colour."""
+"""Find things in an RGB-D image: clusters on supports, named by form and detector."""
 
 import math
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ from vla_deploy.perception.geometry.uncertainty import (
 )
 from vla_deploy.perception.geometry.uncertainty import Vector as Vector
 from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.naming.class_fusion import Name, NameSource, fuse_name, name_by_form
 from vla_deploy.perception.naming.classes import OTHER, Form, judge_form
 from vla_deploy.perception.naming.colour import dominant_colour
-from vla_deploy.perception.naming.object_name import Name, NameSource, by_both, by_form
 
 FEW_PIXELS = 60
 FLAT_SIGMAS = 4.0
@@ -44,9 +44,9 @@ class Detection:
     """Hold one thing as one image shows it, in the frame of the cloud.
 
     `position_m` is its centre: for a box that of its rim's rectangle, half its height below the
-    rim. `size_m` is length along yaw, width, height. Of a truncated thing, class and measures are
+    rim. `size_m` is length along yaw, width, height. Class and measures of a truncated thing are
     guesses: the image's border or something nearer hides its end or its top. The covariance of the
-    position and the sigmas of size and yaw say how sure each is; they grow with what is not seen.
+    position and the sigmas of size and yaw grow with what is not seen.
     """
 
     class_name: str
@@ -66,7 +66,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """Hold one image: its points, and what a network saw in it, if there is one at work."""
+    """Hold one image: its points, and what the detector found in it, if there is one at work."""
 
     cloud: Cloud
     network: NetworkView | None
@@ -77,8 +77,7 @@ def detect(
 ) -> list[Detection]:
     """Return the things that stand on the supports, the nearest first.
 
-    Where they are and how large comes from their points alone; what they are, from their form and
-    what a network saw.
+    Place and size come from their points alone, the name from their form and the detector.
     """
     look = _Look(cloud, network)
     clusters = find_clusters(cloud, supports)
@@ -140,15 +139,15 @@ def _name(cluster: Cluster, shape: MeasuredShape, network: NetworkView | None) -
     if shape.height_m <= _least_height_m(cluster):
         form = Form(name=OTHER, fits=frozenset(), impossible=form.impossible)
     if network is None:
-        return by_form(form)
-    words = network.words_for(cluster.box_px)
-    if not words:
-        return by_form(form, network.silence(cluster.box_px, form.name))
-    return by_both(form, words)
+        return name_by_form(form)
+    votes = network.votes_for(cluster.box_px)
+    if not votes:
+        return name_by_form(form, network.recall_at(cluster.box_px, form.name))
+    return fuse_name(form, votes)
 
 
 def _detection(cluster: Cluster, look: _Look) -> Detection:
-    shape = measure(cluster, look.cloud.camera_position, look.cloud.focal_px)
+    shape = measure(cluster, look.cloud.camera_position, look.cloud.camera.fx)
     name = _name(cluster, shape, look.network)
     colour, share = dominant_colour(cluster.rgb[cluster.upper()])
     placed = place(cluster, shape, name.class_name, look.cloud)

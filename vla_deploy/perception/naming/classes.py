@@ -1,6 +1,6 @@
-"""Tell by its measures what a thing is, what it may also be, and what it cannot be.
+"""Classify a thing by its measures: what it is, what it may also be, and what it cannot be.
 
-One table of rules: the first that names and holds gives the name. A second table bounds what a
+Of the table of rules, the first that names and holds gives the name. A second table bounds what a
 thing of a class can measure at all, however it lies.
 """
 
@@ -74,8 +74,7 @@ MEASURES: dict[str, Measure] = {
 class ClassRule:
     """Name a class and bound the measures that it must meet, bounds included.
 
-    A rule that does not `name` by itself only says that a thing looks like one: a can looks like a
-    cup too.
+    A rule that does not give the name only says what a thing may be: a can looks like a cup, too.
     """
 
     name: str
@@ -175,13 +174,13 @@ POSSIBLE: dict[str, dict[str, Range]] = {
     "remote": {"height_m": (0.004, 0.06), "longest_m": (0.08, 0.3)},
 }
 BYSTANDERS: frozenset[str] = frozenset({"person", "chair"})
-"""What stands in the way and is never a thing to take: no thing's form is possible for them."""
+"""Obstacles that are never things to take: no thing's form is possible for them."""
 FURNITURE = "furniture"
-"""What tables, sofas and the like are called: a network's word for it names nothing to take."""
+"""Tables, sofas and the like: a detector's vote for it names nothing to take."""
 
 
 def judge_form(shape: MeasuredShape, *, whole: bool = True) -> Form:
-    """Return what a shape says; of one that is half hidden, only what is too large is certain."""
+    """Return what a shape may be; of a half-hidden one, only what is too large is certain."""
     fits = [rule for rule in RULES if _holds(rule.bounds, shape)]
     return Form(
         name=next((rule.name for rule in fits if rule.names), OTHER),

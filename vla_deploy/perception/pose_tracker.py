@@ -1,4 +1,4 @@
-"""Follow where the robot is: wheels and IMU from step to step, the lidar against the map."""
+"""Track the robot's pose: wheels and IMU from step to step, the lidar against the map."""
 
 from drivers.clock import NS_PER_S
 from drivers.imu.base import ImuSample
@@ -11,23 +11,23 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
-# Without a new yaw for this long, the turn is taken from the wheels.
+# Without a new yaw for this long, the wheels give the turn.
 FRESH_YAW_NS = NS_PER_S // 25
 
 
-class Whereabouts:
-    """Hold the robot's pose in the map."""
+class PoseTracker:
+    """Feed the localiser, and publish the pose."""
 
     def __init__(self, robot: RobotDescription, model: RobotModel, space: SharedSpace) -> None:
-        """Read the map, and begin where an earlier instance in this run left off.
+        """Read the map, and start where an earlier instance in this run ended.
 
         Raises:
             MapInvalid: the robot file's map cannot be used.
         """
-        # Beams already count from the robot's front, whatever way the lidar is turned.
+        # The driver has turned the beams: they count from the robot's front.
         site = model.site_pose(robot.lidar.site, full_positions(robot))
         lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
-        self._localiser = Localiser(_begin(robot, space), load_map(robot.home.map_path), lidar)
+        self._localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
         self._base_stamp_ns = -1
@@ -44,12 +44,12 @@ class Whereabouts:
 
     @property
     def is_lost(self) -> bool:
-        """Return whether the pose says nothing about the map; it moves on with the wheels then."""
+        """Return whether the place on the map is unknown; the pose follows the wheels then."""
         return self._localiser.state is PlaceState.LOST
 
     @property
-    def is_borne_out(self) -> bool:
-        """Return whether the lidar has agreed with the pose since the start, or since its loss."""
+    def is_anchored(self) -> bool:
+        """Return whether the lidar has confirmed the pose since the start, or since its loss."""
         return self._localiser.is_anchored
 
     def pose_at(self, stamp_ns: int) -> Pose2D:
@@ -60,12 +60,12 @@ class Whereabouts:
         """Return where the robot was by dead reckoning alone, which drifts but never jumps."""
         return self._localiser.track_at(stamp_ns)
 
-    def turn(self, newest: ImuSample) -> None:
-        """Take what the IMU says."""
+    def add_imu(self, newest: ImuSample) -> None:
+        """Use a sample of the IMU from the next step on."""
         self._imu_yaw_rad, self._imu_ns = newest.yaw_rad, newest.stamp_ns
 
-    def move(self, now_ns: int) -> None:
-        """Dead-reckon; without wheel odometry the robot is taken to stand still."""
+    def predict(self, now_ns: int) -> None:
+        """Dead-reckon and publish; without wheel odometry the pose stays as it is."""
         sample = self._base_state.latest()
         if sample is not None and sample.stamp_ns != self._base_stamp_ns:
             self._base_stamp_ns = sample.stamp_ns
@@ -84,17 +84,17 @@ class Whereabouts:
         )
 
     def correct(self, scan: Scan) -> None:
-        """Take what the lidar says."""
+        """Correct the pose by a scan."""
         self._localiser.correct(scan.range_m, scan.beam_stamp_ns)
 
     def _fresh_yaw_rad(self, now_ns: int) -> float | None:
-        """Return the IMU's yaw unless it is out of date: a frozen one would hide every turn."""
+        """Return the IMU's yaw unless it is out of date: a frozen one would hide all turns."""
         return self._imu_yaw_rad if now_ns - self._imu_ns <= FRESH_YAW_NS else None
 
 
-def _begin(robot: RobotDescription, space: SharedSpace) -> Pose2D:
-    told = space.cell_reader("pose").latest()
-    if told is not None:
-        return Pose2D(*(float(told.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+    last = space.cell_reader("pose").latest()
+    if last is not None:
+        return Pose2D(*(float(last.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
     start = robot.start_pose
     return Pose2D(start.x_m, start.y_m, start.yaw_rad)

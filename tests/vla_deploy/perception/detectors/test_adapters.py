@@ -10,9 +10,9 @@ from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import ModelStore
+from vla_deploy.perception.detectors.adapters import read_counted, read_end_to_end
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.detector import Detector
-from vla_deploy.perception.detectors.yolo import read_counted, read_end_to_end
 
 COLOURS = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 SCORE, IOU = 0.25, 0.3
