@@ -22,6 +22,7 @@ from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
 from sim_twin.harness.stack import LockstepStack
 from vla_deploy.perception.images.detection import Detection
+from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate
 from vla_deploy.perception.objects.matching import assign
 from vla_deploy.perception.objects.track import Sighting
@@ -239,6 +240,10 @@ def _sighting(at: np.ndarray, number: int, stamp_ns: int) -> Sighting:
         truncated=False,
         occluded=False,
         box_px=(0, 0, 10, 10),
+        covariance_m2=((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4)),
+        size_sigma_m=(0.01, 0.01, 0.01),
+        yaw_sigma_rad=0.1,
+        named_by=NameSource.FORM,
     )
     seen = Estimate(position_m=at, covariance_m2=1e-4 * np.eye(3), stamp_ns=stamp_ns)
     return Sighting(detection, seen)

@@ -27,7 +27,7 @@ from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses, load_world
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
@@ -201,15 +201,16 @@ class Rig:
                 self._tell()
                 self.node.step()
 
-    def cell(self, name: str) -> Any:
+    def sample(self, name: str) -> Sample:
         sample = self.space.cell_reader(name).latest()
         assert sample is not None, f"{name} was never published"
-        return sample.data
+        return sample
+
+    def cell(self, name: str) -> Any:
+        return self.sample(name).data
 
     def scene(self) -> dict[str, Any]:
-        sample = self.space.cell_reader("scene").latest()
-        assert sample is not None
-        return sample.document()
+        return self.sample("scene").document()
 
     def known(self) -> dict[str, dict[str, Any]]:
         return {thing["id"]: thing for thing in self.scene()["objects"]}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.perception.images.detection import Detection
+from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate, covariance_of
 from vla_deploy.perception.objects.track import KNOWN_LOOKS, MAX_ODD_SIGHTINGS, Sighting
 from vla_deploy.perception.objects.tracker import Tracker
@@ -26,6 +27,9 @@ def seen(
         "occluded": False,
         "box_px": (0, 0, 10, 10),
         "covariance_m2": ((9e-6, 0.0, 0.0), (0.0, 9e-6, 0.0), (0.0, 0.0, 9e-6)),
+        "size_sigma_m": (0.003, 0.003, 0.003),
+        "yaw_sigma_rad": 0.1,
+        "named_by": NameSource.FORM,
     }
     return Detection(**(fields | changes))
 
@@ -50,6 +54,14 @@ class Watcher:
         stamp_ns = self.images * 200_000_000
         self.tracker.update([sighting(one, stamp_ns) for one in detections], clear, stamp_ns)
         return [track.document() for track in self.tracker.objects]
+
+
+def knowing(*detections: Detection) -> Watcher:
+    """Return a watcher that has confirmed some things."""
+    watcher = Watcher()
+    watcher.image(*detections)
+    watcher.image(*detections)
+    return watcher
 
 
 def test_a_thing_is_believed_at_the_second_sight() -> None:
@@ -94,9 +106,7 @@ def test_a_wrong_class_now_and_then_changes_nothing() -> None:
 
 
 def test_what_is_hidden_stays_in_memory() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(50):
         objects = watcher.image(in_view=False)
     assert [o["id"] for o in objects] == ["cup_1"]
@@ -104,18 +114,14 @@ def test_what_is_hidden_stays_in_memory() -> None:
 
 
 def test_what_has_left_its_place_is_forgotten_after_several_clear_views() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(4):
         assert watcher.image() != []
     assert watcher.image() == []
 
 
 def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(6):
         watcher.image()
     elsewhere = seen(at=(4.0, 0.5, 0.6))
@@ -126,9 +132,7 @@ def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
 
 
 def test_a_thing_that_is_pushed_in_view_keeps_its_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     pushed = seen(at=(1.4, 2.0, 0.5))
     watcher.image(pushed)
     (cup,) = watcher.image(pushed)
@@ -137,9 +141,7 @@ def test_a_thing_that_is_pushed_in_view_keeps_its_id() -> None:
 
 
 def test_another_colour_is_another_thing() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(8):
         objects = watcher.image(seen(colour="blue", at=(1.09, 2.0, 0.5)))
     assert [(o["id"], o["colour"]) for o in objects] == [("cup_2", "blue")]
@@ -158,10 +160,8 @@ def test_a_truncated_sight_makes_no_thing_but_keeps_one_alive() -> None:
 
 
 def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for i in range(20):
         watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.5 + 0.02 * i), 0)
         objects = watcher.image(pair[1])
@@ -170,9 +170,7 @@ def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
 
 
 def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("right", "ball", (1.0, 2.0, 0.6), 0)
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 1.2), 0)
     (cup,) = watcher.image(seen())
@@ -225,10 +223,8 @@ def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
 
 
 def test_half_hidden_sights_of_its_box_make_a_cup_no_larger() -> None:
-    watcher = Watcher()
     cup, box = seen(), seen("box", "orange", size_m=(0.24, 0.24, 0.13))
-    watcher.image(cup, box)
-    watcher.image(cup, box)
+    watcher = knowing(cup, box)
     wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
     shard = seen("object", "orange", at=(1.02, 2.0, 0.5), size_m=(0.16, 0.08, 0.1), truncated=True)
     for _ in range(30):
@@ -293,9 +289,7 @@ def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
 
 
 def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_old_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(20):
         watcher.image(in_view=False)
     elsewhere = seen(at=(4.0, 0.5, 0.6))
@@ -325,10 +319,8 @@ def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_
 
 
 def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(4.0, 0.5, 0.6)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for _ in range(6):
         objects = watcher.image(pair[1])
     assert [(o["id"], o.get("aliases")) for o in objects] == [("cup_2", None)]
@@ -344,9 +336,7 @@ def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
     ],
 )
 def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], why: str) -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(6):
         watcher.image()
     other = seen(**({"at": (2.0, 2.0, 0.5)} | changes))
@@ -356,10 +346,8 @@ def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], 
 
 
 def test_a_hand_keeps_what_it_took_when_it_passes_another_one_like_it() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for step in range(16):
         watcher.tracker.carry("left", "cup", (1.0 + 0.02 * step, 2.0, 0.62), 0)
         objects = watcher.image(pair[1])
@@ -368,9 +356,7 @@ def test_a_hand_keeps_what_it_took_when_it_passes_another_one_like_it() -> None:
 
 
 def test_what_was_let_go_is_found_where_it_has_come_to_rest() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("left", "cup", (3.0, 1.0, 0.6), 0)
     watcher.tracker.release("left")
     (cup,) = watcher.image(seen(at=(3.02, 1.0, 0.52)))
@@ -398,9 +384,7 @@ def test_the_memory_of_tracks_is_bounded() -> None:
     ids=["another thing", "no known thing", "another colour"],
 )
 def test_what_a_hand_has_lost_is_not_found_in_whatever_else_lies_there(other: Detection) -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.6), 500_000_000)
     watcher.tracker.lose("left", "it slipped out")
     for _ in range(3):

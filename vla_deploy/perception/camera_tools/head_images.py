@@ -1,4 +1,4 @@
-"""Give images of the head's camera with joints and depth: of a running robot, or of a folder."""
+"""Read images of the head's camera with joints and depth, from a running robot or a folder."""
 
 import json
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ from vla_deploy.robots.schema import is_number
 
 Array = NDArray[np.float64]
 JOINTS_FILE: Final = "joints.json"
-# A head that turns or shakes gives images of no known pose.
+# Of a head that turns or shakes, the pose is not known well enough.
 _STILL_RAD: Final = 0.002
 _STILL_NS: Final = NS_PER_S // 4
 _JOINTS_GAP_NS: Final = NS_PER_S // 10

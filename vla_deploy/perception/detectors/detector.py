@@ -34,11 +34,6 @@ class Detector:
         self._outputs = [tensor.name for tensor in session.model.manifest.outputs]
 
     @property
-    def classes(self) -> tuple[str, ...]:
-        """Return what the class numbers of boxes mean."""
-        return self._detection.classes
-
-    @property
     def detection(self) -> DetectionOutputs:
         """Return how its outputs are read, and how good it was measured to be."""
         return self._detection
@@ -80,7 +75,7 @@ class Detector:
 
     def _check(self, boxes: Boxes) -> None:
         """Refuse classes and scores that cannot be."""
-        name, count = self._session.model.manifest.name, len(self.classes)
+        name, count = self._session.model.manifest.name, len(self._detection.classes)
         if not len(boxes):
             return
         if boxes.classes.min() < 0 or boxes.classes.max() >= count:

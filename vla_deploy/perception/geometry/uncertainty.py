@@ -19,14 +19,7 @@ Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
-UNKNOWN_SIGMA_M = 0.05
-UNKNOWN_MATRIX: Matrix = (
-    (UNKNOWN_SIGMA_M**2, 0.0, 0.0),
-    (0.0, UNKNOWN_SIGMA_M**2, 0.0),
-    (0.0, 0.0, UNKNOWN_SIGMA_M**2),
-)
-UNKNOWN_SIZE_SIGMA_M: Vector = (UNKNOWN_SIGMA_M, UNKNOWN_SIGMA_M, UNKNOWN_SIGMA_M)
-# That of a direction of which nothing is known: evenly spread over half a turn.
+# Of an unknown direction: evenly spread over half a turn.
 UNKNOWN_YAW_SIGMA_RAD = math.pi / math.sqrt(12.0)
 
 FLOOR_M = 0.0008

@@ -21,9 +21,6 @@ from vla_deploy.perception.geometry.shapes import (
 )
 from vla_deploy.perception.geometry.supports import Support
 from vla_deploy.perception.geometry.uncertainty import (
-    UNKNOWN_MATRIX,
-    UNKNOWN_SIZE_SIGMA_M,
-    UNKNOWN_YAW_SIGMA_RAD,
     Matrix,
 )
 from vla_deploy.perception.geometry.uncertainty import Vector as Vector
@@ -58,14 +55,14 @@ class Detection:
     truncated: bool
     occluded: bool
     box_px: tuple[int, int, int, int]
-    covariance_m2: Matrix = UNKNOWN_MATRIX
-    size_sigma_m: Vector = UNKNOWN_SIZE_SIGMA_M
-    yaw_sigma_rad: float = UNKNOWN_YAW_SIGMA_RAD
-    named_by: NameSource = NameSource.FORM
+    covariance_m2: Matrix
+    size_sigma_m: Vector
+    yaw_sigma_rad: float
+    named_by: NameSource
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
+class _View:
     """Hold one image: its points, and what the detector found in it, if there is one at work."""
 
     cloud: Cloud
@@ -79,10 +76,10 @@ def detect(
 
     Place and size come from their points alone, the name from their form and the detector.
     """
-    look = _Look(cloud, network)
+    view = _View(cloud, network)
     clusters = find_clusters(cloud, supports)
     clusters.sort(key=lambda cluster: cluster.depth_m)
-    found = [detection for cluster in clusters for detection in _detections(cluster, look)]
+    found = [detection for cluster in clusters for detection in _detections(cluster, view)]
     boxes = [detection for detection in found if detection.class_name == "box"]
     return [
         detection
@@ -104,18 +101,18 @@ def _is_bare_face(detection: Detection) -> bool:
     return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
 
 
-def _detections(cluster: Cluster, look: _Look) -> list[Detection]:
+def _detections(cluster: Cluster, view: _View) -> list[Detection]:
     """Return one thing, or several that touch where each part by itself is a known one."""
-    whole = _detection(cluster, look)
+    whole = _detection(cluster, view)
     if whole.class_name == "box":
-        return [whole, *_contents(whole, cluster, look)]
+        return [whole, *_contents(whole, cluster, view)]
     if whole.named_by in (NameSource.FORM, NameSource.BOTH):
         return [whole]
-    parts = [_detection(part, look) for part in split_by_colour(cluster, look.cloud)]
+    parts = [_detection(part, view) for part in split_by_colour(cluster, view.cloud)]
     return [whole] if any(part.class_name == OTHER for part in parts) else parts
 
 
-def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
+def _contents(box: Detection, cluster: Cluster, view: _View) -> list[Detection]:
     """Return the known things that stand within a box's walls.
 
     Between its walls a corner of the rim may show a pixel of its own, which belongs to nothing.
@@ -124,8 +121,8 @@ def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
     length_m, width_m, _ = box.size_m
     rim = Rectangle(centre=(x, y), length_m=length_m, width_m=width_m, yaw_rad=box.yaw_rad)
     within = inside_rectangle(cluster.points[:, :2], rim, WALL_M)
-    parts = split_apart(cluster, look.cloud, within & (cluster.heights > BOX_FLOOR_M))
-    contents = (_detection(part, look) for part in parts)
+    parts = split_apart(cluster, view.cloud, within & (cluster.heights > BOX_FLOOR_M))
+    contents = (_detection(part, view) for part in parts)
     return [one for one in contents if one.class_name != OTHER and one.colour != box.colour]
 
 
@@ -146,11 +143,11 @@ def _name(cluster: Cluster, shape: MeasuredShape, network: NetworkView | None) -
     return fuse_name(form, votes)
 
 
-def _detection(cluster: Cluster, look: _Look) -> Detection:
-    shape = measure(cluster, look.cloud.camera_position, look.cloud.camera.fx)
-    name = _name(cluster, shape, look.network)
+def _detection(cluster: Cluster, view: _View) -> Detection:
+    shape = measure(cluster, view.cloud.camera_position, view.cloud.camera.fx)
+    name = _name(cluster, shape, view.network)
     colour, share = dominant_colour(cluster.rgb[cluster.upper()])
-    placed = place(cluster, shape, name.class_name, look.cloud)
+    placed = place(cluster, shape, name.class_name, view.cloud)
     enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
     whole = 0.6 if cluster.truncated or cluster.occluded else 1.0
     return Detection(

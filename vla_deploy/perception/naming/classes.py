@@ -16,24 +16,8 @@ SPHERE_RESIDUAL = 0.06
 SPHERE_SIZE = (0.75, 1.3)
 
 
-def _flatness(shape: MeasuredShape) -> float:
-    return shape.height_m / max(shape.footprint.width_m, 1e-6)
-
-
-def _slenderness(shape: MeasuredShape) -> float:
-    return shape.height_m / max(shape.across_m, 1e-6)
-
-
-def _top_ratio(shape: MeasuredShape) -> float:
-    return shape.top.width_m / max(shape.across_m, 1e-6)
-
-
-def _rim_ratio(shape: MeasuredShape) -> float:
-    return shape.top.width_m / max(shape.footprint.width_m, 1e-6)
-
-
-def _squareness(shape: MeasuredShape) -> float:
-    return shape.footprint.width_m / max(shape.footprint.length_m, 1e-6)
+def _ratio(length_m: float, other_m: float) -> float:
+    return length_m / max(other_m, 1e-6)
 
 
 def _roundness(shape: MeasuredShape) -> float:
@@ -48,23 +32,19 @@ def _roundness(shape: MeasuredShape) -> float:
     return 1.0 if agrees else 0.0
 
 
-def _longest_m(shape: MeasuredShape) -> float:
-    return max(shape.height_m, shape.across_m, shape.footprint.length_m)
-
-
 MEASURES: dict[str, Measure] = {
     "height_m": lambda shape: shape.height_m,
-    "longest_m": _longest_m,
+    "longest_m": lambda shape: max(shape.height_m, shape.across_m, shape.footprint.length_m),
     "across_m": lambda shape: shape.across_m,
     "length_m": lambda shape: shape.footprint.length_m,
     "width_m": lambda shape: shape.footprint.width_m,
     "hole_m": lambda shape: shape.hole_m,
-    "flatness": _flatness,
-    "slenderness": _slenderness,
-    "squareness": _squareness,
-    "top_ratio": _top_ratio,
+    "flatness": lambda shape: _ratio(shape.height_m, shape.footprint.width_m),
+    "slenderness": lambda shape: _ratio(shape.height_m, shape.across_m),
+    "squareness": lambda shape: _ratio(shape.footprint.width_m, shape.footprint.length_m),
+    "top_ratio": lambda shape: _ratio(shape.top.width_m, shape.across_m),
     "rim_m": lambda shape: shape.top.width_m,
-    "rim_ratio": _rim_ratio,
+    "rim_ratio": lambda shape: _ratio(shape.top.width_m, shape.footprint.width_m),
     "rim_share": lambda shape: shape.rim_share,
     "roundness": _roundness,
 }

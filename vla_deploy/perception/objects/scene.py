@@ -44,7 +44,6 @@ class Scene:
         self._tracker = Tracker()
         self._book = SurfaceBook(furniture)
         self.stamp_ns = 0
-        self.detections: list[Detection] = []
         self._surfaces: list[dict[str, Any]] = []
         self._bystanders: list[Bystander] = []
         self._hands: dict[str, dict[str, Any]] = {}
@@ -73,7 +72,6 @@ class Scene:
         self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)
         sightings = [_sighting(detection, base, stamp_ns) for detection in found]
-        self.detections = [sighting.detection for sighting in sightings]
         self._bystanders = find_bystanders(cloud, network, base)
         in_view = [
             track

@@ -124,7 +124,7 @@ def test_outputs_of_another_shape_fail_the_frame_and_nothing_else(
 def test_a_tier_names_the_model_and_the_last_one_is_the_smallest(shelf, profile, tier, name):
     detector = open_detector(shelf, profile, tier)
     assert (detector.stats().model, detector.stats().variant) == (name, Variant.INT8_U8S8)
-    assert detector.classes == ("red", "green", "blue")
+    assert detector.detection.classes == ("red", "green", "blue")
 
 
 def test_a_profile_without_a_detector_is_told(shelf, profile):
