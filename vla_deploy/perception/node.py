@@ -77,7 +77,8 @@ class PerceptionNode:
         executor = InlineExecutor() if executor is None else executor
         self._worker = DetectorWorker(executor, context.clock)
         furniture = furniture_points(robot.places)
-        self._pipeline = ImagePipeline(self._body, self._pose_tracker, self._worker, furniture)
+        localiser = self._pose_tracker.localiser
+        self._pipeline = ImagePipeline(self._body, localiser, self._worker, furniture)
         self._restore_scene()
         self._rate_ratio = 1.0
         self._next_image_ns = 0
@@ -183,7 +184,7 @@ class PerceptionNode:
 
     def _publish_obstacles(self, period_s: float) -> None:
         """Publish what stands around the base; the stamp is that of the present pose."""
-        pose, now_ns = self._pose_tracker.pose, self._clock.now_ns()
+        pose, now_ns = self._pose_tracker.localiser.pose, self._clock.now_ns()
         points = self._pipeline.obstacles.around(pose, now_ns)
         padded = np.zeros((3, OBSTACLE_POINTS), dtype=np.float32)
         padded[:, : len(points)] = points.T

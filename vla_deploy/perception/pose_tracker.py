@@ -5,7 +5,6 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
@@ -16,7 +15,7 @@ FRESH_YAW_NS = NS_PER_S // 25
 
 
 class PoseTracker:
-    """Feed the localiser, and publish the pose."""
+    """Feed the `localiser` from the topics and the sensors, and publish the pose."""
 
     def __init__(self, robot: RobotDescription, model: RobotModel, space: SharedSpace) -> None:
         """Read the map, and start where an earlier instance in this run ended.
@@ -27,7 +26,7 @@ class PoseTracker:
         # The driver has turned the beams: they count from the robot's front.
         site = model.site_pose(robot.lidar.site, full_positions(robot))
         lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
-        self._localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
+        self.localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
         self._base_stamp_ns = -1
@@ -36,29 +35,6 @@ class PoseTracker:
         """Open the topics."""
         self._base_state: CellReader = space.cell_reader("base_state")
         self._writer: CellWriter = space.cell_writer("pose")
-
-    @property
-    def pose(self) -> Pose2D:
-        """Return where the robot is now."""
-        return self._localiser.pose
-
-    @property
-    def is_lost(self) -> bool:
-        """Return whether the place on the map is unknown; the pose follows the wheels then."""
-        return self._localiser.state is PlaceState.LOST
-
-    @property
-    def is_anchored(self) -> bool:
-        """Return whether the lidar has confirmed the pose since the start, or since its loss."""
-        return self._localiser.is_anchored
-
-    def pose_at(self, stamp_ns: int) -> Pose2D:
-        """Return where the robot was at a moment of the last seconds."""
-        return self._localiser.pose_at(stamp_ns)
-
-    def track_at(self, stamp_ns: int) -> Pose2D:
-        """Return where the robot was by dead reckoning alone, which drifts but never jumps."""
-        return self._localiser.track_at(stamp_ns)
 
     def add_imu(self, newest: ImuSample) -> None:
         """Use a sample of the IMU from the next step on."""
@@ -71,21 +47,21 @@ class PoseTracker:
             self._base_stamp_ns = sample.stamp_ns
             data = sample.data
             odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
-            self._localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
-        pose = self._localiser.pose
+            self.localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
+        pose = self.localiser.pose
         self._writer.put(
             x_m=pose.x_m,
             y_m=pose.y_m,
             yaw_rad=pose.yaw_rad,
-            match_ratio=self._localiser.match_ratio,
-            covariance=self._localiser.covariance.ravel(),
-            state=self._localiser.state,
-            doubt=self._localiser.doubt,
+            match_ratio=self.localiser.match_ratio,
+            covariance=self.localiser.covariance.ravel(),
+            state=self.localiser.state,
+            doubt=self.localiser.doubt,
         )
 
     def correct(self, scan: Scan) -> None:
         """Correct the pose by a scan."""
-        self._localiser.correct(scan.range_m, scan.beam_stamp_ns)
+        self.localiser.correct(scan.range_m, scan.beam_stamp_ns)
 
     def _fresh_yaw_rad(self, now_ns: int) -> float | None:
         """Return the IMU's yaw unless it is out of date: a frozen one would hide all turns."""

@@ -64,7 +64,7 @@ def knowing(*detections: Detection) -> Watcher:
     return watcher
 
 
-def test_a_thing_is_believed_at_the_second_sight() -> None:
+def test_a_thing_is_believed_at_the_second_sighting() -> None:
     watcher = Watcher()
     assert watcher.image(seen()) == []
     (cup,) = watcher.image(seen())
@@ -73,7 +73,7 @@ def test_a_thing_is_believed_at_the_second_sight() -> None:
     assert cup["last_seen_ns"] == 400_000_000
 
 
-def test_one_false_sight_is_forgotten() -> None:
+def test_one_false_sighting_is_forgotten() -> None:
     watcher = Watcher()
     watcher.image(seen())
     watcher.image()
@@ -147,7 +147,7 @@ def test_another_colour_is_another_thing() -> None:
     assert [(o["id"], o["colour"]) for o in objects] == [("cup_2", "blue")]
 
 
-def test_a_truncated_sight_makes_no_thing_but_keeps_one_alive() -> None:
+def test_a_truncated_sighting_makes_no_thing_but_keeps_one_alive() -> None:
     watcher = Watcher()
     for _ in range(3):
         assert watcher.image(seen(truncated=True)) == []
@@ -177,7 +177,7 @@ def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
     assert cup["position_m"] == [1.0, 2.0, 0.5]
 
 
-def test_a_vague_sight_begins_no_track() -> None:
+def test_a_vague_sighting_begins_no_track() -> None:
     watcher = Watcher()
     for _ in range(4):
         objects = watcher.image(seen("object", "brown", occluded=True))
@@ -202,7 +202,7 @@ def test_a_thing_never_surely_recognised_is_no_known_thing() -> None:
     assert thing["class"] == "object"
 
 
-def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
+def test_a_box_seen_better_from_near_replaces_its_far_sighting() -> None:
     watcher = Watcher()
     far = seen("box", "brown", at=(4.14, 0.52, 0.475), size_m=(0.28, 0.145, 0.11))
     near = seen("box", "orange", at=(4.21, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
@@ -213,7 +213,7 @@ def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
     assert [(box["id"], box["colour"]) for box in boxes] == [("box_1", "orange")]
 
 
-def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
+def test_a_half_hidden_second_sighting_of_a_box_is_no_second_box() -> None:
     watcher = Watcher()
     box = seen("box", "orange", at=(4.2, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
     part = seen("box", "orange", at=(4.14, 0.46, 0.49), size_m=(0.24, 0.14, 0.13), occluded=True)
@@ -222,7 +222,7 @@ def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
     assert [one["id"] for one in boxes] == ["box_1"]
 
 
-def test_half_hidden_sights_of_its_box_make_a_cup_no_larger() -> None:
+def test_half_hidden_sightings_of_its_box_make_a_cup_no_larger() -> None:
     cup, box = seen(), seen("box", "orange", size_m=(0.24, 0.24, 0.13))
     watcher = knowing(cup, box)
     wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
@@ -254,8 +254,8 @@ def test_a_size_that_was_wrong_from_the_start_is_given_up() -> None:
     assert cup["size_m"] == pytest.approx([0.066, 0.066, 0.095], rel=0.1)
 
 
-def test_crossing_sights_of_two_alike_things_are_shared_out_as_a_whole() -> None:
-    """The nearest pair alone would leave the second thing without its sight."""
+def test_crossing_sightings_of_two_alike_things_are_shared_out_as_a_whole() -> None:
+    """The nearest pair alone would leave the second thing without its sighting."""
     watcher = Watcher()
     pair = (seen(at=(1.0, 2.0, 0.5)), seen(at=(1.05, 2.0, 0.5)))
     for _ in range(4):
@@ -285,7 +285,7 @@ def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
     assert max(cup["sigma_m"]) < 0.015
     for _ in range(300):
         (later,) = watcher.image(in_view=False)
-    assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `grown` tells of the present
+    assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `predicted` is of the present
 
 
 def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_old_id() -> None:

@@ -1,5 +1,6 @@
 """Segment what stands on a support into separate things."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -140,28 +141,15 @@ def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
     return numbered
 
 
-def part_of(cluster: Cluster, cloud: Cloud, member: Mask) -> Cluster | None:
-    """Return a part of a cluster as one of its own, or None where it is too small."""
-    if np.count_nonzero(member) < MIN_PIXELS:
-        return None
-    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
-    heights.flat[cluster.pixels] = cluster.heights
-    return _cluster(cloud, cluster.support, heights, cluster.pixels[member])
-
-
 def split_apart(cluster: Cluster, cloud: Cloud, member: Mask) -> list[Cluster]:
-    """Return what of a part of a cluster stands apart, seen from above; specks are left out."""
+    """Split a part of a cluster into what does not touch, seen from above; drop the small rest."""
     chosen = np.flatnonzero(member)
     if chosen.size < MIN_PIXELS:
         return []
     xy, heights = cluster.points[chosen, :2], cluster.heights[chosen]
     labels = _label(xy, heights, _cell_m(cluster.depth_m))
-    parts = []
-    for label in np.flatnonzero(np.bincount(labels) >= MIN_PIXELS):
-        mask = np.zeros_like(member)
-        mask[chosen[labels == label]] = True
-        parts.append(part_of(cluster, cloud, mask))
-    return [part for part in parts if part is not None]
+    numbers = np.flatnonzero(np.bincount(labels) >= MIN_PIXELS)
+    return _parts(cluster, cloud, (chosen[labels == number] for number in numbers))
 
 
 def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
@@ -171,8 +159,14 @@ def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
     large = np.flatnonzero(counts >= max(MIN_PIXELS, PART_SHARE * names.size))
     if large.size < 2:
         return [cluster]
-    parts = [part_of(cluster, cloud, names == name) for name in large]
-    return [part for part in parts if part is not None]
+    return _parts(cluster, cloud, (np.flatnonzero(names == name) for name in large))
+
+
+def _parts(cluster: Cluster, cloud: Cloud, parts: Iterable[NDArray[np.intp]]) -> list[Cluster]:
+    """Return clusters of some of a cluster's points each, given by their indices."""
+    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
+    heights.flat[cluster.pixels] = cluster.heights
+    return [_cluster(cloud, cluster.support, heights, cluster.pixels[part]) for part in parts]
 
 
 def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np.intp]) -> Cluster:

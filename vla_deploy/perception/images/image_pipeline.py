@@ -7,6 +7,8 @@ import numpy as np
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
+from vla_deploy.navigation.localising.localisation import Localiser
+from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.geometry.rotation import angle_rad
@@ -17,7 +19,6 @@ from vla_deploy.perception.images.network_view import as_pinhole, to_camera_imag
 from vla_deploy.perception.objects.body_state import Array, BodyState
 from vla_deploy.perception.objects.near_obstacles import NearObstacles
 from vla_deploy.perception.objects.scene import Scene
-from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.world.surfaces import Point
 
 # Things are placed by images before whose exposure the camera was nearly still.
@@ -31,14 +32,14 @@ class ImagePipeline:
     def __init__(
         self,
         body: BodyState,
-        pose_tracker: PoseTracker,
+        localiser: Localiser,
         worker: DetectorWorker,
         furniture: Mapping[str, Point],
     ) -> None:
         self.scene = Scene(furniture)
         self.obstacles = NearObstacles()
         self._body = body
-        self._pose_tracker = pose_tracker
+        self._localiser = localiser
         self._worker = worker
         self._monitor = FrameMonitor()
         self._waiting: tuple[PosedImage, GeometryGrid] | None = None
@@ -53,7 +54,7 @@ class ImagePipeline:
         if positions is None:
             return False
         # By dead reckoning: a robot that finds out where it really is has not moved its camera.
-        track = self._pose_tracker.track_at(frame.stamp_ns)
+        track = self._localiser.track_at(frame.stamp_ns)
         view = self._body.view_rotation(frame.stamp_ns, track)
         verdict = self._monitor.judge(frame, frame.depth_m(), view, track)
         if verdict.use < ImageUse.OBSTACLES:
@@ -64,7 +65,7 @@ class ImagePipeline:
         hands = self._body.hands(positions, frame.stamp_ns)
         self.obstacles.update(image, [np.array(one.grip) for one in hands if one.hold.kind])
         # A pose that the lidar has not confirmed yet would put things where they never were.
-        is_placed = turn_rad_s <= MAX_CAMERA_TURN_RAD_S and self._pose_tracker.is_anchored
+        is_placed = turn_rad_s <= MAX_CAMERA_TURN_RAD_S and self._localiser.is_anchored
         if is_placed and verdict.use >= ImageUse.FORM and self._waiting is None:
             self._waiting = (image, grid)
             if verdict.use >= ImageUse.ALL:
@@ -82,7 +83,7 @@ class ImagePipeline:
 
     def move_held(self, positions: Array, now_ns: int) -> None:
         """Move the things that hands hold, as reported and felt, along with the hands."""
-        pose = self._pose_tracker.pose
+        pose = self._localiser.pose
         for hand in self._body.hands(positions, now_ns):
             self.scene.hold(hand.name, hand.hold, hand.grip, pose, now_ns)
 
@@ -91,11 +92,12 @@ class ImagePipeline:
 
         The robot's own pose is in it as long as it is not lost.
         """
-        pose = self._pose_tracker.pose
+        pose = self._localiser.pose
+        is_lost = self._localiser.state is PlaceState.LOST
         robot = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
         return {
             **self.scene.document(),
-            "robot": None if self._pose_tracker.is_lost else robot,
+            "robot": None if is_lost else robot,
             "sight": self._worker.document(),
             "image": self._monitor.document(now_ns),
         }
@@ -107,7 +109,7 @@ class ImagePipeline:
             camera=frame.intrinsics,
             base_from_camera=self._body.camera_pose(positions),
             body=self._body.mask(positions, frame.intrinsics),
-            base=self._pose_tracker.pose_at(frame.stamp_ns),
+            base=self._localiser.pose_at(frame.stamp_ns),
             stamp_ns=frame.stamp_ns,
             aim_sigma_rad=aim_sigma_rad(turn_rad_s),
         )
@@ -115,5 +117,5 @@ class ImagePipeline:
     def _camera_turn_rad_s(self, view: Array, stamp_ns: int) -> float:
         """Return how fast the camera turned up to a moment."""
         before_ns = stamp_ns - STILL_WINDOW_NS
-        before = self._body.view_rotation(before_ns, self._pose_tracker.track_at(before_ns))
+        before = self._body.view_rotation(before_ns, self._localiser.track_at(before_ns))
         return angle_rad(before.T @ view) * NS_PER_S / STILL_WINDOW_NS
