@@ -47,9 +47,9 @@ def _still_costs(tracks: list[Track], sightings: list[Sighting], stamp_ns: int) 
         for column, sighting in enumerate(sightings):
             if costs[row, column] >= GATE:
                 continue
-            is_alike = not sighting.is_doubtful and track.is_like(sighting.detection)
-            if track.cause and not is_alike:
-                # A lost thing may be anywhere near, as much else is: only a clear view is it.
+            if track.cause and (sighting.is_doubtful or not track.is_like(sighting.detection)):
+                # A lost thing may be anywhere near, and so may others: half-hidden or unlike ones
+                # are not taken for it.
                 costs[row, column] = GATE
             elif not sighting.is_doubtful:
                 costs[row, column] += _unlikeness(track, sighting)

@@ -1,7 +1,7 @@
 """Track things in the map frame: the same thing keeps its id from one image to the next.
 
-A thing that appears keeps the id of one that has left its place, if class, colour and about the
-size are the same and nobody would have had to run to bring it there.
+A thing that appears keeps the id of one that has left its place, if class and colour are
+the same, the size is similar, and a person could have carried it there in the time.
 """
 
 import math
@@ -84,7 +84,7 @@ class Tracker:
             if id(sighting) not in taken and _is_sure(sighting) and not self._is_part(sighting):
                 self._tracks.append(new_track(sighting, stamp_ns))
         self._forget()
-        self._drop_doubles([track for track, _, _ in pairs])
+        self._merge_duplicates([track for track, _, _ in pairs])
         for track in list(self._tracks):
             if not track.object_id and _is_confirmed(track):
                 self._identify(track)
@@ -187,7 +187,7 @@ class Tracker:
             inherit_identity(min(younger, key=lambda one: gap_m(gone, one)), gone)
         return bool(younger)
 
-    def _drop_doubles(self, seen: list[Track]) -> None:
+    def _merge_duplicates(self, seen: list[Track]) -> None:
         """Merge unseen tracks into the ones seen now that are alike in the same place."""
         for track in seen:
             for other in [one for one in self._tracks if one not in seen]:
