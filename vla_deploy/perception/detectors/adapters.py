@@ -26,11 +26,7 @@ def raw_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iter
     """Find why this is no output (1, 4 + classes, boxes), or that transposed."""
     channels = _COORDINATES + len(detection.classes)
     shapes = [tensor.shape for tensor in outputs]
-    if (
-        len(shapes) != 1
-        or len(shapes[0]) != 3
-        or not any(_is(one, channels) for one in shapes[0][1:])
-    ):
+    if not any(_fit(shapes, one) for one in ((None, channels, None), (None, None, channels))):
         yield (
             f"expected one output [1, {channels}, boxes]: 4 coordinates and "
             f"{len(detection.classes)} classes, got {_shown(shapes)}; is the list of classes right?"
@@ -65,7 +61,7 @@ def read_raw(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
 def end_to_end_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why this is no output (1, boxes, 6)."""
     shapes = [tensor.shape for tensor in outputs]
-    if len(shapes) != 1 or len(shapes[0]) != 3 or not _is(shapes[0][2], _END_TO_END):
+    if not _fit(shapes, (None, None, _END_TO_END)):
         yield (
             f"expected one output [1, boxes, {_END_TO_END}]: corners, score, class; "
             f"got {_shown(shapes)}"
@@ -88,12 +84,8 @@ def read_end_to_end(outputs: Outputs, detection: DetectionOutputs) -> Boxes:
 def counted_faults(outputs: tuple[Tensor, ...], detection: DetectionOutputs) -> Iterator[str]:
     """Find why these are not the outputs count, boxes (1, n, 4), scores (1, n), classes (1, n)."""
     shapes = [tensor.shape for tensor in outputs]
-    fits = (
-        [len(shape) for shape in shapes[1:]] == [3, 2, 2]
-        and len(shapes[0]) in (1, 2)
-        and _is(shapes[1][2], _COORDINATES)
-    )
-    if not fits:
+    others = ((None, None, _COORDINATES), (None, None), (None, None))
+    if not any(_fit(shapes, count, *others) for count in ((None,), (None, None))):
         yield (
             "expected four outputs in this order: count [1, 1], boxes [1, n, 4], scores [1, n], "
             f"classes [1, n]; got {_shown(shapes)}"
@@ -126,9 +118,13 @@ def _class_numbers(values: NDArray[Any]) -> NDArray[np.intp]:
     return np.where(finite, np.rint(np.where(finite, values, 0)), -1).astype(np.intp)
 
 
-def _is(dimension: Dimension, size: int) -> bool:
-    """Return whether a dimension may have a size: one that is free may."""
-    return isinstance(dimension, str) or dimension == size
+def _fit(shapes: list[tuple[Dimension, ...]], *expected: tuple[int | None, ...]) -> bool:
+    """Return whether shapes are as expected; None fits every size, a free dimension, too."""
+    return [len(shape) for shape in shapes] == [len(shape) for shape in expected] and all(
+        size is None or isinstance(dimension, str) or dimension == size
+        for shape, sizes in zip(shapes, expected, strict=True)
+        for dimension, size in zip(shape, sizes, strict=True)
+    )
 
 
 def _shown(shapes: list[tuple[Dimension, ...]]) -> str:

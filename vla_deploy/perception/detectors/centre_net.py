@@ -1,6 +1,7 @@
 """Read the maps of a centre network: peaks of the heat are things, with the distances of edges."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,8 +73,7 @@ def decode(
 def _within(boxes: Boxes, width_px: float, height_px: float) -> Boxes:
     """Return the boxes cut off at the image's borders."""
     border = np.array([width_px, height_px] * 2, dtype=np.float32)
-    corners: Floats = boxes.corners_px.clip(0.0, border)
-    return Boxes(corners_px=corners, scores=boxes.scores, classes=boxes.classes)
+    return replace(boxes, corners_px=boxes.corners_px.clip(0.0, border))
 
 
 def _peaks(heat: Floats, score_threshold: float) -> tuple[Indices, Indices, Indices]:

@@ -1,7 +1,7 @@
 """Turn an image into a detector's input, and its boxes back into the image."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import cv2
@@ -35,8 +35,7 @@ class InputPlacement:
         border = np.array([self.width_px, self.height_px] * 2, dtype=np.float32)
         corners: Floats = ((boxes.corners_px - offset) / scale).clip(0.0, border)
         inside = (corners[:, 2] > corners[:, 0]) & (corners[:, 3] > corners[:, 1])
-        moved = Boxes(corners_px=corners, scores=boxes.scores, classes=boxes.classes)
-        return moved.where(inside)
+        return replace(boxes, corners_px=corners).where(inside)
 
 
 def fit_image(rgb: Image, image: ImageInput, dtype: str) -> tuple[NDArray[Any], InputPlacement]:
