@@ -22,8 +22,9 @@ from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
 from sim_twin.harness.stack import LockstepStack
 from vla_deploy.perception.images.detection import Detection
-from vla_deploy.perception.objects.assignment import assign
+from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.matching import assign
 from vla_deploy.perception.objects.track import Sighting
 from vla_deploy.perception.objects.tracker import Tracker
 from vla_deploy.world import Snapshot, read_snapshot, relations_of
@@ -216,7 +217,7 @@ def _update_cost(seed: int) -> dict[str, Any]:
             for number, at in enumerate(places)
         ]
         began_s = time.thread_time()
-        tracker.update(sightings, {}, stamp_ns)
+        tracker.update(sightings, (), stamp_ns)
         times_s.append(time.thread_time() - began_s)
     p50_s, p95_s = np.percentile(times_s[UPDATES // 10 :], (50, 95))
     return {
@@ -239,6 +240,10 @@ def _sighting(at: np.ndarray, number: int, stamp_ns: int) -> Sighting:
         truncated=False,
         occluded=False,
         box_px=(0, 0, 10, 10),
+        covariance_m2=((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4)),
+        size_sigma_m=(0.01, 0.01, 0.01),
+        yaw_sigma_rad=0.1,
+        named_by=NameSource.FORM,
     )
     seen = Estimate(position_m=at, covariance_m2=1e-4 * np.eye(3), stamp_ns=stamp_ns)
     return Sighting(detection, seen)

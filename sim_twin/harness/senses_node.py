@@ -8,7 +8,7 @@ from drivers.imu.base import Imu
 from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
 from vla_deploy.ipc import BY_NAME, SharedSpace
-from vla_deploy.perception.whereabouts import Whereabouts
+from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.node import NodeContext
@@ -38,7 +38,7 @@ class SensesNode:
         self._lidar: Lidar = registry.open_lidar(robot.lidar.model, lidar, clock)
         self._imu: Imu = registry.open_imu(robot.imu.model, imu, clock)
         self._space = SharedSpace(context.run_dir / "ipc", clock)
-        self._whereabouts = Whereabouts(robot, RobotModel(robot), self._space)
+        self._pose_tracker = PoseTracker(robot, RobotModel(robot), self._space)
         self._scan = self._space.cell_writer("scan")
         self._attitude = self._space.cell_writer("imu")
         self._obstacles = self._space.cell_writer("near_obstacles")
@@ -46,7 +46,7 @@ class SensesNode:
 
     def start(self) -> None:
         """Open the pose's topics; the rest is open."""
-        self._whereabouts.start(self._space)
+        self._pose_tracker.start(self._space)
 
     def step(self) -> None:
         """Publish what is new.
@@ -55,7 +55,7 @@ class SensesNode:
             LinkLost: a line has gone.
         """
         self._tell_attitude()
-        self._whereabouts.move(self._clock.now_ns())
+        self._pose_tracker.predict(self._clock.now_ns())
         self._tell_scan()
         if self._clock.now_ns() >= self._next_look_ns:
             self._next_look_ns = self._clock.now_ns() + round(LOOK_PERIOD_S * NS_PER_S)
@@ -72,7 +72,7 @@ class SensesNode:
         if not samples:
             return
         newest = samples[-1]
-        self._whereabouts.turn(newest)
+        self._pose_tracker.add_imu(newest)
         self._attitude.put(
             yaw_rad=newest.yaw_rad,
             pitch_rad=newest.pitch_rad,

@@ -15,7 +15,7 @@ from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.process_main import main
 
 DETECTION_S: Final = 0.1
-"""What the network takes for an image, of simulated time."""
+"""Simulated time that the detector takes for an image."""
 
 
 def build(context: NodeContext) -> PerceptionNode:

@@ -1,4 +1,4 @@
-"""Draw a map from what a running robot tells of its sensors, while somebody drives it around."""
+"""Draw a map from a running robot's sensor topics while somebody drives it around."""
 
 from typing import Final
 
@@ -24,8 +24,8 @@ FRESH_YAW_NS: Final = NS_PER_S // 10
 class MapRecorder:
     """Read the topics and feed a mapper.
 
-    A robot that knows where it is gives the new map the frame of its old one; otherwise the frame
-    begins where the robot stands.
+    Where the robot knows its pose, the new map has the frame of the old one; otherwise it begins
+    where the robot stands.
     """
 
     def __init__(
@@ -44,17 +44,17 @@ class MapRecorder:
         self._body = BodyState(robot, model)
         self._body.start(space)
         self._camera = robot.camera
-        start = _known_place(space.cell_reader("pose").latest())
+        start = _tracked_pose(space.cell_reader("pose").latest())
         self.on_old_frame = start is not None
         lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
         self.mapper = Mapper(start or ORIGIN, lidar, resolution_m)
         self._last = {"base_state": -1, "scan": -1, "rgbd": -1}
 
     def step(self) -> None:
-        """Take what is new; to be called some fifty times a second.
+        """Process what is new; to be called some fifty times a second.
 
         Raises:
-            MapInvalid: the map has grown beyond every flat.
+            MapInvalid: the map has grown too large.
         """
         self._body.read()
         moved = self._base_state.latest()
@@ -67,10 +67,10 @@ class MapRecorder:
         if scan is not None and self._is_new("scan", scan.stamp_ns):
             ages_ns = np.rint(scan.data["beam_age_s"] * NS_PER_S).astype(np.int64)
             self.mapper.add_scan(np.array(scan.data["range_m"]), scan.stamp_ns - ages_ns)
-        self._look()
+        self._add_image()
 
-    def _look(self) -> None:
-        """Add what the camera sees between floor and head, where scans have begun the map."""
+    def _add_image(self) -> None:
+        """Add what the camera sees between floor and head, once scans have begun the map."""
         frame = self._images.latest()
         if frame is None or not self.mapper.scans or not self._is_new("rgbd", frame.stamp_ns):
             return
@@ -112,8 +112,8 @@ class MapRecorder:
         )
 
 
-def _known_place(sample: Sample | None) -> Pose2D | None:
-    """Return the robot's pose on its present map, None where it does not know it."""
+def _tracked_pose(sample: Sample | None) -> Pose2D | None:
+    """Return the robot's pose on its present map, None where it is not tracked."""
     if sample is None or int(sample.data["state"]) != PlaceState.TRACKING:
         return None
     return Pose2D(*(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad")))

@@ -13,11 +13,15 @@ from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.perception.images.detector_worker import Eyes, Network, open_network
-from vla_deploy.perception.images.image_pipeline import Looking
+from vla_deploy.perception.images.detector_worker import (
+    DetectorWorker,
+    LoadedDetector,
+    load_detector,
+)
+from vla_deploy.perception.images.image_pipeline import ImagePipeline
 from vla_deploy.perception.objects.body_state import BodyState
+from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.perception.sensors import Sensors
-from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
@@ -27,22 +31,22 @@ from vla_deploy.world.surfaces import furniture_points
 STALE_SCAN_NS = round(BY_NAME["scan"].deadline_s * NS_PER_S)
 SCENE_PERIOD_NS = NS_PER_S // 2
 MILLIMETRE_M = 0.001
-# An image that comes a little early is not left for the next one.
+# Of the period between images: one that arrives a little early is used, too.
 EARLY_RATIO = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prepared:
-    """Hold what a profile asks of perception: its rates, and the network it names things by."""
+class PerceptionSetup:
+    """Hold what a profile sets for perception: its rates and its detector."""
 
     profile: Profile
-    network: Network
+    loaded: LoadedDetector
 
 
 class PerceptionNode:
-    """See, and know where the robot is, from what its sensors say and nothing else.
+    """Publish scene, obstacles and pose, from the robot's sensors and nothing else.
 
-    The network runs in `executor`, beside the steps; without one, within them.
+    The detector runs in `executor`, outside the steps; without one, within them.
     """
 
     period_s = 0.02
@@ -69,82 +73,85 @@ class PerceptionNode:
         rate_hz = profile.camera_rate_hz
         self._sensors = Sensors(robot, model, devices, context.clock, rate_hz)
         self._body = BodyState(robot, model)
-        self._whereabouts = Whereabouts(robot, model, self._space)
-        self._eyes = Eyes(InlineExecutor() if executor is None else executor, context.clock)
+        self._pose_tracker = PoseTracker(robot, model, self._space)
+        executor = InlineExecutor() if executor is None else executor
+        self._worker = DetectorWorker(executor, context.clock)
         furniture = furniture_points(robot.places)
-        self._looking = Looking(self._body, self._whereabouts, self._eyes, furniture)
-        self._recall_scene()
+        localiser = self._pose_tracker.localiser
+        self._pipeline = ImagePipeline(self._body, localiser, self._worker, furniture)
+        self._restore_scene()
         self._rate_ratio = 1.0
-        self._next_look_ns = 0
+        self._next_image_ns = 0
         self._next_scene_ns = 0
 
     def start(self) -> None:
-        """Open sensors, topics and the network.
+        """Open sensors, topics and the detector.
 
         Raises:
             DriverError: a sensor is missing or busy.
-            InferenceError: the network cannot be opened, and the profile says that it is required.
+            InferenceError: the detector cannot be opened, and the profile requires it.
         """
         # OpenCV's own threads would compete with control for the cores and gain nothing here.
         cv2.setNumThreads(1)
         space = self._space
         self._body.start(space)
-        self._whereabouts.start(space)
+        self._pose_tracker.start(space)
         self._writers: dict[str, CellWriter] = {
             name: space.cell_writer(name) for name in ("imu", "scan", "scene", "near_obstacles")
         }
         self._images: FrameWriter = space.frame_writer("rgbd")
         self._sensors.open()
-        self._eyes.take(open_network(self._shelf, self._profile, 0))
+        self._worker.replace(load_detector(self._shelf, self._profile, 0))
 
     def step(self) -> None:
-        """Take what the sensors have and publish what follows from it."""
+        """Read the sensors and publish what follows from it."""
         self._body.read()
         self._read_imu()
-        self._whereabouts.move(self._clock.now_ns())
+        self._pose_tracker.predict(self._clock.now_ns())
         self._read_scan()
         self._read_camera()
-        if self._looking.finish():
+        if self._pipeline.finish():
             self._next_scene_ns = 0
-        self._carry_held()
+        self._move_held()
         self._publish_scene()
 
     def stop(self) -> None:
-        """Release every sensor and the network."""
+        """Release every sensor and the detector."""
         self._sensors.close()
-        self._eyes.close()
+        self._worker.close()
         self._space.close()
 
-    def prepare(self, profile: Profile, model_tier: int) -> Prepared:
-        """Open the network of a profile.
+    def prepare(self, profile: Profile, model_tier: int) -> PerceptionSetup:
+        """Open the detector of a profile.
 
         Raises:
             InferenceError: it cannot be opened, and the robot would lose the one it has.
         """
-        has_one = self._eyes.network.detector is not None
-        network = open_network(self._shelf, profile, model_tier, instead_of_one=has_one)
-        return Prepared(profile=profile, network=network)
+        has_one = self._worker.loaded.detector is not None
+        loaded = load_detector(self._shelf, profile, model_tier, replaces_one=has_one)
+        return PerceptionSetup(profile=profile, loaded=loaded)
 
-    def commit(self, prepared: Prepared) -> Prepared:
-        """Change rates and network between two images."""
-        before = Prepared(profile=self._profile, network=self._eyes.take(prepared.network))
+    def commit(self, prepared: PerceptionSetup) -> PerceptionSetup:
+        """Change rates and detector between two images."""
+        replaced = self._worker.replace(prepared.loaded)
+        before = PerceptionSetup(profile=self._profile, loaded=replaced)
         self._profile = prepared.profile
         self._sensors.set_camera_rate(prepared.profile.camera_rate_hz)
         return before
 
-    def discard(self, prepared: Prepared) -> None:
-        """Close the network that is not needed."""
-        self._eyes.release(prepared.network)
+    def discard(self, prepared: PerceptionSetup) -> None:
+        """Close the detector that is not needed."""
+        self._worker.release(prepared.loaded)
 
     def slow(self, rate_ratio: float) -> None:
-        """Look at fewer images; lidar, IMU and the robot's pose go on as they are stepped."""
+        """Process fewer images; lidar, IMU and the robot's pose are not slowed."""
         self._rate_ratio = rate_ratio
 
     def _read_imu(self) -> None:
         newest = self._sensors.attitude()
         if newest is None:
             return
-        self._whereabouts.turn(newest)
+        self._pose_tracker.add_imu(newest)
         self._writers["imu"].put(
             yaw_rad=newest.yaw_rad,
             pitch_rad=newest.pitch_rad,
@@ -153,32 +160,32 @@ class PerceptionNode:
         )
 
     def _read_scan(self) -> None:
-        """Publish a scan unless it is out of date already: its reader takes it for the present."""
+        """Publish a scan unless it is out of date already: its readers take it for the present."""
         scan = self._sensors.scan()
         if scan is not None and self._clock.now_ns() - scan.stamp_ns <= STALE_SCAN_NS:
             ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
             self._writers["scan"].put(range_m=scan.range_m, beam_age_s=ages_s)
-            self._whereabouts.correct(scan)
+            self._pose_tracker.correct(scan)
 
     def _read_camera(self) -> None:
         frame, now_ns = self._sensors.image(), self._clock.now_ns()
         if frame is None:
             return
-        self._looking.came(frame, now_ns)
-        # By the images' own time: one that had to wait for a step must not cost the next one.
-        if frame.stamp_ns < self._next_look_ns:
+        self._pipeline.receive(frame, now_ns)
+        # By the images' own time: one that had to wait for a step must not drop the next one.
+        if frame.stamp_ns < self._next_image_ns:
             return
         rate_hz = self._profile.perception_rate_hz * self._rate_ratio
-        self._next_look_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
+        self._next_image_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
-        self._next_scene_ns = 0  # a scene for each image, whatever the robot makes of it
-        if self._looking.see(frame):
+        self._next_scene_ns = 0  # a scene for each image, whatever its use
+        if self._pipeline.process(frame):
             self._publish_obstacles(1.0 / rate_hz)
 
     def _publish_obstacles(self, period_s: float) -> None:
         """Publish what stands around the base; the stamp is that of the present pose."""
-        pose, now_ns = self._whereabouts.pose, self._clock.now_ns()
-        points = self._looking.obstacles.around(pose, now_ns)
+        pose, now_ns = self._pose_tracker.localiser.pose, self._clock.now_ns()
+        points = self._pipeline.obstacles.around(pose, now_ns)
         padded = np.zeros((3, OBSTACLE_POINTS), dtype=np.float32)
         padded[:, : len(points)] = points.T
         x_m, y_m, z_m = padded
@@ -186,17 +193,17 @@ class PerceptionNode:
             count=len(points), period_s=period_s, x_m=x_m, y_m=y_m, z_m=z_m
         )
 
-    def _recall_scene(self) -> None:
-        """Remember what an earlier instance in this run knew of things."""
-        told = self._space.cell_reader("scene").latest()
-        if told is not None:
-            self._looking.scene.recall(told.document())
+    def _restore_scene(self) -> None:
+        """Restore what an earlier instance in this run knew of things."""
+        last = self._space.cell_reader("scene").latest()
+        if last is not None:
+            self._pipeline.scene.restore(last.document())
 
-    def _carry_held(self) -> None:
+    def _move_held(self) -> None:
         now_ns = self._clock.now_ns()
         positions = self._body.at(now_ns)
         if positions is not None:
-            self._looking.carry(positions, now_ns)
+            self._pipeline.move_held(positions, now_ns)
 
     def _publish_image(self, frame: RgbdFrame) -> None:
         depth = frame.depth
@@ -213,5 +220,5 @@ class PerceptionNode:
         now_ns = self._clock.now_ns()
         if now_ns >= self._next_scene_ns:
             self._next_scene_ns = now_ns + SCENE_PERIOD_NS
-            document = {**self._looking.document(now_ns), "away": self._sensors.away()}
+            document = {**self._pipeline.document(now_ns), "away": self._sensors.away()}
             self._writers["scene"].put_document(document)

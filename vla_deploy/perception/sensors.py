@@ -1,4 +1,4 @@
-"""Hold the sensors open: lidar, IMU and camera, each opened again when its link breaks."""
+"""Keep lidar, IMU and camera open, and reopen each when its link breaks."""
 
 import logging
 import math
@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 
 class Sensors:
-    """Give what each sensor has; one that is away gives nothing, and the others go on."""
+    """Read each sensor; one that is away returns nothing, and the others go on."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Sensors:
         self._devices = devices
         self._clock = clock
         self._camera_rate_hz = camera_rate_hz
-        self._told_of_size = False
+        self._has_logged_size = False
         self._lidar = Reopening("lidar", self._open_lidar, clock)
         self._imu = Reopening("imu", self._open_imu, clock)
         self._camera = Reopening("camera", self._open_camera, clock)
@@ -69,20 +69,20 @@ class Sensors:
         lens = self._robot.camera.lens
         if frame is None or lens is None:
             return frame
-        told, known = frame.intrinsics, lens.intrinsics
-        if (told.width, told.height) == (known.width, known.height):
+        sent, known = frame.intrinsics, lens.intrinsics
+        if (sent.width, sent.height) == (known.width, known.height):
             return replace(frame, intrinsics=known)
-        self._tell_of_other_size(told, known)
+        self._log_other_size(sent, known)
         return frame
 
     def set_camera_rate(self, rate_hz: float) -> None:
-        """Open the camera anew where it is to send at another rate."""
+        """Reopen the camera where it is to send at another rate."""
         if rate_hz != self._camera_rate_hz:
             self._camera_rate_hz = rate_hz
             self._camera.close()
 
     def away(self) -> dict[str, str]:
-        """Return which sensors are away at present, and why: what they told is stale."""
+        """Return which sensors are away at present, each with the reason."""
         failures = {
             "lidar": self._lidar.failure,
             "imu": self._imu.failure,
@@ -90,15 +90,15 @@ class Sensors:
         }
         return {name: failure for name, failure in failures.items() if failure}
 
-    def _tell_of_other_size(self, told: Intrinsics, known: Intrinsics) -> None:
-        """Say once that the calibration is of no use: the camera's own intrinsics count then."""
-        if not self._told_of_size:
-            self._told_of_size = True
+    def _log_other_size(self, sent: Intrinsics, known: Intrinsics) -> None:
+        """Log once that the calibration does not fit, so that the camera's own intrinsics count."""
+        if not self._has_logged_size:
+            self._has_logged_size = True
             _log.error(
                 "degraded: the camera sends %dx%d, its lens was calibrated at %dx%d; its own "
                 "intrinsics are taken; calibrate it anew: vla-deploy camera calibrate",
-                told.width,
-                told.height,
+                sent.width,
+                sent.height,
                 known.width,
                 known.height,
             )

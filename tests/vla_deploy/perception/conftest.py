@@ -27,8 +27,10 @@ from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses, load_world
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.geometry.body_mask import BodyMask
+from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
@@ -50,6 +52,7 @@ class StillFlat:
     def __init__(self) -> None:
         self.robot = load_robot("butler")
         self.kinematics = RobotModel(self.robot)
+        self.body_mask = BodyMask(self.robot)
         self.world = load_world("flat")
         self.model = compose(self.robot.mjcf_path, self.world.mjcf_path)
         self.data = mujoco.MjData(self.model)
@@ -109,6 +112,13 @@ class StillFlat:
         noisy = depth + 0.0012 * depth**2 * random.standard_normal(depth.shape)
         rounded = (np.rint(noisy * 1000.0) / 1000.0).astype(np.float32)
         return self.grid.colours(rgb), self.grid.depth(rounded)
+
+    def cloud(self, seed: int = 0) -> Cloud:
+        """Return the points of a noisy view, with the robot's own body masked."""
+        rgb, depth = self.noisy_view(np.random.default_rng(seed))
+        body = self.body_mask.mask(self.joints, self.grid.camera)
+        pose = self.kinematics.camera_pose(self.joints)
+        return make_cloud(rgb, depth, self.grid.camera, pose, body)
 
     def view_without_robot(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Render what the camera would see were the robot transparent."""
@@ -201,15 +211,16 @@ class Rig:
                 self._tell()
                 self.node.step()
 
-    def cell(self, name: str) -> Any:
+    def sample(self, name: str) -> Sample:
         sample = self.space.cell_reader(name).latest()
         assert sample is not None, f"{name} was never published"
-        return sample.data
+        return sample
+
+    def cell(self, name: str) -> Any:
+        return self.sample(name).data
 
     def scene(self) -> dict[str, Any]:
-        sample = self.space.cell_reader("scene").latest()
-        assert sample is not None
-        return sample.document()
+        return self.sample("scene").document()
 
     def known(self) -> dict[str, dict[str, Any]]:
         return {thing["id"]: thing for thing in self.scene()["objects"]}

@@ -14,7 +14,7 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import aim_sigma_rad, make_cloud
 from vla_deploy.perception.geometry.supports import find_supports
 from vla_deploy.perception.images.detection import Detection, detect
-from vla_deploy.perception.objects.history import JointHistory
+from vla_deploy.perception.objects.body_state import JointHistory
 
 if TYPE_CHECKING:
     from conftest import StillFlat

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.body import BodyMask
-from vla_deploy.perception.geometry.cloud import make_cloud
 from vla_deploy.perception.geometry.supports import find_supports
 from vla_deploy.perception.images.detection import Detection, detect
 
@@ -23,10 +21,7 @@ BOX_RIM_M = 0.128
 
 def see(flat: "StillFlat", seed: int = 0) -> list[tuple[Detection, np.ndarray]]:
     """Return what the robot detects, each with its position in the map."""
-    rgb, depth = flat.noisy_view(np.random.default_rng(seed))
-    pose = flat.kinematics.camera_pose(flat.joints)
-    body = BodyMask(flat.robot).mask(flat.joints, flat.grid.camera)
-    cloud = make_cloud(rgb, depth, flat.grid.camera, pose, body)
+    cloud = flat.cloud(seed)
     found = []
     for detection in detect(cloud, find_supports(cloud)):
         x, y, z = detection.position_m
@@ -179,7 +174,7 @@ def test_the_robots_own_arm_is_masked(flat: "StillFlat") -> None:
     _, with_robot = flat.camera.render()
     _, without = flat.view_without_robot()
     shown = with_robot < without - 0.02
-    mask = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
+    mask = flat.body_mask.mask(flat.joints, flat.intrinsics)
     assert np.count_nonzero(shown) > 3000
     assert np.count_nonzero(shown & mask) > 0.97 * np.count_nonzero(shown)
     assert np.count_nonzero(mask) < 2.0 * np.count_nonzero(shown)

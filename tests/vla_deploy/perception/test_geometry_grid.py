@@ -106,7 +106,7 @@ def test_a_networks_boxes_move_along() -> None:
             scores=np.ones(1, np.float32),
             classes=np.zeros(1, np.intp),
         ),
-        voices=(),
+        reliabilities=(),
     )
     moved = grid.view(view)
     assert moved is not None

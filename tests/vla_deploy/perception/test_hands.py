@@ -53,10 +53,10 @@ class Body:
             )
             sample = self._reader.latest()
             assert sample is not None
-            self.hands.feel(sample)
+            self.hands.update(sample)
 
     def left(self, told: str | None) -> Hold:
-        return self.hands.judge({"left": told, "right": None}, self.now)["left"]
+        return self.hands.holds({"left": told, "right": None}, self.now)["left"]
 
 
 @pytest.fixture

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.perception.geometry.body import BodyMask
+from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.geometry.cloud import make_cloud
 from vla_deploy.perception.geometry.lens import (
-    bent_boxes,
-    flattened,
+    distorted_boxes,
     matrix_of,
-    needs_flattening,
+    needs_undistortion,
     project,
     ray_table,
+    undistorted,
 )
 from vla_deploy.robots import load_robot
 
@@ -68,18 +68,18 @@ def test_the_table_of_rays_is_computed_once_for_a_camera() -> None:
 
 
 def test_a_box_of_the_flattened_image_comes_back_to_where_the_thing_is() -> None:
-    assert needs_flattening(BARREL)
-    assert not needs_flattening(PINHOLE)
-    assert not needs_flattening(replace(PINHOLE, distortion=(1e-4,) * 5))
+    assert needs_undistortion(BARREL)
+    assert not needs_undistortion(PINHOLE)
+    assert not needs_undistortion(replace(PINHOLE, distortion=(1e-4,) * 5))
     image = np.zeros((240, 320, 3), np.uint8)
     image[20:60, 250:300] = 255
-    flat = flattened(image, BARREL)
+    flat = undistorted(image, BARREL)
     rows, columns = np.nonzero(flat[..., 0] > 127)
     box = np.array([[columns.min(), rows.min(), columns.max(), rows.max()]], np.float32)
     assert np.abs(box - (250, 20, 299, 59)).max() > 5.0
     # A straight box around a bent square is a little wider than the square.
-    assert bent_boxes(BARREL, box)[0] == pytest.approx((250, 20, 299, 59), abs=6.0)
-    assert bent_boxes(BARREL, box[:0]).shape == (0, 4)
+    assert distorted_boxes(BARREL, box)[0] == pytest.approx((250, 20, 299, 59), abs=6.0)
+    assert distorted_boxes(BARREL, box[:0]).shape == (0, 4)
 
 
 def test_the_robots_own_hands_are_masked_where_the_lens_shows_them() -> None:

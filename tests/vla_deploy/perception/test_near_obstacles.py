@@ -9,6 +9,7 @@ from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.geometry.cloud import PosedImage
 from vla_deploy.perception.objects.near_obstacles import KEPT_NS, NearObstacles
 
 CAMERA = Intrinsics(width=160, height=120, fx=110.0, fy=110.0, cx=79.5, cy=59.5)
@@ -62,7 +63,16 @@ def look(
     body: NDArray[np.bool_] = NO_BODY,
     grips: tuple[NDArray[np.float64], ...] = (),
 ) -> NDArray[np.float64]:
-    seen.look(depth, CAMERA, camera_pose(), body, pose, grips, stamp_ns)
+    image = PosedImage(
+        rgb=np.zeros((*depth.shape, 3), np.uint8),
+        depth_m=depth,
+        camera=CAMERA,
+        base_from_camera=camera_pose(),
+        body=body,
+        base=pose,
+        stamp_ns=stamp_ns,
+    )
+    seen.update(image, grips)
     return seen.around(pose, stamp_ns)
 
 

@@ -50,7 +50,7 @@ def full_scene() -> Scene:
     corners = [[-12.345, -12.345]] * 24
     surface = {"name": "kitchen_table", "height_m": 0.4567, "polygon_m": corners}
     scene._surfaces = [surface] * 8
-    hold = Hold(kind="bottle", told="bottle", touch=Touch(grip=Grip.LOST), is_confirmed=True,
+    hold = Hold(kind="bottle", reported="bottle", touch=Touch(grip=Grip.LOST), is_confirmed=True,
                 cause=WHY)  # fmt: skip
     scene._hands = {name: {"holding": "bottle_1", **hold.document()} for name in ("left", "right")}
     return scene
@@ -73,7 +73,7 @@ def test_what_was_told_is_taken_over_by_the_next_instance() -> None:
     scene._tracker._tracks = [a_track(1), replace(a_track(2), aliases=(), cause="")]
     told = scene.document()
     heir = Scene()
-    heir.recall(told)
+    heir.restore(told)
     for before, after in zip(told["objects"], heir.document()["objects"], strict=True):
         names = ("id", "class", "colour", "position_m", "size_m", "sigma_m", "rests")
         assert {name: after[name] for name in names} == {name: before[name] for name in names}
@@ -87,7 +87,7 @@ def test_what_was_lost_keeps_its_id_for_the_next_instance() -> None:
     scene._tracker._tracks = [replace(a_track(1), aliases=())]
     scene._tracker._vanished = [replace(a_track(7), aliases=(), cause="it fell")]
     heir = Scene()
-    heir.recall(scene.document())
+    heir.restore(scene.document())
     assert [(one["id"], one["cause"]) for one in heir.document()["lost"]] == [
         ("bottle_107", "it fell")
     ]

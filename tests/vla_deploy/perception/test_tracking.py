@@ -3,14 +3,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.perception.geometry.noise import covariance_of
 from vla_deploy.perception.images.detection import Detection
-from vla_deploy.perception.objects.filtering import Estimate
-from vla_deploy.perception.objects.in_view import PlaceView
-from vla_deploy.perception.objects.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
+from vla_deploy.perception.naming.class_fusion import NameSource
+from vla_deploy.perception.objects.filtering import Estimate, covariance_of
+from vla_deploy.perception.objects.track import KNOWN_LOOKS, MAX_ODD_SIGHTINGS, Sighting
 from vla_deploy.perception.objects.tracker import Tracker
-
-CLEAR, HIDDEN = PlaceView.CLEAR, PlaceView.HIDDEN
 
 
 def seen(
@@ -30,6 +27,9 @@ def seen(
         "occluded": False,
         "box_px": (0, 0, 10, 10),
         "covariance_m2": ((9e-6, 0.0, 0.0), (0.0, 9e-6, 0.0), (0.0, 0.0, 9e-6)),
+        "size_sigma_m": (0.003, 0.003, 0.003),
+        "yaw_sigma_rad": 0.1,
+        "named_by": NameSource.FORM,
     }
     return Detection(**(fields | changes))
 
@@ -48,15 +48,23 @@ class Watcher:
         self.tracker = Tracker()
         self.images = 0
 
-    def image(self, *detections: Detection, view: PlaceView = CLEAR) -> list[dict[str, Any]]:
+    def image(self, *detections: Detection, in_view: bool = True) -> list[dict[str, Any]]:
         self.images += 1
-        views = {id(track): view for track in self.tracker.tracks}
+        clear = self.tracker.tracks if in_view else []
         stamp_ns = self.images * 200_000_000
-        self.tracker.update([sighting(one, stamp_ns) for one in detections], views, stamp_ns)
+        self.tracker.update([sighting(one, stamp_ns) for one in detections], clear, stamp_ns)
         return [track.document() for track in self.tracker.objects]
 
 
-def test_a_thing_is_believed_at_the_second_sight() -> None:
+def knowing(*detections: Detection) -> Watcher:
+    """Return a watcher that has confirmed some things."""
+    watcher = Watcher()
+    watcher.image(*detections)
+    watcher.image(*detections)
+    return watcher
+
+
+def test_a_thing_is_believed_at_the_second_sighting() -> None:
     watcher = Watcher()
     assert watcher.image(seen()) == []
     (cup,) = watcher.image(seen())
@@ -65,7 +73,7 @@ def test_a_thing_is_believed_at_the_second_sight() -> None:
     assert cup["last_seen_ns"] == 400_000_000
 
 
-def test_one_false_sight_is_forgotten() -> None:
+def test_one_false_sighting_is_forgotten() -> None:
     watcher = Watcher()
     watcher.image(seen())
     watcher.image()
@@ -98,28 +106,22 @@ def test_a_wrong_class_now_and_then_changes_nothing() -> None:
 
 
 def test_what_is_hidden_stays_in_memory() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(50):
-        objects = watcher.image(view=HIDDEN)
+        objects = watcher.image(in_view=False)
     assert [o["id"] for o in objects] == ["cup_1"]
     assert objects[0]["last_seen_ns"] == 400_000_000
 
 
 def test_what_has_left_its_place_is_forgotten_after_several_clear_views() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(4):
         assert watcher.image() != []
     assert watcher.image() == []
 
 
 def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(6):
         watcher.image()
     elsewhere = seen(at=(4.0, 0.5, 0.6))
@@ -130,9 +132,7 @@ def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
 
 
 def test_a_thing_that_is_pushed_in_view_keeps_its_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     pushed = seen(at=(1.4, 2.0, 0.5))
     watcher.image(pushed)
     (cup,) = watcher.image(pushed)
@@ -141,15 +141,13 @@ def test_a_thing_that_is_pushed_in_view_keeps_its_id() -> None:
 
 
 def test_another_colour_is_another_thing() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(8):
         objects = watcher.image(seen(colour="blue", at=(1.09, 2.0, 0.5)))
     assert [(o["id"], o["colour"]) for o in objects] == [("cup_2", "blue")]
 
 
-def test_a_truncated_sight_makes_no_thing_but_keeps_one_alive() -> None:
+def test_a_truncated_sighting_makes_no_thing_but_keeps_one_alive() -> None:
     watcher = Watcher()
     for _ in range(3):
         assert watcher.image(seen(truncated=True)) == []
@@ -162,10 +160,8 @@ def test_a_truncated_sight_makes_no_thing_but_keeps_one_alive() -> None:
 
 
 def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for i in range(20):
         watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.5 + 0.02 * i), 0)
         objects = watcher.image(pair[1])
@@ -174,16 +170,14 @@ def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
 
 
 def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("right", "ball", (1.0, 2.0, 0.6), 0)
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 1.2), 0)
     (cup,) = watcher.image(seen())
     assert cup["position_m"] == [1.0, 2.0, 0.5]
 
 
-def test_a_vague_sight_begins_no_track() -> None:
+def test_a_vague_sighting_begins_no_track() -> None:
     watcher = Watcher()
     for _ in range(4):
         objects = watcher.image(seen("object", "brown", occluded=True))
@@ -208,18 +202,18 @@ def test_a_thing_never_surely_recognised_is_no_known_thing() -> None:
     assert thing["class"] == "object"
 
 
-def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
+def test_a_box_seen_better_from_near_replaces_its_far_sighting() -> None:
     watcher = Watcher()
     far = seen("box", "brown", at=(4.14, 0.52, 0.475), size_m=(0.28, 0.145, 0.11))
     near = seen("box", "orange", at=(4.21, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
     for _ in range(3):
         watcher.image(far)
     for _ in range(3):
-        boxes = watcher.image(near, view=HIDDEN)
+        boxes = watcher.image(near, in_view=False)
     assert [(box["id"], box["colour"]) for box in boxes] == [("box_1", "orange")]
 
 
-def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
+def test_a_half_hidden_second_sighting_of_a_box_is_no_second_box() -> None:
     watcher = Watcher()
     box = seen("box", "orange", at=(4.2, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
     part = seen("box", "orange", at=(4.14, 0.46, 0.49), size_m=(0.24, 0.14, 0.13), occluded=True)
@@ -228,15 +222,13 @@ def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
     assert [one["id"] for one in boxes] == ["box_1"]
 
 
-def test_half_hidden_sights_of_its_box_make_a_cup_no_larger() -> None:
-    watcher = Watcher()
+def test_half_hidden_sightings_of_its_box_make_a_cup_no_larger() -> None:
     cup, box = seen(), seen("box", "orange", size_m=(0.24, 0.24, 0.13))
-    watcher.image(cup, box)
-    watcher.image(cup, box)
+    watcher = knowing(cup, box)
     wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
     shard = seen("object", "orange", at=(1.02, 2.0, 0.5), size_m=(0.16, 0.08, 0.1), truncated=True)
     for _ in range(30):
-        objects = watcher.image(box, wall, shard, view=HIDDEN)
+        objects = watcher.image(box, wall, shard, in_view=False)
     kept = {one["id"]: one for one in objects}
     assert kept["cup_1"]["size_m"] == [0.066, 0.066, 0.095]
 
@@ -247,7 +239,7 @@ def test_a_cup_that_is_seen_as_one_with_its_box_now_and_then_gets_no_larger() ->
     for _ in range(KNOWN_LOOKS):
         watcher.image(seen())
     for _ in range(3):
-        for _ in range(MOST_ODD_SIGHTS):
+        for _ in range(MAX_ODD_SIGHTINGS):
             (cup,) = watcher.image(both)
             assert cup["size_m"] == [0.066, 0.066, 0.095]
         watcher.image(seen(occluded=True))
@@ -257,13 +249,13 @@ def test_a_size_that_was_wrong_from_the_start_is_given_up() -> None:
     watcher = Watcher()
     for _ in range(2 * KNOWN_LOOKS):
         watcher.image(seen(size_m=(0.215, 0.215, 0.126)))
-    for _ in range(MOST_ODD_SIGHTS + 15):
+    for _ in range(MAX_ODD_SIGHTINGS + 15):
         (cup,) = watcher.image(seen())
     assert cup["size_m"] == pytest.approx([0.066, 0.066, 0.095], rel=0.1)
 
 
-def test_crossing_sights_of_two_alike_things_are_shared_out_as_a_whole() -> None:
-    """The nearest pair alone would leave the second thing without its sight."""
+def test_crossing_sightings_of_two_alike_things_are_shared_out_as_a_whole() -> None:
+    """The nearest pair alone would leave the second thing without its sighting."""
     watcher = Watcher()
     pair = (seen(at=(1.0, 2.0, 0.5)), seen(at=(1.05, 2.0, 0.5)))
     for _ in range(4):
@@ -292,19 +284,17 @@ def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
     assert cup["colours"] == {"red": 1.0}
     assert max(cup["sigma_m"]) < 0.015
     for _ in range(300):
-        (later,) = watcher.image(view=HIDDEN)
-    assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `grown` tells of the present
+        (later,) = watcher.image(in_view=False)
+    assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `predicted` is of the present
 
 
 def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_old_id() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(20):
-        watcher.image(view=HIDDEN)
+        watcher.image(in_view=False)
     elsewhere = seen(at=(4.0, 0.5, 0.6))
     for _ in range(2):
-        both = watcher.image(elsewhere, view=HIDDEN)
+        both = watcher.image(elsewhere, in_view=False)
     assert {o["id"] for o in both} == {"cup_1", "cup_2"}
     for _ in range(5):
         objects = watcher.image(elsewhere)
@@ -319,9 +309,9 @@ def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_
     for move in range(1, 9):
         at = places[move % 2]
         for _ in range(20):
-            watcher.image(view=HIDDEN)
+            watcher.image(in_view=False)
         for _ in range(2):
-            watcher.image(seen(at=at), view=HIDDEN)
+            watcher.image(seen(at=at), in_view=False)
         for _ in range(5):
             watcher.image(seen(at=at))
     (cup,) = watcher.tracker.objects
@@ -329,10 +319,8 @@ def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_
 
 
 def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(4.0, 0.5, 0.6)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for _ in range(6):
         objects = watcher.image(pair[1])
     assert [(o["id"], o.get("aliases")) for o in objects] == [("cup_2", None)]
@@ -348,9 +336,7 @@ def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
     ],
 )
 def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], why: str) -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     for _ in range(6):
         watcher.image()
     other = seen(**({"at": (2.0, 2.0, 0.5)} | changes))
@@ -360,10 +346,8 @@ def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], 
 
 
 def test_a_hand_keeps_what_it_took_when_it_passes_another_one_like_it() -> None:
-    watcher = Watcher()
     pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
-    watcher.image(*pair)
-    watcher.image(*pair)
+    watcher = knowing(*pair)
     for step in range(16):
         watcher.tracker.carry("left", "cup", (1.0 + 0.02 * step, 2.0, 0.62), 0)
         objects = watcher.image(pair[1])
@@ -372,9 +356,7 @@ def test_a_hand_keeps_what_it_took_when_it_passes_another_one_like_it() -> None:
 
 
 def test_what_was_let_go_is_found_where_it_has_come_to_rest() -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("left", "cup", (3.0, 1.0, 0.6), 0)
     watcher.tracker.release("left")
     (cup,) = watcher.image(seen(at=(3.02, 1.0, 0.52)))
@@ -386,8 +368,8 @@ def test_the_memory_of_tracks_is_bounded() -> None:
     watcher = Watcher()
     for number in range(200):
         spot = seen("object", at=(number * 1.0, 0.0, 0.5))
-        watcher.image(spot, view=HIDDEN)
-        watcher.image(spot, view=HIDDEN)
+        watcher.image(spot, in_view=False)
+        watcher.image(spot, in_view=False)
     assert len(watcher.tracker.tracks) <= 128
     assert len(watcher.tracker.objects) <= 64
 
@@ -402,19 +384,17 @@ def test_the_memory_of_tracks_is_bounded() -> None:
     ids=["another thing", "no known thing", "another colour"],
 )
 def test_what_a_hand_has_lost_is_not_found_in_whatever_else_lies_there(other: Detection) -> None:
-    watcher = Watcher()
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher = knowing(seen())
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.6), 500_000_000)
     watcher.tracker.lose("left", "it slipped out")
     for _ in range(3):
-        told = watcher.image(other, view=HIDDEN)
+        told = watcher.image(other, in_view=False)
     lost = next(one for one in told if one["id"] == "cup_1")
     assert lost["cause"] == "it slipped out"
     assert (lost["class"], lost["colour"]) == ("cup", "red")
     assert lost["last_seen_ns"] == 500_000_000
 
-    found = watcher.image(seen(at=(1.1, 2.0, 0.4)), view=HIDDEN)
+    found = watcher.image(seen(at=(1.1, 2.0, 0.4)), in_view=False)
     cup = next(one for one in found if one["id"] == "cup_1")
     assert "cause" not in cup
     assert cup["position_m"][0] == pytest.approx(1.1, abs=0.02)

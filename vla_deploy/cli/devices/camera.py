@@ -201,7 +201,7 @@ def _chosen_views(
     def print_view(view: BoardView) -> None:
         print(f"{view.name}: {len(view.pixels)} corners", file=sys.stderr)
 
-    chosen = select(named(), _board(arguments), enough=arguments.views, tell=print_view)
+    chosen = select(named(), _board(arguments), enough=arguments.views, on_view=print_view)
     return images, chosen
 
 

@@ -32,7 +32,7 @@ _REFINE_PX: Final = 3
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationBoard:
-    """Describe a board by its squares; `square_m` is to be measured on the print."""
+    """Describe a board by its squares; `square_m` must be measured on the print."""
 
     columns: int = 7
     rows: int = 5
@@ -137,7 +137,7 @@ def write_board(file: Path, board: CalibrationBoard) -> None:
 
 
 def _as_png(image: Image, pixels_per_m: float) -> bytes:
-    """Return a PNG that tells its resolution, so that programs print it in true size."""
+    """Return a PNG with its resolution, so that programs print it in true size."""
     _, encoded = cv2.imencode(".png", image)
     data = bytes(encoded)
     per_m = round(pixels_per_m)

@@ -1,13 +1,13 @@
-"""Say why a camera could not be calibrated.
+"""Errors of camera calibration.
 
 CalibrationError
   BadImages            the images show too little: take others
-  ImplausibleResult    a result came out that no such camera has: check board and images
+  ImplausibleResult    the result cannot be true: check board and images
 """
 
 
 class CalibrationError(Exception):
-    """Be the root of what calibrating a camera may end in."""
+    """A camera could not be calibrated."""
 
 
 class BadImages(CalibrationError):
@@ -15,4 +15,4 @@ class BadImages(CalibrationError):
 
 
 class ImplausibleResult(CalibrationError):
-    """What came out cannot be true, or is too uncertain; check the board's size and the images."""
+    """The result cannot be true, or is too uncertain; check the board's size and the images."""

@@ -1,7 +1,7 @@
-"""Find how the camera sits on the head: views of a board that stays, while the head turns.
+"""Estimate the camera's mounting on the head from views of a fixed board while the head turns.
 
-Unknown are the camera's place on its site and the board's in the base frame; all corners of all
-views together say both (least squares on pixels, with Huber's weights against wrong corners).
+Unknown are the camera's pose on its site and the board's in the base frame; both are fitted to all
+corners of all views (least squares on pixels, with Huber's weights against wrong corners).
 """
 
 import math
@@ -19,6 +19,7 @@ from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResu
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.perception.geometry.rotation import angle_rad
 from vla_deploy.robots.description import CameraDescription, CameraMounting
+from vla_deploy.robots.kinematics.orientation import quaternion_of
 
 MIN_VIEWS: Final = 6
 # Turns about one axis alone leave the place along it open.
@@ -28,7 +29,7 @@ MAX_SHIFT_SIGMA_M: Final = 0.004
 MAX_TURN_SIGMA_RAD: Final = math.radians(0.4)
 HUBER_PX: Final = 1.0
 ROUNDS: Final = 40
-# Corners of one image err alike in part, by the head's joints: so many say as much as one.
+# Corners of one image share errors of the head's joints: so many count as one.
 ALIKE: Final = 2.0
 _STEP: Final = 1e-6
 _ENOUGH: Final = 1e-9
@@ -58,17 +59,15 @@ class HandEye:
 
     def quaternion_xyzw(self) -> tuple[float, float, float, float]:
         """Return the camera's turn against its site; w is above 0, as the turn is small."""
-        turn = cv2.Rodrigues(self.site_from_camera[:3, :3])[0].ravel()
-        angle = float(np.linalg.norm(turn))
-        x, y, z = math.sin(angle / 2) * turn / max(angle, 1e-12)
-        return (float(x), float(y), float(z), math.cos(angle / 2))
+        x, y, z, w = (float(value) for value in quaternion_of(self.site_from_camera[:3, :3]))
+        return (x, y, z, w)
 
     def turn_rad(self) -> float:
-        """Return by how much the camera is turned against its site."""
+        """Return the angle between the camera and its site."""
         return angle_rad(self.site_from_camera[:3, :3])
 
     def mounting(self, camera: CameraDescription, made_at: str) -> CameraMounting:
-        """Return the camera's place as the robot's folder stores it."""
+        """Return the mounting for the robot's folder."""
         x, y, z = (round(float(value), 6) for value in self.site_from_camera[:3, 3])
         return CameraMounting(
             site=camera.site,
@@ -82,11 +81,11 @@ class HandEye:
 
 
 def fit_hand_eye(views: Sequence[HeadView], camera: Intrinsics) -> HandEye:
-    """Return the camera's place on its site.
+    """Fit the camera's pose on its site.
 
     Raises:
         BadImages: too few views, or the head turned too little or about one axis only.
-        ImplausibleResult: the views contradict each other, or the place stays in doubt.
+        ImplausibleResult: the views contradict each other, or the pose stays uncertain.
     """
     _require_turns(views)
     state = np.zeros(12)

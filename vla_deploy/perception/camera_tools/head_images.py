@@ -1,4 +1,4 @@
-"""Give images of the head's camera with joints and depth: of a running robot, or of a folder."""
+"""Read images of the head's camera with joints and depth, from a running robot or a folder."""
 
 import json
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.perception.camera_tools.board import Image
 from vla_deploy.perception.camera_tools.errors import BadImages
-from vla_deploy.perception.objects.history import JointHistory
+from vla_deploy.perception.objects.body_state import JointHistory
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import CameraDescription
 from vla_deploy.robots.kinematics.model import full_positions
@@ -22,7 +22,7 @@ from vla_deploy.robots.schema import is_number
 
 Array = NDArray[np.float64]
 JOINTS_FILE: Final = "joints.json"
-# A head that turns or shakes gives images of no known pose.
+# Of a head that turns or shakes, the pose is not known well enough.
 _STILL_RAD: Final = 0.002
 _STILL_NS: Final = NS_PER_S // 4
 _JOINTS_GAP_NS: Final = NS_PER_S // 10

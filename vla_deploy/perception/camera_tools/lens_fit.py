@@ -20,7 +20,7 @@ MODELS: Final = {"plumb_bob": 5, "rational_polynomial": 8}
 MAX_ERROR_PX: Final = 0.7
 # A view this many times worse than the usual one is left out once: a finger, a bent corner.
 OUTLIER_RATIO: Final = 3.0
-# Boards that all face the same way leave distance and focal length in doubt.
+# Boards that all face the same way do not separate distance and focal length.
 TILTED_RAD: Final = math.radians(12.0)
 TILTED_VIEWS: Final = 3
 MAX_FOCAL_SIGMA_RATIO: Final = 0.01
@@ -38,7 +38,7 @@ class LensFit:
     sigma_px: tuple[float, float, float, float]
 
     def calibration(self, tool: str, made_at: str) -> LensCalibration:
-        """Return the lens as the robot's folder stores it."""
+        """Return the lens for the robot's folder."""
         return LensCalibration(
             intrinsics=self.intrinsics,
             distortion_model=self.distortion_model,
@@ -67,7 +67,7 @@ def fit_lens(
     Raises:
         BadImages: too few, all alike, all facing the same way, or not all over the image.
         ImplausibleResult: the corners are too far from where the lens puts them, or its focal
-            length stays in doubt.
+            length stays uncertain.
     """
     require_variety(views, size_px)
     solved = _solve(views, size_px, model)

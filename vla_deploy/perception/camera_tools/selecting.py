@@ -1,4 +1,4 @@
-"""Choose the images that are good for calibrating, and say what is wrong with the others."""
+"""Select the images that are good for calibration, with the reason why others are not."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from vla_deploy.perception.camera_tools.errors import BadImages
 
 # The brightness step between squares, as a share of it for each pixel: less is out of focus.
 SHARP_PER_PX: Final = 0.35
-# Corners that lie nearer than this share of the width to those of another image tell nothing new.
+# Corners nearer than this share of the width to those of another image add nothing.
 APART_RATIO: Final = 0.03
 # The image in cells; corners must have been in this share of them.
 COVERED_CELLS: Final = (4, 4)
@@ -41,11 +41,11 @@ def select(
     board: CalibrationBoard,
     *,
     enough: int | None = None,
-    tell: Callable[[BoardView], None] = lambda _: None,
+    on_view: Callable[[BoardView], None] = lambda _: None,
 ) -> ViewSelection:
-    """Return the views that show the board, sharp, each otherwise than those before.
+    """Return the views that show the board, sharp, each unlike those before.
 
-    It takes no further image once there are `enough`; `tell` hears of each view that is used.
+    It takes no further image once there are `enough`; `on_view` is called with each view used.
     """
     views: list[BoardView] = []
     left_out: dict[str, str] = {}
@@ -56,14 +56,14 @@ def select(
             left_out[name] = reason
         else:
             views.append(view)
-            tell(view)
+            on_view(view)
         if len(views) == enough:
             break
     return ViewSelection(views=tuple(views), left_out=left_out)
 
 
 def why_not(image: Image, view: BoardView, earlier: Sequence[BoardView]) -> str:
-    """Return why a view is of no use beside the earlier ones, "" where it is."""
+    """Return why a view adds nothing to the earlier ones, "" where it does."""
     sharp = sharpness(image, view.pixels)
     if sharp < SHARP_PER_PX:
         return f"blurred: sharpness {sharp:.2f}, expected {SHARP_PER_PX} or more"
@@ -75,7 +75,7 @@ def why_not(image: Image, view: BoardView, earlier: Sequence[BoardView]) -> str:
 
 
 def sharpness(image: Image, corners: Array) -> float:
-    """Return how steep edges are at the corners, as a share of the contrast there for a pixel."""
+    """Return the slope of edges at the corners, as a share of the contrast there in a pixel."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     found = [_steepness(grey, x, y) for x, y in corners]
     return float(np.median(found))

@@ -1,4 +1,4 @@
-"""Hold the boxes that a detector found, and thin out those that are one thing."""
+"""Hold the boxes that a detector found, and suppress those of the same thing."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -37,8 +37,8 @@ class Boxes:
         )
 
 
-def sound(boxes: Boxes, score_threshold: float) -> Boxes:
-    """Return the boxes that are sure enough, finite and not empty, the surest first."""
+def valid_boxes(boxes: Boxes, score_threshold: float) -> Boxes:
+    """Return the boxes that score enough, are finite and not empty, the surest first."""
     left, top, right, bottom = boxes.corners_px.T
     finite = np.isfinite(boxes.corners_px).all(axis=1)
     good = (boxes.scores >= score_threshold) & finite & (right > left) & (bottom > top)
@@ -47,10 +47,10 @@ def sound(boxes: Boxes, score_threshold: float) -> Boxes:
     return kept.where(order[:MAX_CANDIDATES])
 
 
-def without_doubles(boxes: Boxes, iou_threshold: float) -> Boxes:
-    """Return the boxes, which come the surest first, without those that a surer one covers.
+def suppress_overlaps(boxes: Boxes, iou_threshold: float) -> Boxes:
+    """Suppress non-maxima: return boxes, given the surest first, without those that one covers.
 
-    A box is covered by one of its own class that overlaps it by more than the threshold.
+    A box is covered by a surer one of its class that overlaps it by more than the threshold.
     """
     left = np.arange(len(boxes))
     kept: list[int] = []
@@ -58,8 +58,8 @@ def without_doubles(boxes: Boxes, iou_threshold: float) -> Boxes:
         best, rest = int(left[0]), left[1:]
         kept.append(best)
         overlaps = iou(boxes.corners_px[best], boxes.corners_px[rest])
-        doubles = (overlaps > iou_threshold) & (boxes.classes[rest] == boxes.classes[best])
-        left = rest[~doubles]
+        covered = (overlaps > iou_threshold) & (boxes.classes[rest] == boxes.classes[best])
+        left = rest[~covered]
     return boxes.where(np.array(kept, dtype=np.intp))
 
 

@@ -1,13 +1,20 @@
-"""Read the maps of a centre network: peaks of the heat are things, around them lie their edges."""
+"""Read the maps of a centre network: peaks of the heat are things, with the distances of edges."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.inference.manifest import DetectionOutputs, Tensor
-from vla_deploy.perception.detectors.boxes import Boxes, Floats, Indices, sound, without_doubles
+from vla_deploy.perception.detectors.boxes import (
+    Boxes,
+    Floats,
+    Indices,
+    suppress_overlaps,
+    valid_boxes,
+)
 
 Outputs = tuple[NDArray[Any], ...]
 
@@ -59,15 +66,14 @@ def decode(
         classes=classes,
     )
     height_px, width_px = (size * stride_px for size in heat.shape[1:])
-    inside = _within(sound(boxes, score_threshold), width_px, height_px)
-    return without_doubles(inside, iou_threshold)
+    inside = _within(valid_boxes(boxes, score_threshold), width_px, height_px)
+    return suppress_overlaps(inside, iou_threshold)
 
 
 def _within(boxes: Boxes, width_px: float, height_px: float) -> Boxes:
     """Return the boxes cut off at the image's borders."""
     border = np.array([width_px, height_px] * 2, dtype=np.float32)
-    corners: Floats = boxes.corners_px.clip(0.0, border)
-    return Boxes(corners_px=corners, scores=boxes.scores, classes=boxes.classes)
+    return replace(boxes, corners_px=boxes.corners_px.clip(0.0, border))
 
 
 def _peaks(heat: Floats, score_threshold: float) -> tuple[Indices, Indices, Indices]:

@@ -22,7 +22,7 @@ class Detector:
     """Hold one open model and read its outputs."""
 
     def __init__(self, session: ModelSession) -> None:
-        """Take a session over; `close` closes it.
+        """Own a session; `close` closes it.
 
         Raises:
             ModelMismatch: the adapter is unknown, or the outputs are not what it reads.
@@ -34,11 +34,6 @@ class Detector:
         self._outputs = [tensor.name for tensor in session.model.manifest.outputs]
 
     @property
-    def classes(self) -> tuple[str, ...]:
-        """Return what the class numbers of boxes mean."""
-        return self._detection.classes
-
-    @property
     def detection(self) -> DetectionOutputs:
         """Return how its outputs are read, and how good it was measured to be."""
         return self._detection
@@ -47,7 +42,7 @@ class Detector:
         """Return the boxes in an RGB image (h, w, 3), in its pixels, the surest first.
 
         Raises:
-            RunFailed: the model failed, or told what cannot be.
+            RunFailed: the model failed, or its outputs cannot be.
         """
         tensor, placement = fit_image(rgb, self._detection.image, self._input.dtype)
         outputs = self._session.run({self._input.name: tensor})
@@ -79,8 +74,8 @@ class Detector:
             ) from error
 
     def _check(self, boxes: Boxes) -> None:
-        """Refuse what would name a thing wrongly or hold noise for sure."""
-        name, count = self._session.model.manifest.name, len(self.classes)
+        """Refuse classes and scores that cannot be."""
+        name, count = self._session.model.manifest.name, len(self._detection.classes)
         if not len(boxes):
             return
         if boxes.classes.min() < 0 or boxes.classes.max() >= count:

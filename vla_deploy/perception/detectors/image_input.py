@@ -1,7 +1,7 @@
 """Turn an image into a detector's input, and its boxes back into the image."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import cv2
@@ -16,7 +16,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputPlacement:
-    """Say where the image lies in the input: pixel p of it is at p * scale + offset."""
+    """Hold where the image lies in the input: pixel p of it is at p * scale + offset."""
 
     scale_x: float
     scale_y: float
@@ -35,8 +35,7 @@ class InputPlacement:
         border = np.array([self.width_px, self.height_px] * 2, dtype=np.float32)
         corners: Floats = ((boxes.corners_px - offset) / scale).clip(0.0, border)
         inside = (corners[:, 2] > corners[:, 0]) & (corners[:, 3] > corners[:, 1])
-        moved = Boxes(corners_px=corners, scores=boxes.scores, classes=boxes.classes)
-        return moved.where(inside)
+        return replace(boxes, corners_px=corners).where(inside)
 
 
 def fit_image(rgb: Image, image: ImageInput, dtype: str) -> tuple[NDArray[Any], InputPlacement]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.lens import ray_table
 
 Floats = NDArray[np.float32]
@@ -27,6 +28,24 @@ EDGE_RATIO = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PosedImage:
+    """Hold an image and the pose of camera and robot when it was taken.
+
+    `base_from_camera` is 4 x 4, from the optical frame (z forward); `base` is the robot's pose in
+    the map; `body` marks the pixels that show the robot itself.
+    """
+
+    rgb: NDArray[np.uint8]
+    depth_m: Floats
+    camera: Intrinsics
+    base_from_camera: NDArray[np.float64]
+    body: Mask
+    base: Pose2D
+    stamp_ns: int
+    aim_sigma_rad: float = AIM_SIGMA_RAD
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cloud:
     """Hold an image's points; `points` is (h, w, 3) in metres, x forward, z up from the floor.
 
@@ -38,9 +57,15 @@ class Cloud:
     points: Floats
     valid: Mask
     own_body: Mask
-    camera_position: NDArray[np.float64]
-    focal_px: float
+    camera: Intrinsics
+    base_from_camera: NDArray[np.float64]
     aim_sigma_rad: float
+
+    @property
+    def camera_position(self) -> NDArray[np.float64]:
+        """Return where the camera is in the base frame."""
+        position: NDArray[np.float64] = self.base_from_camera[:3, 3]
+        return position
 
     def sigma_m(self) -> Floats:
         """Return the depth noise to expect at each pixel."""
@@ -49,7 +74,7 @@ class Cloud:
 
 
 def aim_sigma_rad(turn_rad_s: float) -> float:
-    """Return how well the direction of a camera is known that turns at a rate."""
+    """Return the standard deviation of a camera's direction while it turns at a rate."""
     return math.hypot(AIM_SIGMA_RAD, STAMP_SIGMA_S * turn_rad_s)
 
 
@@ -74,8 +99,8 @@ def make_cloud(
         points=_back_project(depth_m, camera, base_from_camera),
         valid=valid & ~own_body,
         own_body=own_body,
-        camera_position=base_from_camera[:3, 3].copy(),
-        focal_px=camera.fx,
+        camera=camera,
+        base_from_camera=base_from_camera,
         aim_sigma_rad=aim_sigma_rad,
     )
 

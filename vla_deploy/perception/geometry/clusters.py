@@ -1,5 +1,6 @@
-"""Cut what stands on a support into separate things."""
+"""Segment what stands on a support into separate things."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +11,7 @@ from vla_deploy.perception.geometry.cloud import Cloud, Floats, Mask
 from vla_deploy.perception.geometry.supports import Support, inside
 from vla_deploy.perception.naming.colour import colour_names
 
-# What is this high is a thing; what adjoins it and is that high belongs to it.
+# From the first height on it is a thing; what adjoins it belongs to it from the second on.
 MIN_HEIGHT_M, EDGE_HEIGHT_M = 0.004, 0.002
 # Rugs and thresholds are floor.
 MIN_HEIGHT_ON_FLOOR_M = 0.012
@@ -26,7 +27,7 @@ NEAR_M = 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
 TOP_HIDDEN_SHARE = 0.5
-# Of a thing's left or right edge: a hand may hide a third of a box and touch little of its outline.
+# Of a thing's left or right edge: a hand may hide a third of a box and little of its outline.
 END_HIDDEN_SHARE = 0.3
 PART_SHARE = 0.15
 OUTLINE_PX = 3
@@ -66,7 +67,7 @@ class _Hidden:
 
 
 def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
-    """Return the things on each support; furniture and walls are none."""
+    """Return the clusters on each support, without furniture and walls."""
     clusters: list[Cluster] = []
     flat_points = cloud.points.reshape(-1, 3)
     sigma_m = cloud.sigma_m()
@@ -116,7 +117,7 @@ def _split(
             continue
         member = labels == label
         extent = np.ptp(points[member][:, :2], axis=0)
-        # What hangs in the air is carried by a hand, or is a part of the robot.
+        # What floats above the support is carried by a hand, or is a part of the robot.
         lowest_m = float(np.percentile(heights[rows[member], columns[member]], 5.0))
         if extent.max() < MAX_EXTENT_M and lowest_m < FLOATING_M:
             clusters.append(_cluster(cloud, support, heights, standing[member]))
@@ -140,39 +141,32 @@ def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
     return numbered
 
 
-def part_of(cluster: Cluster, cloud: Cloud, member: Mask) -> Cluster | None:
-    """Return a part of a cluster as one of its own, or None where it is too small."""
-    if np.count_nonzero(member) < MIN_PIXELS:
-        return None
-    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
-    heights.flat[cluster.pixels] = cluster.heights
-    return _cluster(cloud, cluster.support, heights, cluster.pixels[member])
-
-
 def split_apart(cluster: Cluster, cloud: Cloud, member: Mask) -> list[Cluster]:
-    """Return what of a part of a cluster stands apart, seen from above; specks are left out."""
+    """Split a part of a cluster into what does not touch, seen from above; drop the small rest."""
     chosen = np.flatnonzero(member)
     if chosen.size < MIN_PIXELS:
         return []
     xy, heights = cluster.points[chosen, :2], cluster.heights[chosen]
     labels = _label(xy, heights, _cell_m(cluster.depth_m))
-    parts = []
-    for label in np.flatnonzero(np.bincount(labels) >= MIN_PIXELS):
-        mask = np.zeros_like(member)
-        mask[chosen[labels == label]] = True
-        parts.append(part_of(cluster, cloud, mask))
-    return [part for part in parts if part is not None]
+    numbers = np.flatnonzero(np.bincount(labels) >= MIN_PIXELS)
+    return _parts(cluster, cloud, (chosen[labels == number] for number in numbers))
 
 
 def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
-    """Return the parts of a cluster that have a colour of their own: things that touch."""
+    """Return the parts of a cluster that differ in colour: things that touch."""
     names = colour_names(cluster.rgb)
     counts = np.bincount(names)
     large = np.flatnonzero(counts >= max(MIN_PIXELS, PART_SHARE * names.size))
     if large.size < 2:
         return [cluster]
-    parts = [part_of(cluster, cloud, names == name) for name in large]
-    return [part for part in parts if part is not None]
+    return _parts(cluster, cloud, (np.flatnonzero(names == name) for name in large))
+
+
+def _parts(cluster: Cluster, cloud: Cloud, parts: Iterable[NDArray[np.intp]]) -> list[Cluster]:
+    """Return clusters of some of a cluster's points each, given by their indices."""
+    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
+    heights.flat[cluster.pixels] = cluster.heights
+    return [_cluster(cloud, cluster.support, heights, cluster.pixels[part]) for part in parts]
 
 
 def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np.intp]) -> Cluster:

@@ -1,8 +1,7 @@
 """Reduce an RGB-D image to the grid on which geometry is measured, whatever the camera's size.
 
-A network wants every pixel that there is; clouds, masks and clusters cost as much as they have
-points, and their bounds (noise, least number of pixels) are those of one density. Smaller images
-stay as they are.
+The detector gets every pixel. The cost of clouds, masks and clusters grows with their points, and
+their bounds (noise, least number of pixels) hold for one density. Smaller images stay as they are.
 """
 
 import math
@@ -89,15 +88,13 @@ class GeometryGrid:
         return (np.rint(found) if depth.dtype == np.uint16 else found).astype(depth.dtype)
 
     def view(self, network: NetworkView | None) -> NetworkView | None:
-        """Return what a network saw in the source's image, its boxes in the grid's pixels."""
+        """Return what was found in the source's image, its boxes in the grid's pixels."""
         if network is None or self.is_whole:
             return network
         across = self.camera.width / self.source.width
         down = self.camera.height / self.source.height
         scale = np.array((across, down) * 2, dtype=np.float32)
-        return replace(
-            network, boxes=replace(network.boxes, corners_px=network.boxes.corners_px * scale)
-        )
+        return network.at(network.boxes.corners_px * scale)
 
 
 def geometry_grid(source: Intrinsics) -> GeometryGrid:

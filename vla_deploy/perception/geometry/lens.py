@@ -1,7 +1,7 @@
-"""Turn pixels into rays and points into pixels, the lens' distortion included.
+"""Convert pixels into rays and points into pixels, with the lens' distortion.
 
-A camera's intrinsics without distortion coefficients are those of a pinhole. The ray of each pixel
-is computed once for a camera and kept, since distortion can only be undone by iteration.
+Intrinsics without distortion coefficients are those of a pinhole. The ray of each pixel is computed
+once for a camera, since distortion can only be undone by iteration.
 """
 
 from functools import lru_cache
@@ -17,8 +17,8 @@ Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
 CAMERAS_KEPT: Final = 4
-# A lens that moves no pixel further than this needs no flattening for a network.
-FLAT_ENOUGH_PX: Final = 1.0
+# A lens that moves no pixel further than this needs no undistortion for a detector.
+MAX_SHIFT_PX: Final = 1.0
 # Beyond the widest ray of the image the distortion polynomial means nothing and may fold back.
 WIDEST_RATIO: Final = 1.2
 _CRITERIA: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9)
@@ -69,22 +69,22 @@ def matrix_of(camera: Intrinsics) -> Array:
     return np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
 
 
-def needs_flattening(camera: Intrinsics) -> bool:
-    """Return whether the lens bends the image by more than a network can overlook."""
-    return bool(camera.distortion) and _largest_shift_px(camera) > FLAT_ENOUGH_PX
+def needs_undistortion(camera: Intrinsics) -> bool:
+    """Return whether the lens moves any pixel by more than `MAX_SHIFT_PX`."""
+    return bool(camera.distortion) and _largest_shift_px(camera) > MAX_SHIFT_PX
 
 
-def flattened(image: NDArray[np.uint8], camera: Intrinsics) -> NDArray[np.uint8]:
+def undistorted(image: NDArray[np.uint8], camera: Intrinsics) -> NDArray[np.uint8]:
     """Return the image that a pinhole of the same focal length and middle would have taken."""
-    columns, rows = _flattening(camera)
+    columns, rows = _undistortion_maps(camera)
     flat: NDArray[np.uint8] = cv2.remap(image, columns, rows, cv2.INTER_LINEAR)
     return flat
 
 
-def bent_boxes(camera: Intrinsics, corners_px: Floats) -> Floats:
-    """Return boxes (n, 4) of a flattened image as they lie in the camera's own image.
+def distorted_boxes(camera: Intrinsics, corners_px: Floats) -> Floats:
+    """Return boxes (n, 4) of an undistorted image as they lie in the camera's own image.
 
-    A box there holds the four bent corners and the middles of the four bent sides.
+    A box there encloses the four bent corners and the middles of the four bent sides.
     """
     if not len(corners_px):
         return corners_px
@@ -110,14 +110,14 @@ def _widest(camera: Intrinsics) -> float:
 
 @lru_cache(maxsize=CAMERAS_KEPT)
 def _largest_shift_px(camera: Intrinsics) -> float:
-    columns, rows = _flattening(camera)
+    columns, rows = _undistortion_maps(camera)
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     return float(np.hypot(columns - u, rows - v).max())
 
 
 @lru_cache(maxsize=CAMERAS_KEPT)
-def _flattening(camera: Intrinsics) -> tuple[Floats, Floats]:
-    """Return from which column and row of the camera's image each flattened pixel comes."""
+def _undistortion_maps(camera: Intrinsics) -> tuple[Floats, Floats]:
+    """Return the column and row of the camera's image from which each undistorted pixel comes."""
     matrix, size = matrix_of(camera), (camera.width, camera.height)
     columns, rows = cv2.initUndistortRectifyMap(
         matrix, _coefficients(camera), None, matrix, size, cv2.CV_32FC1

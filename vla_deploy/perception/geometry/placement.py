@@ -1,4 +1,4 @@
-"""Place a thing: its middle, size and yaw by the form that its class has, and how sure that is."""
+"""Estimate a thing's middle, size and yaw by the form that its class has, and their errors."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 from vla_deploy.perception.geometry.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.geometry.clusters import Cluster
-from vla_deploy.perception.geometry.forms import TurnedFit, fit_lying, fit_upright, sight_frame
+from vla_deploy.perception.geometry.revolution import (
+    RevolutionFit,
+    fit_lying,
+    fit_upright,
+    sight_frame,
+)
 from vla_deploy.perception.geometry.shapes import MeasuredShape, Rectangle, half_turn, rectangle_of
 from vla_deploy.perception.geometry.uncertainty import (
     UNKNOWN_YAW_SIGMA_RAD,
@@ -25,7 +30,7 @@ ROUND_AGREEMENT = 0.3
 # Share of a pixel that is left in the middle of, and in the distance between, two edges.
 MIDDLE_PX = 0.3
 EXTENT_PX = 0.6
-# What fills its rectangle badly has no clear middle and direction; thin parts of it are not seen.
+# What fills its rectangle badly has no clear middle and direction, since thin parts are not seen.
 FULL_RATIO, RAGGED_RATIO, RAGGED_RAD, SKIRT_RATIO = 0.96, 0.3, 1.0, 0.8
 # A disc fills pi / 4 of its square, and has no direction.
 DISC_SQUARENESS, DISC_FILL_RATIO = 0.85, 0.87
@@ -38,10 +43,10 @@ AXIS_PX = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """Hold where a thing is, in the frame of its cloud; covariance and sigmas are one sigma.
+    """Hold where a thing is, in the frame of its cloud.
 
-    `yaw_sigma_rad` is that of the direction of the sides: which of two like sides is the length is
-    a toss. `size_m` is length along yaw, width, height.
+    `size_m` is length along yaw, width, height. `yaw_sigma_rad` is that of the direction of the
+    sides: of two like sides, either may count as the length.
     """
 
     position_m: Vector
@@ -56,7 +61,7 @@ class Placement:
 class _Spot:
     """Hold a form on the floor plan; the sigmas are along and across `direction_rad`.
 
-    `height_m` is None where the highest points tell it best.
+    `height_m` is None where the highest points give it best.
     """
 
     xy: tuple[float, float]
@@ -70,7 +75,7 @@ class _Spot:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
+class _Target:
     """Hold what a form is fitted to."""
 
     cluster: Cluster
@@ -82,19 +87,23 @@ class _Sight:
         return grain_m(self.cluster, self.cloud)
 
     @property
+    def depth_sigma_m(self) -> float:
+        return DEPTH_SIGMA_PER_M * self.cluster.depth_m**2
+
+    @property
     def direction_rad(self) -> float:
         _, sight, _ = sight_frame(self.cluster, self.cloud.camera_position)
         return math.atan2(sight[1], sight[0])
 
 
 def place(cluster: Cluster, shape: MeasuredShape, class_name: str, cloud: Cloud) -> Placement:
-    """Return the place of one thing of a class; "object" where the class is not known."""
-    sight = _Sight(cluster, shape, cloud)
-    spot = _lying(sight) if class_name not in NEVER_LIE else None
-    spot = spot or FORMS.get(class_name, _block)(sight)
+    """Return where a thing of a class is; the class is "object" where it is not known."""
+    target = _Target(cluster, shape, cloud)
+    spot = _lying(target) if class_name not in NEVER_LIE else None
+    spot = spot or FORMS.get(class_name, _block)(target)
     height_m = shape.height_m if spot.height_m is None else spot.height_m
     ground_m = cluster.support.height_m(*spot.xy)
-    grain = sight.grain_m
+    grain = target.grain_m
     hidden = hidden_m(cluster, cloud, max(spot.length_m, spot.width_m))
     aim_m = cloud.aim_sigma_rad * cluster.depth_m
     further_m = math.hypot(hidden, noise_m(cluster), aim_m)
@@ -104,9 +113,9 @@ def place(cluster: Cluster, shape: MeasuredShape, class_name: str, cloud: Cloud)
         size_m=(spot.length_m, spot.width_m, height_m),
         yaw_rad=spot.yaw_rad,
         covariance_m2=covariance(
-            spot.direction_rad, spot.sigma_m, _height_sigma_m(sight), further_m
+            spot.direction_rad, spot.sigma_m, _height_sigma_m(target), further_m
         ),
-        size_sigma_m=(extent_m, extent_m, 2.0 * _height_sigma_m(sight)),
+        size_sigma_m=(extent_m, extent_m, 2.0 * _height_sigma_m(target)),
         yaw_sigma_rad=min(
             UNKNOWN_YAW_SIGMA_RAD,
             math.hypot(spot.yaw_sigma_rad, hidden / max(spot.length_m, grain)),
@@ -114,42 +123,40 @@ def place(cluster: Cluster, shape: MeasuredShape, class_name: str, cloud: Cloud)
     )
 
 
-def _height_sigma_m(sight: _Sight) -> float:
+def _height_sigma_m(target: _Target) -> float:
     """Return the error of the middle's height: half of that of the top."""
-    sigma_m = DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2
-    hidden = 0.5 * sight.shape.height_m if sight.cluster.truncated else 0.0
-    return math.hypot(sigma_m, hidden)
+    hidden = 0.5 * target.shape.height_m if target.cluster.truncated else 0.0
+    return math.hypot(target.depth_sigma_m, hidden)
 
 
-def _lying(sight: _Sight) -> _Spot | None:
+def _lying(target: _Target) -> _Spot | None:
     """Return a cylinder on its side, None where the points are not on one."""
-    base = sight.shape.footprint
+    base = target.shape.footprint
     low, high = LYING_HEIGHT_RATIO
-    if not low < sight.shape.height_m / max(base.width_m, 1e-6) < high:
+    if not low < target.shape.height_m / max(base.width_m, 1e-6) < high:
         return None
-    sigma_m = DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2
-    best: TurnedFit | None = None
+    best: RevolutionFit | None = None
     for turn in (0.0, math.pi / 2):
-        fit = fit_lying(sight.cluster, base.yaw_rad + turn, sight.grain_m, sigma_m)
+        fit = fit_lying(target.cluster, base.yaw_rad + turn, target.grain_m, target.depth_sigma_m)
         if fit is not None and (best is None or fit.agreement > best.agreement):
             best = fit
         if best is not None and best.agreement >= LYING_AGREEMENT:
             break
     if best is None or best.agreement < LYING_AGREEMENT or best.length_m < 2.0 * best.radius_m:
         return None
-    return _spot(sight, best, best.yaw_rad)
+    return _spot(target, best, best.yaw_rad)
 
 
-def _upright(sight: _Sight) -> _Spot:
-    sigma_m = DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2
-    fit = fit_upright(sight.cluster, sight.cloud.camera_position, sight.grain_m, sigma_m)
+def _upright(target: _Target) -> _Spot:
+    camera_position = target.cloud.camera_position
+    fit = fit_upright(target.cluster, camera_position, target.grain_m, target.depth_sigma_m)
     if fit is None or fit.agreement < ROUND_AGREEMENT:
-        return _round_top(sight)
-    return _spot(sight, fit, sight.direction_rad, width_m=sight.shape.across_m)
+        return _round_top(target)
+    return _spot(target, fit, target.direction_rad, width_m=target.shape.across_m)
 
 
 def _spot(
-    sight: _Sight, fit: TurnedFit, direction_rad: float, width_m: float | None = None
+    target: _Target, fit: RevolutionFit, direction_rad: float, width_m: float | None = None
 ) -> _Spot:
     return _Spot(
         xy=fit.xy,
@@ -158,72 +165,72 @@ def _spot(
         yaw_rad=fit.yaw_rad,
         sigma_m=fit.sigma_xy_m,
         direction_rad=direction_rad,
-        yaw_sigma_rad=math.hypot(fit.yaw_sigma_rad, AXIS_PX * sight.grain_m / fit.length_m),
+        yaw_sigma_rad=math.hypot(fit.yaw_sigma_rad, AXIS_PX * target.grain_m / fit.length_m),
     )
 
 
-def _round_top(sight: _Sight) -> _Spot:
+def _round_top(target: _Target) -> _Spot:
     """Take the middle of the top: it is seen whole, while the far side is hidden."""
-    return _round(sight, sight.shape.top, sight.shape.across_m)
+    return _round(target, target.shape.top, target.shape.across_m)
 
 
-def _rim(sight: _Sight) -> _Spot:
+def _rim(target: _Target) -> _Spot:
     """Take the rim alone: below it a handle sticks out, and only the near side is seen."""
-    heights = sight.cluster.heights
-    thick_m = max(RIM_M, RIM_SIGMAS * DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2)
-    rim = sight.cluster.points[heights > sight.shape.height_m - thick_m]
-    top = rectangle_of(rim[:, :2]) if len(rim) >= RIM_POINTS else sight.shape.top
-    return _round(sight, top, 0.5 * (top.length_m + top.width_m) + 0.5 * sight.grain_m)
+    heights = target.cluster.heights
+    thick_m = max(RIM_M, RIM_SIGMAS * DEPTH_SIGMA_PER_M * target.cluster.depth_m**2)
+    rim = target.cluster.points[heights > target.shape.height_m - thick_m]
+    top = rectangle_of(rim[:, :2]) if len(rim) >= RIM_POINTS else target.shape.top
+    return _round(target, top, 0.5 * (top.length_m + top.width_m) + 0.5 * target.grain_m)
 
 
-def _round(sight: _Sight, top: Rectangle, width_m: float) -> _Spot:
-    middle_m = MIDDLE_PX * sight.grain_m
+def _round(target: _Target, top: Rectangle, width_m: float) -> _Spot:
+    middle_m = MIDDLE_PX * target.grain_m
     return _Spot(
         xy=top.centre,
         length_m=width_m,
         width_m=width_m,
         yaw_rad=0.0,
         sigma_m=(2.0 * middle_m, middle_m),
-        direction_rad=sight.direction_rad,
+        direction_rad=target.direction_rad,
         yaw_sigma_rad=UNKNOWN_YAW_SIGMA_RAD,
     )
 
 
-def _ball(sight: _Sight) -> _Spot:
-    sphere = sight.shape.sphere
+def _ball(target: _Target) -> _Spot:
+    sphere = target.shape.sphere
     if sphere is None:
-        return _block(sight)
-    sigma_m = MIDDLE_PX * sight.grain_m
+        return _block(target)
+    sigma_m = MIDDLE_PX * target.grain_m
     return _Spot(
         xy=sphere.centre[:2],
         length_m=2.0 * sphere.radius_m,
         width_m=2.0 * sphere.radius_m,
         yaw_rad=0.0,
         sigma_m=(sigma_m, sigma_m),
-        direction_rad=sight.direction_rad,
+        direction_rad=target.direction_rad,
         yaw_sigma_rad=UNKNOWN_YAW_SIGMA_RAD,
         height_m=2.0 * sphere.radius_m,
     )
 
 
-def _box(sight: _Sight) -> _Spot:
-    return _rectangle(sight, sight.shape.top)
+def _box(target: _Target) -> _Spot:
+    return _rectangle(target, target.shape.top)
 
 
-def _block(sight: _Sight) -> _Spot:
-    base = sight.shape.footprint
+def _block(target: _Target) -> _Spot:
+    base = target.shape.footprint
     if base.width_m > DISC_SQUARENESS * base.length_m and base.fill_ratio < DISC_FILL_RATIO:
-        return _round(sight, base, 0.5 * (base.length_m + base.width_m))
-    return _rectangle(sight, base)
+        return _round(target, base, 0.5 * (base.length_m + base.width_m))
+    return _rectangle(target, base)
 
 
-def _rectangle(sight: _Sight, base: Rectangle) -> _Spot:
+def _rectangle(target: _Target, base: Rectangle) -> _Spot:
     ragged = max(0.0, FULL_RATIO - base.fill_ratio)
-    whole = sight.shape.whole
-    # Low parts, such as the blades of keys, are not what one grips, but belong to the thing.
+    whole = target.shape.whole
+    # Low parts, such as the blades of keys, are not gripped, but belong to the thing.
     skirt_m = math.dist(base.centre, whole.centre)
-    skirt_rad = abs(half_turn(whole.yaw_rad - base.yaw_rad)) if skirt_m > sight.grain_m else 0.0
-    middle_m = MIDDLE_PX * sight.grain_m + RAGGED_RATIO * ragged * base.length_m
+    skirt_rad = abs(half_turn(whole.yaw_rad - base.yaw_rad)) if skirt_m > target.grain_m else 0.0
+    middle_m = MIDDLE_PX * target.grain_m + RAGGED_RATIO * ragged * base.length_m
     middle_m += SKIRT_RATIO * skirt_m
     return _Spot(
         xy=base.centre,
@@ -232,14 +239,14 @@ def _rectangle(sight: _Sight, base: Rectangle) -> _Spot:
         yaw_rad=base.yaw_rad,
         sigma_m=(middle_m, middle_m),
         direction_rad=base.yaw_rad,
-        yaw_sigma_rad=TURN_PX * sight.grain_m / max(base.length_m, 1e-6)
+        yaw_sigma_rad=TURN_PX * target.grain_m / max(base.length_m, 1e-6)
         + RAGGED_RAD * ragged
         + SKIRT_RATIO * skirt_rad,
     )
 
 
 NEVER_LIE = frozenset({"ball", "box", "bowl", "phone", "keys", "remote"})
-FORMS: dict[str, Callable[[_Sight], _Spot]] = {
+FORMS: dict[str, Callable[[_Target], _Spot]] = {
     "bottle": _upright,
     "can": _upright,
     "cup": _rim,

@@ -1,4 +1,4 @@
-"""Measure what a cluster of points says about its thing's size and form."""
+"""Measure size and form of a cluster of points."""
 
 import math
 from dataclasses import dataclass
@@ -47,10 +47,10 @@ class Sphere:
 class MeasuredShape:
     """Hold the measures that the class rules look at.
 
-    `across_m` is the width as seen from the camera, which no far side can hide. `hole_m` is how far
-    the inside lies below the rim, 0 for what has no rim; `rim_share` is how much of the way around
-    the middle the rim is seen. `sphere` is None where none fits. `whole` is the rectangle around
-    low edges, too, which the other measures leave out: the rings and blades of keys.
+    `across_m` is the width as seen from the camera, of which nothing is hidden. `hole_m` is how far
+    the inside lies below the rim, 0 without a rim; `rim_share` is the share of directions from the
+    middle in which a rim is seen. `sphere` is None where none fits. `whole` is the rectangle around
+    low edges, too, such as the rings and blades of keys, which the other measures leave out.
     """
 
     height_m: float
@@ -136,7 +136,7 @@ def _hole(cluster: Cluster, rim: Rectangle, height_m: float, pixel_m: float) -> 
         return 0.0
     middle = cluster.heights[inside_rectangle(cluster.points[:, :2], rim, RIM_MARGIN_M)]
     if middle.size < SOLID_SHARE * length_m * width_m / pixel_m**2:
-        # A lid would fill the middle with points: one looks down onto the support.
+        # A lid would fill the middle with points: the support is seen instead.
         return height_m
     return max(0.0, height_m - float(np.median(middle)))
 

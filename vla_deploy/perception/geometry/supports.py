@@ -11,7 +11,7 @@ from vla_deploy.perception.geometry.cloud import Cloud, Floats, Mask, upward_are
 BIN_M = 0.01
 LAYER_M = 0.015
 MIN_AREA_M2 = 0.04
-# So little of a surface is enough where one is known: the rest is hidden by what stands on it.
+# Enough where a surface is known: the rest is hidden by what stands on it.
 MIN_KNOWN_AREA_M2 = 0.01
 SAME_LEVEL_M = 0.02
 MAX_SUPPORTS = 6
@@ -148,13 +148,12 @@ def _pieces(
     _, labels = cv2.connectedComponents(grid, connectivity=8)
     label = labels[cells[:, 0], cells[:, 1]]
     areas = np.bincount(label, weights=area[on_plane])
-    pieces = [xy[label == index] for index in np.flatnonzero(areas >= MIN_KNOWN_AREA_M2)]
-    large = areas[areas >= MIN_KNOWN_AREA_M2] >= MIN_AREA_M2
-    return [
-        Support(plane=plane, outline=_outline(piece))
-        for piece, is_large in zip(pieces, large, strict=True)
-        if is_large or _is_on(piece, known)
-    ]
+    supports = []
+    for index in np.flatnonzero(areas >= MIN_KNOWN_AREA_M2):
+        piece = xy[label == index]
+        if areas[index] >= MIN_AREA_M2 or _is_on(piece, known):
+            supports.append(Support(plane=plane, outline=_outline(piece)))
+    return supports
 
 
 def _is_on(piece: Floats, known: Sequence[KnownSurface]) -> bool:

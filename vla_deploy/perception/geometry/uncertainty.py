@@ -1,4 +1,4 @@
-"""Say how far off an estimate may be: from noise, grain, what is hidden, and the camera's aim.
+"""Estimate the error of a place: noise, pixel size, hidden parts, and the camera's direction.
 
 The constants were set so that of the errors on the twin's random scenes the right share lies within
 the 95 % ellipse (`benchmarks/perception_geometry.py` measures it); real cameras have more faults
@@ -13,23 +13,17 @@ from numpy.typing import NDArray
 
 from vla_deploy.perception.geometry.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.geometry.clusters import Cluster
+from vla_deploy.perception.geometry.rotation import yaw_rotation
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
-UNKNOWN_SIGMA_M = 0.05
-UNKNOWN_MATRIX: Matrix = (
-    (UNKNOWN_SIGMA_M**2, 0.0, 0.0),
-    (0.0, UNKNOWN_SIGMA_M**2, 0.0),
-    (0.0, 0.0, UNKNOWN_SIGMA_M**2),
-)
-UNKNOWN_SIZE_SIGMA_M: Vector = (UNKNOWN_SIGMA_M, UNKNOWN_SIGMA_M, UNKNOWN_SIGMA_M)
-# That of a direction of which nothing is known: evenly spread over half a turn.
+# Of an unknown direction: evenly spread over half a turn.
 UNKNOWN_YAW_SIGMA_RAD = math.pi / math.sqrt(12.0)
 
 FLOOR_M = 0.0008
-# Error of a thing's middle, as a share of its size, from what the border or something nearer hides.
+# Error of a thing's middle, as a share of its size, where border or something nearer hides a part.
 TRUNCATED_RATIO = 0.3
 OCCLUDED_RATIO = 0.15
 HOLE_RATIO = 0.5
@@ -39,7 +33,7 @@ PIXELS_PER_SAMPLE = 9.0
 
 def grain_m(cluster: Cluster, cloud: Cloud) -> float:
     """Return the size of a pixel at a cluster's distance."""
-    return cluster.depth_m / cloud.focal_px
+    return cluster.depth_m / cloud.camera.fx
 
 
 def noise_m(cluster: Cluster) -> float:
@@ -89,7 +83,6 @@ def covariance(
 
 def turned(matrix: Matrix, yaw_rad: float) -> Matrix:
     """Return a covariance in a frame in which the old one is turned by `yaw_rad`."""
-    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn = yaw_rotation(yaw_rad)
     rows = (turn @ np.array(matrix) @ turn.T).tolist()
     return (tuple(rows[0]), tuple(rows[1]), tuple(rows[2]))

@@ -1,4 +1,4 @@
-"""Find things in an RGB-D image: clusters on supports, named by form and network, with a colour."""
+"""Find things in an RGB-D image: clusters on supports, named by form and detector."""
 
 import math
 from dataclasses import dataclass
@@ -21,16 +21,13 @@ from vla_deploy.perception.geometry.shapes import (
 )
 from vla_deploy.perception.geometry.supports import Support
 from vla_deploy.perception.geometry.uncertainty import (
-    UNKNOWN_MATRIX,
-    UNKNOWN_SIZE_SIGMA_M,
-    UNKNOWN_YAW_SIGMA_RAD,
     Matrix,
 )
 from vla_deploy.perception.geometry.uncertainty import Vector as Vector
 from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.naming.class_fusion import Name, NameSource, fuse_name, name_by_form
 from vla_deploy.perception.naming.classes import OTHER, Form, judge_form
 from vla_deploy.perception.naming.colour import dominant_colour
-from vla_deploy.perception.naming.object_name import Name, NameSource, by_both, by_form
 
 FEW_PIXELS = 60
 FLAT_SIGMAS = 4.0
@@ -44,9 +41,9 @@ class Detection:
     """Hold one thing as one image shows it, in the frame of the cloud.
 
     `position_m` is its centre: for a box that of its rim's rectangle, half its height below the
-    rim. `size_m` is length along yaw, width, height. Of a truncated thing, class and measures are
+    rim. `size_m` is length along yaw, width, height. Class and measures of a truncated thing are
     guesses: the image's border or something nearer hides its end or its top. The covariance of the
-    position and the sigmas of size and yaw say how sure each is; they grow with what is not seen.
+    position and the sigmas of size and yaw grow with what is not seen.
     """
 
     class_name: str
@@ -58,15 +55,15 @@ class Detection:
     truncated: bool
     occluded: bool
     box_px: tuple[int, int, int, int]
-    covariance_m2: Matrix = UNKNOWN_MATRIX
-    size_sigma_m: Vector = UNKNOWN_SIZE_SIGMA_M
-    yaw_sigma_rad: float = UNKNOWN_YAW_SIGMA_RAD
-    named_by: NameSource = NameSource.FORM
+    covariance_m2: Matrix
+    size_sigma_m: Vector
+    yaw_sigma_rad: float
+    named_by: NameSource
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
-    """Hold one image: its points, and what a network saw in it, if there is one at work."""
+class _View:
+    """Hold one image: its points, and what the detector found in it, if there is one at work."""
 
     cloud: Cloud
     network: NetworkView | None
@@ -77,13 +74,12 @@ def detect(
 ) -> list[Detection]:
     """Return the things that stand on the supports, the nearest first.
 
-    Where they are and how large comes from their points alone; what they are, from their form and
-    what a network saw.
+    Place and size come from their points alone, the name from their form and the detector.
     """
-    look = _Look(cloud, network)
+    view = _View(cloud, network)
     clusters = find_clusters(cloud, supports)
     clusters.sort(key=lambda cluster: cluster.depth_m)
-    found = [detection for cluster in clusters for detection in _detections(cluster, look)]
+    found = [detection for cluster in clusters for detection in _detections(cluster, view)]
     boxes = [detection for detection in found if detection.class_name == "box"]
     return [
         detection
@@ -105,18 +101,18 @@ def _is_bare_face(detection: Detection) -> bool:
     return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
 
 
-def _detections(cluster: Cluster, look: _Look) -> list[Detection]:
+def _detections(cluster: Cluster, view: _View) -> list[Detection]:
     """Return one thing, or several that touch where each part by itself is a known one."""
-    whole = _detection(cluster, look)
+    whole = _detection(cluster, view)
     if whole.class_name == "box":
-        return [whole, *_contents(whole, cluster, look)]
+        return [whole, *_contents(whole, cluster, view)]
     if whole.named_by in (NameSource.FORM, NameSource.BOTH):
         return [whole]
-    parts = [_detection(part, look) for part in split_by_colour(cluster, look.cloud)]
+    parts = [_detection(part, view) for part in split_by_colour(cluster, view.cloud)]
     return [whole] if any(part.class_name == OTHER for part in parts) else parts
 
 
-def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
+def _contents(box: Detection, cluster: Cluster, view: _View) -> list[Detection]:
     """Return the known things that stand within a box's walls.
 
     Between its walls a corner of the rim may show a pixel of its own, which belongs to nothing.
@@ -125,8 +121,8 @@ def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
     length_m, width_m, _ = box.size_m
     rim = Rectangle(centre=(x, y), length_m=length_m, width_m=width_m, yaw_rad=box.yaw_rad)
     within = inside_rectangle(cluster.points[:, :2], rim, WALL_M)
-    parts = split_apart(cluster, look.cloud, within & (cluster.heights > BOX_FLOOR_M))
-    contents = (_detection(part, look) for part in parts)
+    parts = split_apart(cluster, view.cloud, within & (cluster.heights > BOX_FLOOR_M))
+    contents = (_detection(part, view) for part in parts)
     return [one for one in contents if one.class_name != OTHER and one.colour != box.colour]
 
 
@@ -140,18 +136,18 @@ def _name(cluster: Cluster, shape: MeasuredShape, network: NetworkView | None) -
     if shape.height_m <= _least_height_m(cluster):
         form = Form(name=OTHER, fits=frozenset(), impossible=form.impossible)
     if network is None:
-        return by_form(form)
-    words = network.words_for(cluster.box_px)
-    if not words:
-        return by_form(form, network.silence(cluster.box_px, form.name))
-    return by_both(form, words)
+        return name_by_form(form)
+    votes = network.votes_for(cluster.box_px)
+    if not votes:
+        return name_by_form(form, network.recall_at(cluster.box_px, form.name))
+    return fuse_name(form, votes)
 
 
-def _detection(cluster: Cluster, look: _Look) -> Detection:
-    shape = measure(cluster, look.cloud.camera_position, look.cloud.focal_px)
-    name = _name(cluster, shape, look.network)
+def _detection(cluster: Cluster, view: _View) -> Detection:
+    shape = measure(cluster, view.cloud.camera_position, view.cloud.camera.fx)
+    name = _name(cluster, shape, view.network)
     colour, share = dominant_colour(cluster.rgb[cluster.upper()])
-    placed = place(cluster, shape, name.class_name, look.cloud)
+    placed = place(cluster, shape, name.class_name, view.cloud)
     enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
     whole = 0.6 if cluster.truncated or cluster.occluded else 1.0
     return Detection(

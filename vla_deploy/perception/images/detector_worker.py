@@ -1,8 +1,8 @@
-"""Ask the network what an image shows, beside the steps; do without it when it fails.
+"""Run the detector outside the steps, and go on without it when it fails.
 
-The rule of doing without: a robot whose network cannot be opened, fails, or takes too long goes on
-by form alone, and says so; what stands in its way and where it is never depend on the network. A
-change that would take the network away from a robot that has one is refused instead.
+A robot whose detector cannot be opened, fails, or takes too long names things by their form alone,
+and publishes why; its obstacles and its own pose never depend on the detector. A change of profile
+that would take away a detector at work is refused instead.
 """
 
 import logging
@@ -20,14 +20,14 @@ from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.runtime.one_line import one_line
 
 LATE_NS: Final = NS_PER_S
-"""An image is looked at by form alone when the network has not answered within this time."""
+"""The things of an image are named by form alone when the detector has not answered by then."""
 FAILURES_TO_DISMISS: Final = 3
-"""Runs in a row after which a network is asked no more."""
+"""Failed runs in a row after which a detector is dismissed."""
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Network:
+class LoadedDetector:
     """Hold an open detector, or why there is none."""
 
     detector: Detector | None
@@ -41,40 +41,39 @@ class Network:
 
 @dataclass(frozen=True, slots=True)
 class DetectorAnswer:
-    """Hold what a network saw; None where there is none, it failed, or it took too long."""
+    """Hold what the detector found; None where there is none, it failed, or it took too long."""
 
     view: NetworkView | None
 
 
-def open_network(
-    shelf: ModelShelf, profile: Profile, model_tier: int, *, instead_of_one: bool = False
-) -> Network:
-    """Open the detector that a profile chooses; where it has none, say why there is none.
+def load_detector(
+    shelf: ModelShelf, profile: Profile, model_tier: int, *, replaces_one: bool = False
+) -> LoadedDetector:
+    """Open the detector that a profile chooses, or return why there is none.
 
     Raises:
-        InferenceError: it cannot be opened, and the profile requires it, or it would take the place
-            of one that is at work.
+        InferenceError: it cannot be opened, and the profile requires it or another one is at work.
     """
     choice = profile.models.get(ROLE)
     if choice is None:
-        return Network(detector=None, why=f"profile {profile.name} names no detector")
+        return LoadedDetector(detector=None, why=f"profile {profile.name} names no detector")
     try:
-        return Network(detector=open_detector(shelf, profile, model_tier))
+        return LoadedDetector(detector=open_detector(shelf, profile, model_tier))
     except InferenceError as error:
-        if choice.required or instead_of_one:
+        if choice.required or replaces_one:
             raise
         _log.error("degraded: things are named by their form alone: %s", error)
-        return Network(detector=None, why=one_line(error))
+        return LoadedDetector(detector=None, why=one_line(error))
 
 
-class Eyes:
-    """Hold the network at work, and ask it about one image at a time."""
+class DetectorWorker:
+    """Hold the detector at work, and ask it about one image at a time."""
 
     def __init__(self, executor: Executor, clock: Clock) -> None:
-        """Take an executor of one thread over, or one that works at once."""
+        """Own an executor: one thread, or one that runs each task at once."""
         self._executor = executor
         self._clock = clock
-        self._network = Network(detector=None, why="not opened yet")
+        self._loaded = LoadedDetector(detector=None, why="not opened yet")
         self._asked: Future[NetworkView] | None = None
         self._asked_ns = 0
         self._given_up = False
@@ -84,40 +83,40 @@ class Eyes:
         self._trouble = ""
 
     @property
-    def network(self) -> Network:
+    def loaded(self) -> LoadedDetector:
         """Return what is at work."""
-        return self._network
+        return self._loaded
 
-    def take(self, network: Network) -> Network:
-        """Put another network to work from the next image on; return the one before."""
-        before, self._network = self._network, network
+    def replace(self, loaded: LoadedDetector) -> LoadedDetector:
+        """Use another detector from the next image on; return the one before."""
+        before, self._loaded = self._loaded, loaded
         self._failures, self._trouble = 0, ""
         return before
 
-    def release(self, network: Network) -> None:
-        """Close a network that is at work no more, behind what it was asked last."""
+    def release(self, loaded: LoadedDetector) -> None:
+        """Close a detector that is no longer at work, after its last run."""
         if self._closed:
-            network.close()
+            loaded.close()
         else:
-            self._executor.submit(network.close)
+            self._executor.submit(loaded.close)
 
     def close(self) -> None:
-        """Release everything; an answer under way is given up."""
+        """Release everything; a run under way is abandoned."""
         self._closed = True
         self._executor.shutdown(wait=False, cancel_futures=True)
-        self._network.close()
+        self._loaded.close()
 
     def ask(self, rgb: Image) -> None:
-        """Ask about an image, unless the last answer is still under way."""
+        """Start the detector on an image, unless it is still busy with the last one."""
         if self._given_up and self._asked is not None and self._asked.done():
             self._asked, self._given_up = None, False
-        detector = self._network.detector
+        detector = self._loaded.detector
         if detector is not None and self._asked is None:
             self._asked_ns = self._clock.now_ns()
-            self._asked = self._executor.submit(_look, detector, rgb)
+            self._asked = self._executor.submit(_detect, detector, rgb)
 
     def answer(self) -> DetectorAnswer | None:
-        """Return what the network saw in the image that was asked about last; None: wait on."""
+        """Return what the detector found in the last image, None while it is still at work."""
         if self._asked is None or self._given_up:
             return DetectorAnswer(view=None)
         if not self._asked.done():
@@ -132,11 +131,11 @@ class Eyes:
         return DetectorAnswer(view=view)
 
     def document(self) -> dict[str, Any]:
-        """Return how things are named at present, as the scene topic tells it."""
-        detector = self._network.detector
+        """Return how things are named at present, for the scene topic."""
+        detector = self._loaded.detector
         return {
             "mode": "form" if detector is None or self._trouble else "network",
-            "why": self._trouble or self._network.why,
+            "why": self._trouble or self._loaded.why,
             "late": self._late,
             "model": None if detector is None else detector.stats().document(),
         }
@@ -154,10 +153,10 @@ class Eyes:
         self._trouble = why
         if self._failures < FAILURES_TO_DISMISS:
             return
-        told = f"{why}; {FAILURES_TO_DISMISS} runs in a row failed, it is asked no more"
-        _log.error("degraded: things are named by their form alone: %s", told)
-        self.release(self.take(Network(detector=None, why=told)))
+        reason = f"{why}; {FAILURES_TO_DISMISS} runs in a row failed, it is asked no more"
+        _log.error("degraded: things are named by their form alone: %s", reason)
+        self.release(self.replace(LoadedDetector(detector=None, why=reason)))
 
 
-def _look(detector: Detector, rgb: Image) -> NetworkView:
+def _detect(detector: Detector, rgb: Image) -> NetworkView:
     return NetworkView.of(detector.detect(rgb), detector.detection)

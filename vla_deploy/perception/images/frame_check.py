@@ -1,9 +1,9 @@
-"""Judge whether an image can be what the camera sees now: one table of limits, one rule each.
+"""Judge whether an image can be what the camera sees now, by one table of limits.
 
-A rule takes what its fault spoils. A grainy image is not shown to the network; without colours
-nothing is named, but depth still tells what stands in the way; without depth, or in an image that
-is not of now, nothing is told. What is not told becomes stale, and whoever relies on it acts by its
-own rule for that.
+A fault takes away only what it spoils. A grainy image is not given to the detector; without colours
+nothing is named, but depth still shows obstacles; without depth, or where an image is not of the
+present, nothing is published. What is not published becomes stale, and its readers act on that by
+their own rules.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ STALE_COLOUR_RATIO: Final = 0.6
 
 
 class ImageUse(IntEnum):
-    """Say what an image is good for: each use includes those below it."""
+    """Say what an image is good for; each use includes those below it."""
 
     NOTHING = 0
     OBSTACLES = 1
@@ -143,12 +143,12 @@ class ImageVerdict:
     faults: tuple[str, ...]
 
     def document(self) -> dict[str, Any]:
-        """Return the verdict as the scene topic tells it."""
+        """Return the verdict for the scene topic."""
         return {"use": self.use.name.lower(), "faults": list(self.faults)}
 
 
 def judge_frame(seen: FrameStatistics) -> ImageVerdict:
-    """Return what an image with these statistics is good for; all that spoils it is told."""
+    """Return what an image with these statistics is good for, with each fault that limits it."""
     beyond = [limit for limit in LIMITS if limit.measure(seen) > limit.most]
     worst = min((limit.leaves for limit in beyond), default=ImageUse.ALL)
     return ImageVerdict(

@@ -1,4 +1,4 @@
-"""Measure what tells a sound image from a spoiled one, by itself and beside the one before."""
+"""Measure what distinguishes a sound image from a spoiled one, alone and against earlier ones."""
 
 import math
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ WHITE_LEVEL: Final = 252
 EMPTY_LEVEL: Final = 2
 ONE_COLOUR_LEVELS: Final = 1
 NEAR_WALL_M: Final = 1.0
-"""A wall nearer than this may fill the view, and without noise it may have but one colour."""
+"""A nearer wall may fill the view, and without noise it may have one colour only."""
 THUMB_PX: Final = (40, 30)
 PLAIN_LEVELS: Final = 6.0
-"""Contrast of an image in which nothing could be seen to move, such as one of a bare wall."""
+"""Contrast below which a move of the camera changes nothing, such as before a bare wall."""
 SAME_LEVELS: Final = 0.7
 ROW_STRIDE: Final = 4
 SATURATED_DEPTH: Final = np.iinfo(np.uint16).max
-TELLING_SHARE: Final = 0.25
-"""Share of a row that must be noisy for the row to tell, and of the rows that must tell.
+LEAST_SHARE: Final = 0.25
+"""Share of a row that must be noisy for the row to count, and of the rows that must count.
 
-Of fewer pixels, all may be the same by chance.
+Fewer pixels may all be the same by chance.
 """
 LEAST_SIGMA_M: Final = 0.0005
 _SECOND_DIFFERENCE: Final = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
@@ -43,10 +43,10 @@ _MEDIAN_OF_NOISE: Final = 0.6745 * math.sqrt(6.0)
 class FrameStatistics:
     """Hold the measures of one image.
 
-    `unmoved_rad` is by how much the camera has turned since images began to show the same; 0 where
-    they do not, or show too little to tell. `stale_colour_ratio` is 0 as long as the
-    camera has not moved meanwhile. Ratios are shares of pixels or rows, from 0 to 1.
-    `silent_s` is for how long none has come.
+    Ratios are shares of pixels or rows, from 0 to 1. `unmoved_rad` is by how much the camera has
+    turned since images began to show the same; 0 where they do not, or show too little to decide.
+    `stale_colour_ratio` is 0 as long as the camera has not moved meanwhile. `silent_s` is the time
+    since the last image.
     """
 
     dark_ratio: float = 0.0
@@ -63,8 +63,8 @@ class FrameStatistics:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Glance:
-    """Hold what is kept of an image to compare the next one with.
+class FrameSignature:
+    """Hold what is kept of an image to compare later ones with.
 
     `depth_rows` are true for rows of depth that cannot be the same twice, `colour_rows` for rows of
     colour that cannot when the camera moves.
@@ -77,8 +77,8 @@ class Glance:
     colour_rows: Mask
 
     @classmethod
-    def of(cls, frame: RgbdFrame) -> "Glance":
-        """Return what is to be kept of an image."""
+    def of(cls, frame: RgbdFrame) -> "FrameSignature":
+        """Return what is kept of an image."""
         grey = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)
         small = cv2.resize(grey, THUMB_PX, interpolation=cv2.INTER_AREA)
         return cls(
@@ -89,7 +89,7 @@ class Glance:
             colour_rows=grey[:, ::ROW_STRIDE].std(axis=1) >= PLAIN_LEVELS,
         )
 
-    def shows_the_same(self, other: "Glance") -> bool:
+    def shows_the_same(self, other: "FrameSignature") -> bool:
         """Return whether two images show the same view of something that has contrast."""
         plain = min(float(self.thumb.std()), float(other.thumb.std())) < PLAIN_LEVELS
         change = float(np.abs(self.thumb - other.thumb).mean())
@@ -98,14 +98,14 @@ class Glance:
     def stale_ratio(self, depth: Depth) -> float:
         """Return the share of rows with noisy depth in which not one bit of depth differs.
 
-        No sensor's depth is as still as that. Colours may be, in a row that is black or white, and
-        they may come anew beside a depth that does not.
+        No sensor's depth repeats like that. Colours may, in a row that is black or white, and they
+        may be live while the depth has stopped.
         """
         if self.depth.shape != depth.shape:
             return 0.0
         return _share_of((self.depth == depth).all(axis=1), self.depth_rows)
 
-    def stale_colour_ratio(self, other: "Glance") -> float:
+    def stale_colour_ratio(self, other: "FrameSignature") -> float:
         """Return the share of rows with contrast in which not one bit of colour differs."""
         if self.rgb.shape != other.rgb.shape:
             return 0.0
@@ -126,22 +126,22 @@ def measure_frame(rgb: Image, depth_m: Floats) -> FrameStatistics:
 
 
 def _noisy_rows(frame: RgbdFrame) -> Mask:
-    """Return which rows have depth that a stereo camera could not tell twice alike.
+    """Return which rows have depth that a stereo camera could not measure twice alike.
 
-    Nearer than this, its noise is lost in the rounding: along a near wall depth may stay the same.
+    Of nearer pixels the noise is lost in the rounding: along a near wall depth may stay the same.
     """
     noisy_from_m = math.sqrt(0.5 * frame.depth_unit_m / DEPTH_SIGMA_PER_M)
     far = (frame.depth >= noisy_from_m / frame.depth_unit_m) & (frame.depth < SATURATED_DEPTH)
-    rows: Mask = np.count_nonzero(far, axis=1) >= TELLING_SHARE * far.shape[1]
+    rows: Mask = np.count_nonzero(far, axis=1) >= LEAST_SHARE * far.shape[1]
     return rows
 
 
-def _share_of(same: Mask, telling: Mask) -> float:
-    """Return the share of the telling rows that are the same; 0 where too few tell."""
-    count = int(np.count_nonzero(telling))
-    if count < TELLING_SHARE * len(telling):
+def _share_of(same: Mask, counted: Mask) -> float:
+    """Return the share of the counted rows that are the same; 0 where those are too few."""
+    count = int(np.count_nonzero(counted))
+    if count < LEAST_SHARE * len(counted):
         return 0.0
-    return int(np.count_nonzero(same & telling)) / count
+    return int(np.count_nonzero(same & counted)) / count
 
 
 def _share_between(rgb: Image, low: int, high: int) -> float:

@@ -1,166 +1,121 @@
-"""Look at the camera's images: what stands in the way at once, what things are as soon as asked."""
+"""Process the camera's images: near obstacles at once, things once the detector has answered."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.cloud import aim_sigma_rad
+from vla_deploy.navigation.localising.localisation import Localiser
+from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.geometry.rotation import angle_rad
-from vla_deploy.perception.images.detector_worker import Eyes
+from vla_deploy.perception.images.detector_worker import DetectorWorker
 from vla_deploy.perception.images.frame_check import ImageUse
-from vla_deploy.perception.images.frame_watch import FrameWatch
-from vla_deploy.perception.images.network_view import NetworkView
-from vla_deploy.perception.images.pinhole_view import as_pinhole, in_image
+from vla_deploy.perception.images.frame_monitor import FrameMonitor
+from vla_deploy.perception.images.network_view import as_pinhole, to_camera_image
 from vla_deploy.perception.objects.body_state import Array, BodyState
 from vla_deploy.perception.objects.near_obstacles import NearObstacles
 from vla_deploy.perception.objects.scene import Scene
-from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.world.surfaces import Point
 
-# An image is used only where the camera was nearly still before its exposure.
+# Things are placed by images before whose exposure the camera was nearly still.
 STILL_WINDOW_NS: Final = 60_000_000
 MAX_CAMERA_TURN_RAD_S: Final = 0.35
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ImageMoment:
-    """Hold an image and how the robot stood when it was taken.
-
-    `seen` is the image on the geometry's `grid`, with its depth in metres and a mask of the robot;
-    `track` is where it was by dead reckoning, `view` turns the camera into that frame, 3 x 3: a
-    robot that finds out where it really is has not moved.
-    """
-
-    grid: GeometryGrid
-    seen: RgbdFrame
-    depth_m: NDArray[np.float32]
-    base_from_camera: Array
-    base: Pose2D
-    track: Pose2D
-    body: NDArray[np.bool_]
-    view: Array
-    turn_rad_s: float
-
-
-class Looking:
-    """Turn images into obstacles and a scene; one image at a time waits for the network."""
+class ImagePipeline:
+    """Turn images into obstacles and a scene; one image at a time waits for the detector."""
 
     def __init__(
         self,
         body: BodyState,
-        whereabouts: Whereabouts,
-        eyes: Eyes,
+        localiser: Localiser,
+        worker: DetectorWorker,
         furniture: Mapping[str, Point],
     ) -> None:
         self.scene = Scene(furniture)
         self.obstacles = NearObstacles()
         self._body = body
-        self._whereabouts = whereabouts
-        self._eyes = eyes
-        self._watch = FrameWatch()
-        self._waiting: ImageMoment | None = None
+        self._localiser = localiser
+        self._worker = worker
+        self._monitor = FrameMonitor()
+        self._waiting: tuple[PosedImage, GeometryGrid] | None = None
 
-    def came(self, frame: RgbdFrame, now_ns: int) -> None:
-        """Take note that an image has come, whether it is looked at or not."""
-        self._watch.came(frame, now_ns)
+    def receive(self, frame: RgbdFrame, now_ns: int) -> None:
+        """Record that an image has arrived, whether it is processed or not."""
+        self._monitor.receive(frame, now_ns)
 
-    def see(self, frame: RgbdFrame) -> bool:
-        """Take a new image; return whether the obstacles around are new."""
+    def process(self, frame: RgbdFrame) -> bool:
+        """Process a new image; return whether the obstacles around are new."""
         positions = self._body.at(frame.stamp_ns)
         if positions is None:
             return False
-        moment = self._moment(frame, positions)
-        verdict = self._watch.judge(frame, frame.depth_m(), moment.view, moment.track)
+        # By dead reckoning: a robot that finds out where it really is has not moved its camera.
+        track = self._localiser.track_at(frame.stamp_ns)
+        view = self._body.view_rotation(frame.stamp_ns, track)
+        verdict = self._monitor.judge(frame, frame.depth_m(), view, track)
         if verdict.use < ImageUse.OBSTACLES:
             return False
+        grid = geometry_grid(frame.intrinsics)
+        turn_rad_s = self._camera_turn_rad_s(view, frame.stamp_ns)
+        image = self._posed(grid.frame(frame), positions, turn_rad_s)
         hands = self._body.hands(positions, frame.stamp_ns)
-        grips = [np.array(hand.grip) for hand in hands if hand.hold.kind]
-        self.obstacles.look(
-            moment.depth_m,
-            moment.seen.intrinsics,
-            moment.base_from_camera,
-            moment.body,
-            moment.base,
-            grips,
-            frame.stamp_ns,
-        )
-        still = moment.turn_rad_s <= MAX_CAMERA_TURN_RAD_S
-        # A pose that the lidar has not borne out yet would put things where they never were.
-        placed = still and self._whereabouts.is_borne_out
-        if placed and verdict.use >= ImageUse.FORM and self._waiting is None:
-            self._waiting = moment
+        self.obstacles.update(image, [np.array(one.grip) for one in hands if one.hold.kind])
+        # A pose that the lidar has not confirmed yet would put things where they never were.
+        is_placed = turn_rad_s <= MAX_CAMERA_TURN_RAD_S and self._localiser.is_anchored
+        if is_placed and verdict.use >= ImageUse.FORM and self._waiting is None:
+            self._waiting = (image, grid)
             if verdict.use >= ImageUse.ALL:
-                self._eyes.ask(as_pinhole(frame))
+                self._worker.ask(as_pinhole(frame))
         return True
 
     def finish(self) -> bool:
-        """Take what the network has answered; return whether the scene is new."""
-        answer = self._eyes.answer() if self._waiting is not None else None
+        """Take what the detector has answered; return whether the scene is new."""
+        answer = self._worker.answer() if self._waiting is not None else None
         if self._waiting is None or answer is None:
             return False
-        moment, self._waiting = self._waiting, None
-        self._look(moment, moment.grid.view(in_image(answer.view, moment.grid.source)))
+        (image, grid), self._waiting = self._waiting, None
+        self.scene.update(image, grid.view(to_camera_image(answer.view, grid.source)))
         return True
 
-    def carry(self, positions: Array, now_ns: int) -> None:
-        """Let the things that hands hold, as told and felt, move along with the hands."""
-        pose = self._whereabouts.pose
+    def move_held(self, positions: Array, now_ns: int) -> None:
+        """Move the things that hands hold, as reported and felt, along with the hands."""
+        pose = self._localiser.pose
         for hand in self._body.hands(positions, now_ns):
             self.scene.hold(hand.name, hand.hold, hand.grip, pose, now_ns)
 
     def document(self, now_ns: int) -> dict[str, Any]:
         """Return the scene topic's document, with how things are named, and how images are.
 
-        The robot's own place is in it as long as it is not lost.
+        The robot's own pose is in it as long as it is not lost.
         """
-        pose = self._whereabouts.pose
+        pose = self._localiser.pose
+        is_lost = self._localiser.state is PlaceState.LOST
         robot = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
         return {
             **self.scene.document(),
-            "robot": None if self._whereabouts.is_lost else robot,
-            "sight": self._eyes.document(),
-            "image": self._watch.document(now_ns),
+            "robot": None if is_lost else robot,
+            "sight": self._worker.document(),
+            "image": self._monitor.document(now_ns),
         }
 
-    def _look(self, moment: ImageMoment, network: NetworkView | None) -> None:
-        self.scene.look(
-            moment.seen.rgb,
-            moment.depth_m,
-            moment.seen.intrinsics,
-            moment.base_from_camera,
-            moment.base,
-            moment.body,
-            moment.seen.stamp_ns,
-            network,
-            aim_sigma_rad(moment.turn_rad_s),
-        )
-
-    def _moment(self, frame: RgbdFrame, positions: Array) -> ImageMoment:
-        track = self._whereabouts.track_at(frame.stamp_ns)
-        view = self._body.view_rotation(frame.stamp_ns, track)
-        grid = geometry_grid(frame.intrinsics)
-        seen = grid.frame(frame)
-        return ImageMoment(
-            grid=grid,
-            seen=seen,
-            depth_m=seen.depth_m(),
+    def _posed(self, frame: RgbdFrame, positions: Array, turn_rad_s: float) -> PosedImage:
+        return PosedImage(
+            rgb=frame.rgb,
+            depth_m=frame.depth_m(),
+            camera=frame.intrinsics,
             base_from_camera=self._body.camera_pose(positions),
-            base=self._whereabouts.pose_at(frame.stamp_ns),
-            track=track,
-            body=self._body.mask(positions, seen.intrinsics),
-            view=view,
-            turn_rad_s=self._camera_turn(view, frame.stamp_ns),
+            body=self._body.mask(positions, frame.intrinsics),
+            base=self._localiser.pose_at(frame.stamp_ns),
+            stamp_ns=frame.stamp_ns,
+            aim_sigma_rad=aim_sigma_rad(turn_rad_s),
         )
 
-    def _camera_turn(self, view: Array, stamp_ns: int) -> float:
+    def _camera_turn_rad_s(self, view: Array, stamp_ns: int) -> float:
         """Return how fast the camera turned up to a moment."""
         before_ns = stamp_ns - STILL_WINDOW_NS
-        before = self._body.view_rotation(before_ns, self._whereabouts.track_at(before_ns))
+        before = self._body.view_rotation(before_ns, self._localiser.track_at(before_ns))
         return angle_rad(before.T @ view) * NS_PER_S / STILL_WINDOW_NS

@@ -1,6 +1,6 @@
-"""Tell by its measures what a thing is, what it may also be, and what it cannot be.
+"""Classify a thing by its measures: what it is, what it may also be, and what it cannot be.
 
-One table of rules: the first that names and holds gives the name. A second table bounds what a
+Of the table of rules, the first that names and holds gives the name. A second table bounds what a
 thing of a class can measure at all, however it lies.
 """
 
@@ -16,24 +16,8 @@ SPHERE_RESIDUAL = 0.06
 SPHERE_SIZE = (0.75, 1.3)
 
 
-def _flatness(shape: MeasuredShape) -> float:
-    return shape.height_m / max(shape.footprint.width_m, 1e-6)
-
-
-def _slenderness(shape: MeasuredShape) -> float:
-    return shape.height_m / max(shape.across_m, 1e-6)
-
-
-def _top_ratio(shape: MeasuredShape) -> float:
-    return shape.top.width_m / max(shape.across_m, 1e-6)
-
-
-def _rim_ratio(shape: MeasuredShape) -> float:
-    return shape.top.width_m / max(shape.footprint.width_m, 1e-6)
-
-
-def _squareness(shape: MeasuredShape) -> float:
-    return shape.footprint.width_m / max(shape.footprint.length_m, 1e-6)
+def _ratio(length_m: float, other_m: float) -> float:
+    return length_m / max(other_m, 1e-6)
 
 
 def _roundness(shape: MeasuredShape) -> float:
@@ -48,23 +32,19 @@ def _roundness(shape: MeasuredShape) -> float:
     return 1.0 if agrees else 0.0
 
 
-def _longest_m(shape: MeasuredShape) -> float:
-    return max(shape.height_m, shape.across_m, shape.footprint.length_m)
-
-
 MEASURES: dict[str, Measure] = {
     "height_m": lambda shape: shape.height_m,
-    "longest_m": _longest_m,
+    "longest_m": lambda shape: max(shape.height_m, shape.across_m, shape.footprint.length_m),
     "across_m": lambda shape: shape.across_m,
     "length_m": lambda shape: shape.footprint.length_m,
     "width_m": lambda shape: shape.footprint.width_m,
     "hole_m": lambda shape: shape.hole_m,
-    "flatness": _flatness,
-    "slenderness": _slenderness,
-    "squareness": _squareness,
-    "top_ratio": _top_ratio,
+    "flatness": lambda shape: _ratio(shape.height_m, shape.footprint.width_m),
+    "slenderness": lambda shape: _ratio(shape.height_m, shape.across_m),
+    "squareness": lambda shape: _ratio(shape.footprint.width_m, shape.footprint.length_m),
+    "top_ratio": lambda shape: _ratio(shape.top.width_m, shape.across_m),
     "rim_m": lambda shape: shape.top.width_m,
-    "rim_ratio": _rim_ratio,
+    "rim_ratio": lambda shape: _ratio(shape.top.width_m, shape.footprint.width_m),
     "rim_share": lambda shape: shape.rim_share,
     "roundness": _roundness,
 }
@@ -74,8 +54,7 @@ MEASURES: dict[str, Measure] = {
 class ClassRule:
     """Name a class and bound the measures that it must meet, bounds included.
 
-    A rule that does not `name` by itself only says that a thing looks like one: a can looks like a
-    cup too.
+    A rule that does not give the name only says what a thing may be: a can looks like a cup, too.
     """
 
     name: str
@@ -175,13 +154,13 @@ POSSIBLE: dict[str, dict[str, Range]] = {
     "remote": {"height_m": (0.004, 0.06), "longest_m": (0.08, 0.3)},
 }
 BYSTANDERS: frozenset[str] = frozenset({"person", "chair"})
-"""What stands in the way and is never a thing to take: no thing's form is possible for them."""
+"""Obstacles that are never things to take: no thing's form is possible for them."""
 FURNITURE = "furniture"
-"""What tables, sofas and the like are called: a network's word for it names nothing to take."""
+"""Tables, sofas and the like: a detector's vote for it names nothing to take."""
 
 
 def judge_form(shape: MeasuredShape, *, whole: bool = True) -> Form:
-    """Return what a shape says; of one that is half hidden, only what is too large is certain."""
+    """Return what a shape may be; of a half-hidden one, only what is too large is certain."""
     fits = [rule for rule in RULES if _holds(rule.bounds, shape)]
     return Form(
         name=next((rule.name for rule in fits if rule.names), OTHER),

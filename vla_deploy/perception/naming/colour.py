@@ -1,4 +1,4 @@
-"""Name colours as people do, by one table over hue, saturation and brightness."""
+"""Name colours by one table over hue, saturation and brightness."""
 
 from dataclasses import dataclass
 

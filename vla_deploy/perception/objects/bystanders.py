@@ -1,7 +1,7 @@
-"""Place the people and chairs that a network sees: what stands in the way and is never taken.
+"""Place the people and chairs that the detector finds: obstacles, never things to take.
 
-A box tells only a direction. How far it is, and whether there is anything at all, the depth image
-says; a box whose depth shows nothing of a person's or a chair's size tells of none.
+A box gives only a direction. The depth image says how far away it is, and whether it is of a
+person's or a chair's size at all; a box for which it is not is dropped.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Bystander:
     confidence: float
 
     def document(self) -> dict[str, Any]:
-        """Return the obstacle as the scene topic tells it."""
+        """Return the obstacle for the scene topic."""
         return {
             "class": self.class_name,
             "position_m": [round(self.x_m, 3), round(self.y_m, 3)],
@@ -53,9 +53,9 @@ def find_bystanders(cloud: Cloud, network: NetworkView | None, base: Pose2D) -> 
     if network is None:
         return []
     found = [
-        _place(cloud, corners_px, word.class_name, word.chance, base)
-        for corners_px, word in network.sure_words(BYSTANDERS)
-        if word.chance >= LEAST_CHANCE
+        _place(cloud, corners_px, vote.class_name, vote.chance, base)
+        for corners_px, vote in network.sure_votes(BYSTANDERS)
+        if vote.chance >= LEAST_CHANCE
     ]
     return [one for one in found if one is not None]
 

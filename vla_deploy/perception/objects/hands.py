@@ -1,4 +1,4 @@
-"""Know what the hands hold: the executor tells, the fingers confirm or deny."""
+"""Decide what the hands hold: the executor reports it, the fingers confirm or deny it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,16 +10,19 @@ from vla_deploy.perception.naming.classes import OTHER
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world.touch import FingerSample, Grip, Touch, feel
 
-# Fingers that told nothing for longer are not felt.
+# Older samples of the fingers are not used.
 STALE_NS = NS_PER_S // 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """Say what a hand holds: `kind` is a class, "" for nothing; `cause` why it holds no longer."""
+    """Hold what a hand holds: `kind` is a class, "" for nothing; `cause` why it no longer does.
+
+    `reported` is the class that the executor names.
+    """
 
     kind: str
-    told: str
+    reported: str
     touch: Touch
     is_confirmed: bool
     cause: str = ""
@@ -30,10 +33,10 @@ class Hold:
         return not self.kind and self.touch.grip is Grip.LOST
 
     def document(self) -> dict[str, Any]:
-        """Return it as the scene topic tells it."""
+        """Return it for the scene topic."""
         return {
             "class": self.kind or None,
-            "told": self.told or None,
+            "told": self.reported or None,
             "felt": self.touch.grip.value,
             "confirmed": self.is_confirmed,
             "width_m": round(self.touch.width_m, 4) if self.touch.is_held else None,
@@ -44,7 +47,7 @@ class Hold:
 
 
 class Hands:
-    """Feel every hand's fingers in what control tells of the joints."""
+    """Follow the fingers of every hand in control's joint states."""
 
     def __init__(self, robot: RobotDescription) -> None:
         index = robot.joint_index
@@ -54,8 +57,8 @@ class Hands:
         self._touches = {name: Touch() for name in robot.hands}
         self._stamp_ns = 0
 
-    def feel(self, sample: Sample) -> None:
-        """Take in one sample of `joint_state`; one that was taken in already changes nothing."""
+    def update(self, sample: Sample) -> None:
+        """Process a sample of `joint_state`, once."""
         if sample.stamp_ns <= self._stamp_ns:
             return
         self._stamp_ns, data = sample.stamp_ns, sample.data
@@ -70,20 +73,22 @@ class Hands:
             )
             self._touches[name] = feel(self._touches[name], fingers)
 
-    def judge(self, told: Mapping[str, Any], now_ns: int) -> dict[str, Hold]:
-        """Return what each hand holds; `told` is what the executor says, by hand."""
+    def holds(self, reported: Mapping[str, Any], now_ns: int) -> dict[str, Hold]:
+        """Return what each hand holds; `reported` is what the executor names, by hand."""
         is_felt = now_ns - self._stamp_ns <= STALE_NS
         return {
-            name: _hold(str(told.get(name) or ""), touch if is_felt else Touch())
+            name: _hold(str(reported.get(name) or ""), touch if is_felt else Touch())
             for name, touch in self._touches.items()
         }
 
 
-def _hold(told: str, touch: Touch) -> Hold:
-    """Join word and touch: what is told and not felt is not held, what is only felt is unknown."""
+def _hold(reported: str, touch: Touch) -> Hold:
+    """Join report and touch: what is not felt is not held, what is only felt has no class."""
+    kind, cause, is_confirmed = "", touch.cause, True
     if touch.is_held:
-        return Hold(kind=told or OTHER, told=told, touch=touch, is_confirmed=True)
-    if touch.grip in (Grip.UNKNOWN, Grip.CLOSING):
-        return Hold(kind=told, told=told, touch=touch, is_confirmed=False, cause=touch.cause)
-    cause = touch.cause or ("nothing is felt between the fingers" if told else "")
-    return Hold(kind="", told=told, touch=touch, is_confirmed=True, cause=cause)
+        kind, cause = reported or OTHER, ""
+    elif touch.grip in (Grip.UNKNOWN, Grip.CLOSING):
+        kind, is_confirmed = reported, False
+    elif reported and not cause:
+        cause = "nothing is felt between the fingers"
+    return Hold(kind=kind, reported=reported, touch=touch, is_confirmed=is_confirmed, cause=cause)

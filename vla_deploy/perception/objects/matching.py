@@ -1,4 +1,4 @@
-"""Decide which sight is which known thing: by place and its uncertainty, by class and colour."""
+"""Match detections to tracks: by place and its uncertainty, by class and colour."""
 
 import math
 
@@ -6,25 +6,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.perception.naming.classes import OTHER
-from vla_deploy.perception.objects.assignment import assign
-from vla_deploy.perception.objects.filtering import distances2, grown
+from vla_deploy.perception.objects.filtering import mahalanobis2, predicted
 from vla_deploy.perception.objects.track import Sighting, Track
 
-# Squared Mahalanobis distance of three dimensions that one true pair in a thousand exceeds. What
-# is unlike in class or colour costs some of it, so that it must be nearer.
+# Squared Mahalanobis distance of three dimensions that one true pair in a thousand exceeds. Another
+# class or colour adds to it, so that such a pair must be nearer.
 GATE = 16.27
 CLASS_FLOOR, COLOUR_FLOOR = 0.02, 0.05
 UNRECOGNISED_COST = 2.0
-# Something alike within this way has been pushed.
+# A thing of the same class and colour within this distance has been pushed.
 PUSHED_GATE_M = 0.12
+
+Costs = NDArray[np.float64]
 
 
 def match(
     tracks: list[Track], sightings: list[Sighting], stamp_ns: int
 ) -> list[tuple[Track, Sighting, bool]]:
-    """Return each pair of track and sight, with whether the thing was moved since the last one.
+    """Return the pairs of track and sighting, each with whether the thing was moved.
 
-    Things that stand still come first; a pushed one is looked for among what is left.
+    Things that stand still are matched first, pushed ones among what is left.
     """
     if not tracks or not sightings:
         return []
@@ -39,30 +40,20 @@ def match(
     return pairs + [(left[row], rest[column], True) for row, column in pushed]
 
 
-def _still_costs(
-    tracks: list[Track], sightings: list[Sighting], stamp_ns: int
-) -> NDArray[np.float64]:
-    now = [grown(track.estimate, stamp_ns) for track in tracks]
-    costs = distances2(now, [one.seen for one in sightings])
+def _still_costs(tracks: list[Track], sightings: list[Sighting], stamp_ns: int) -> Costs:
+    now = [predicted(track.estimate, stamp_ns) for track in tracks]
+    costs = mahalanobis2(now, [one.seen for one in sightings])
     for row, track in enumerate(tracks):
         for column, sighting in enumerate(sightings):
             if costs[row, column] >= GATE:
                 continue
-            if track.cause and not _is_found(track, sighting):
+            if track.cause and (sighting.is_doubtful or not track.is_like(sighting.detection)):
+                # A lost thing may be anywhere near, and so may others: half-hidden or unlike ones
+                # are not taken for it.
                 costs[row, column] = GATE
             elif not sighting.is_doubtful:
                 costs[row, column] += _unlikeness(track, sighting)
     return costs
-
-
-def _is_found(track: Track, sighting: Sighting) -> bool:
-    """Return whether a sight shows a thing that was lost: it may be anywhere near, as much else is.
-
-    So nothing half seen, and nothing of another class or colour, is taken for it.
-    """
-    seen = sighting.detection
-    alike = (seen.class_name, seen.colour) == (track.class_name, track.colour)
-    return alike and not sighting.is_doubtful
 
 
 def _unlikeness(track: Track, sighting: Sighting) -> float:
@@ -78,11 +69,72 @@ def _unlikeness(track: Track, sighting: Sighting) -> float:
     return cost - 2.0 * math.log(kind)
 
 
-def _pushed_costs(tracks: list[Track], sightings: list[Sighting]) -> NDArray[np.float64]:
+def _pushed_costs(tracks: list[Track], sightings: list[Sighting]) -> Costs:
     costs = np.full((len(tracks), len(sightings)), PUSHED_GATE_M)
     for row, track in enumerate(tracks):
         for column, sighting in enumerate(sightings):
-            seen = sighting.detection
-            if (seen.class_name, seen.colour) == (track.class_name, track.colour):
-                costs[row, column] = math.dist(track.position_m, seen.position_m)
+            if track.is_like(sighting.detection):
+                costs[row, column] = math.dist(track.position_m, sighting.detection.position_m)
     return costs
+
+
+def assign(cost: Costs, limit: float) -> list[tuple[int, int]]:
+    """Return the (row, column) pairs of least total cost, each below `limit`.
+
+    A pair that costs `limit` or more is worse than none: both stay alone.
+    """
+    if not cost.size:
+        return []
+    if cost.shape[0] > cost.shape[1]:
+        return sorted((row, column) for column, row in assign(cost.T, limit))
+    bounded = np.minimum(cost, limit)
+    pairs = ((row, column) for column, row in enumerate(_row_of_columns(bounded)) if row >= 0)
+    return sorted((row, column) for row, column in pairs if cost[row, column] < limit)
+
+
+def _row_of_columns(cost: Costs) -> list[int]:
+    """Return the row of each column, -1 for none, by shortest augmenting paths.
+
+    The Hungarian method with potentials: index 0 of what follows is a column before the first, to
+    which the row that is to be placed belongs at first.
+    """
+    rows, columns = cost.shape
+    row_price, column_price = np.zeros(rows + 1), np.zeros(columns + 1)
+    row_of = np.zeros(columns + 1, dtype=np.intp)
+    for row in range(1, rows + 1):
+        row_of[0] = row
+        before = _search(cost, row_of, row_price, column_price)
+        column = int(before[0])
+        while column:
+            earlier = int(before[column])
+            row_of[column] = row_of[earlier]
+            column = earlier
+    return [int(row) - 1 for row in row_of[1:]]
+
+
+def _search(
+    cost: Costs, row_of: NDArray[np.intp], row_price: Costs, column_price: Costs
+) -> NDArray[np.intp]:
+    """Find the cheapest way to a free column; return each column's predecessor on the way.
+
+    The predecessor of column 0, which has none, is where the way ends.
+    """
+    columns = cost.shape[1]
+    before = np.zeros(columns + 1, dtype=np.intp)
+    least = np.full(columns + 1, np.inf)
+    done = np.zeros(columns + 1, dtype=np.bool_)
+    column = 0
+    while row_of[column]:
+        done[column] = True
+        row = int(row_of[column])
+        reduced = cost[row - 1] - row_price[row] - column_price[1:]
+        nearer = ~done[1:] & (reduced < least[1:])
+        least[1:][nearer], before[1:][nearer] = reduced[nearer], column
+        following = int(np.argmin(np.where(done[1:], np.inf, least[1:]))) + 1
+        step = least[following]
+        row_price[row_of[done]] += step
+        column_price[done] -= step
+        least[~done] -= step
+        column = following
+    before[0] = column
+    return before

@@ -1,20 +1,20 @@
 """Remember what the depth camera saw standing up from the floor around the base.
 
-The camera looks over what is close, and sees a cup on the floor only from a metre away. So what
-it saw is kept where it was, in cells of the map frame, until it is seen to be gone or too old.
+The camera looks over what is close, and sees a cup on the floor only from a metre away. So points
+are kept in cells of the map frame until they are seen to be gone or are too old.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.geometry.cloud import PosedImage
 from vla_deploy.perception.geometry.lens import project, ray_table
+from vla_deploy.perception.geometry.rotation import yaw_rotation
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]
@@ -33,7 +33,7 @@ GONE_M = 0.04
 MIN_DEPTH_M = 0.2
 # A thing in a hand reaches this far from the grip.
 HELD_M = 0.22
-# What was kept this near to a full hand is what it has taken; further off it may be the table.
+# What stood this near to a full hand is what it holds; further off it may be the table.
 TAKEN_M = 0.1
 
 
@@ -43,29 +43,20 @@ class NearObstacles:
     def __init__(self) -> None:
         self._cells: dict[Cell, tuple[float, float, float, int]] = {}
 
-    def look(
-        self,
-        depth_m: NDArray[np.float32],
-        camera: Intrinsics,
-        base_from_camera: Array,
-        body: NDArray[np.bool_],
-        pose: Pose2D,
-        grips: Sequence[Array],
-        stamp_ns: int,
-    ) -> None:
-        """Take in an image; `body` marks the robot itself, `grips` are points of full hands."""
-        self._forget_what_is_gone(depth_m, camera, base_from_camera, body, pose)
-        self._forget_what_is_taken(grips, pose)
-        points = _standing(depth_m, camera, base_from_camera, body)
+    def update(self, image: PosedImage, grips: Sequence[Array]) -> None:
+        """Process an image; `grips` are points of full hands in the base frame."""
+        self._forget_gone(image)
+        self._forget_grasped(grips, image.base)
+        points = _standing(image)
         for grip in grips:
             points = points[np.linalg.norm(points - grip, axis=1) > HELD_M]
-        turned = _to_map(points, pose)
+        turned = _to_map(points, image.base)
         keys = np.floor(turned[:, :2] / CELL_M).astype(np.int64)
         _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
         for index in first[counts >= MIN_PIXELS]:
             x_m, y_m, z_m = turned[index].tolist()
             column, row = keys[index].tolist()
-            self._cells[column, row] = (x_m, y_m, z_m, stamp_ns)
+            self._cells[column, row] = (x_m, y_m, z_m, image.stamp_ns)
 
     def around(self, pose: Pose2D, now_ns: int) -> Array:
         """Return what stands near the base, (n, 3) in the base frame, the nearest first."""
@@ -82,19 +73,13 @@ class NearObstacles:
         kept = [cell[:3] for cell in self._cells.values()]
         return np.array(kept, dtype=np.float64).reshape(-1, 3)
 
-    def _forget_what_is_gone(
-        self,
-        depth_m: NDArray[np.float32],
-        camera: Intrinsics,
-        base_from_camera: Array,
-        body: NDArray[np.bool_],
-        pose: Pose2D,
-    ) -> None:
+    def _forget_gone(self, image: PosedImage) -> None:
         """Drop cells through which the camera looks at something further away."""
         if not self._cells:
             return
-        points = _to_base(self._points(), pose) - base_from_camera[:3, 3]
-        local = points @ base_from_camera[:3, :3]
+        camera = image.camera
+        points = _to_base(self._points(), image.base) - image.base_from_camera[:3, 3]
+        local = points @ image.base_from_camera[:3, :3]
         ahead = local[:, 2].copy()
         local[:, 2] = np.maximum(ahead, MIN_DEPTH_M)
         column, row = np.rint(project(camera, local)).astype(np.int64).T
@@ -102,11 +87,11 @@ class NearObstacles:
         seen &= (row >= 0) & (row < camera.height)
         at = (row[seen], column[seen])
         gone = np.zeros(len(points), dtype=np.bool_)
-        gone[seen] = (depth_m[at] > ahead[seen] + GONE_M) & ~body[at]
+        gone[seen] = (image.depth_m[at] > ahead[seen] + GONE_M) & ~image.body[at]
         self._forget(gone)
 
-    def _forget_what_is_taken(self, grips: Sequence[Array], pose: Pose2D) -> None:
-        """Drop cells where a full hand is: it carries away what stood there."""
+    def _forget_grasped(self, grips: Sequence[Array], pose: Pose2D) -> None:
+        """Drop cells near a full hand, which carries away what stood there."""
         for grip in grips:
             points = _to_base(self._points(), pose)
             self._forget(np.linalg.norm(points - grip, axis=1) < TAKEN_M)
@@ -119,33 +104,23 @@ class NearObstacles:
         }
 
 
-def _standing(
-    depth_m: NDArray[np.float32],
-    camera: Intrinsics,
-    base_from_camera: Array,
-    body: NDArray[np.bool_],
-) -> Array:
+def _standing(image: PosedImage) -> Array:
     """Return the points between floor and robot's height, of some of the pixels."""
     some = (slice(None, None, STRIDE_PX), slice(None, None, STRIDE_PX))
-    depth = depth_m[some].astype(np.float64)
-    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < SEEN_WITHIN_M) & ~body[some])
+    depth = image.depth_m[some].astype(np.float64)
+    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < SEEN_WITHIN_M) & ~image.body[some])
     z = depth[rows, columns]
-    x, y = ray_table(camera)[some][rows, columns].T * z
-    rotation, origin = base_from_camera[:3, :3], base_from_camera[:3, 3]
+    x, y = ray_table(image.camera)[some][rows, columns].T * z
+    rotation, origin = image.base_from_camera[:3, :3], image.base_from_camera[:3, 3]
     points: Array = np.column_stack((x, y, z)) @ rotation.T + origin
     return points[(points[:, 2] > LOWEST_M) & (points[:, 2] < HIGHEST_M)]
 
 
-def _rotation(yaw_rad: float) -> Array:
-    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _to_map(points: Array, pose: Pose2D) -> Array:
-    turned: Array = points @ _rotation(pose.yaw_rad).T + (pose.x_m, pose.y_m, 0.0)
+    turned: Array = points @ yaw_rotation(pose.yaw_rad).T + (pose.x_m, pose.y_m, 0.0)
     return turned
 
 
 def _to_base(points: Array, pose: Pose2D) -> Array:
-    turned: Array = (points - (pose.x_m, pose.y_m, 0.0)) @ _rotation(pose.yaw_rad)
+    turned: Array = (points - (pose.x_m, pose.y_m, 0.0)) @ yaw_rotation(pose.yaw_rad)
     return turned

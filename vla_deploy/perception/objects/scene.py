@@ -1,4 +1,4 @@
-"""Keep the scene: detections of each image, moved to the map frame, tracked over time."""
+"""Maintain the scene: the detections of each image, moved to the map frame, tracked over time."""
 
 import itertools
 import json
@@ -8,12 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.cloud import AIM_SIGMA_RAD, make_cloud
-from vla_deploy.perception.geometry.noise import covariance_of
+from vla_deploy.perception.geometry.cloud import PosedImage, make_cloud
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.geometry.supports import (
     KnownSurface,
@@ -25,9 +22,9 @@ from vla_deploy.perception.geometry.uncertainty import turned
 from vla_deploy.perception.images.detection import Detection, Vector, detect
 from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.perception.objects.bystanders import Bystander, find_bystanders
-from vla_deploy.perception.objects.filtering import Estimate
+from vla_deploy.perception.objects.filtering import Estimate, covariance_of
 from vla_deploy.perception.objects.hands import Hold
-from vla_deploy.perception.objects.in_view import Image, view_of
+from vla_deploy.perception.objects.in_view import is_in_clear_view
 from vla_deploy.perception.objects.track import Sighting, Track
 from vla_deploy.perception.objects.tracker import Tracker
 from vla_deploy.world.document import read_snapshot
@@ -35,9 +32,9 @@ from vla_deploy.world.resting import BEGIN, LET_GO, RelationBounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
 from vla_deploy.world.thing import Rest, Surface
 
-# The scene's cell is bounded: so much of it is for things, the most recently seen first.
-TOLD_BYTES = 25_000
-LOST_TOLD = 12
+# The share of the scene's cell that is for things, the most recently seen first.
+THINGS_BYTES = 25_000
+MAX_LOST = 12
 
 
 class Scene:
@@ -47,57 +44,48 @@ class Scene:
         self._tracker = Tracker()
         self._book = SurfaceBook(furniture)
         self.stamp_ns = 0
-        self.detections: list[Detection] = []
         self._surfaces: list[dict[str, Any]] = []
         self._bystanders: list[Bystander] = []
         self._hands: dict[str, dict[str, Any]] = {}
 
-    def recall(self, document: Mapping[str, Any]) -> None:
-        """Take over what an earlier instance in this run knew; it is no longer in view.
+    def restore(self, document: Mapping[str, Any]) -> None:
+        """Restore what an earlier instance in this run knew, as not in view now.
 
         Raises:
             SceneUnreadable: the document is no scene.
         """
         read_snapshot(document)
-        self._tracker.recall(document["objects"], document.get("lost", ()))
+        self._tracker.restore(document["objects"], document.get("lost", ()))
 
-    def look(
-        self,
-        rgb: NDArray[np.uint8],
-        depth_m: NDArray[np.float32],
-        camera: Intrinsics,
-        base_from_camera: NDArray[np.float64],
-        base: Pose2D,
-        body: NDArray[np.bool_],
-        stamp_ns: int,
-        network: NetworkView | None = None,
-        aim_sigma_rad: float = AIM_SIGMA_RAD,
-    ) -> None:
-        """Take one image; `base` is the robot's map pose, `body` masks the robot itself.
-
-        `network` is what a network saw in it, if one is at work; `aim_sigma_rad` is how well the
-        camera's direction is known.
-        """
-        cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body, aim_sigma_rad)
+    def update(self, image: PosedImage, network: NetworkView | None) -> None:
+        """Process an image; `network` is what the detector found in it, if one is at work."""
+        base, stamp_ns = image.base, image.stamp_ns
+        cloud = make_cloud(
+            image.rgb,
+            image.depth_m,
+            image.camera,
+            image.base_from_camera,
+            image.body,
+            image.aim_sigma_rad,
+        )
         supports = find_supports(cloud, [_known(one, base) for one in self._book.surfaces])
         self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)
         sightings = [_sighting(detection, base, stamp_ns) for detection in found]
-        self.detections = [sighting.detection for sighting in sightings]
         self._bystanders = find_bystanders(cloud, network, base)
-        image = Image(cloud=cloud, camera=camera, base_from_camera=base_from_camera)
-        views = {
-            id(track): view_of(_local(track, base), track.size_m, image, found)
+        in_view = [
+            track
             for track in self._tracker.tracks
-        }
-        self._tracker.update(sightings, views, stamp_ns)
+            if is_in_clear_view(_local(track, base), track.size_m, cloud, found)
+        ]
+        self._tracker.update(sightings, in_view, stamp_ns)
         self.stamp_ns = stamp_ns
         for track in self._tracker.objects:
             if track.last_seen_ns == stamp_ns and not track.held_by:
                 track.rests = self._rest_of(track, BEGIN)
 
     def hold(self, hand: str, hold: Hold, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
-        """Take note of what a hand holds; `grip` is where the hand is, in the base frame.
+        """Record what a hand holds; `grip` is where the hand is, in the base frame.
 
         What it has put down rests below it; what it has lost may be anywhere near.
         """
@@ -116,11 +104,11 @@ class Scene:
 
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""
-        lost = [track.document() for track in self._tracker.vanished[-LOST_TOLD:]]
+        lost = [track.document() for track in self._tracker.vanished[-MAX_LOST:]]
         known = [track.document() for track in self._tracker.objects]
         return {
             "stamp_ns": self.stamp_ns,
-            "objects": _within(TOLD_BYTES - _size(lost), known),
+            "objects": _within(THINGS_BYTES - _size(lost), known),
             "surfaces": self._surfaces,
             "bystanders": [bystander.document() for bystander in self._bystanders],
             "lost": lost,
@@ -132,7 +120,7 @@ class Scene:
         return rest_of(track.thing, things, self._book.surfaces, begin)
 
     def _surface(self, support: Support, base: Pose2D) -> dict[str, Any]:
-        """Return a surface as the scene topic tells it: the part in view, in the map frame."""
+        """Return a surface for the scene topic: the part in view, in the map frame."""
         x, y = (float(v) for v in support.outline.mean(axis=0))
         corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
         polygon_m = [(corner.x_m, corner.y_m) for corner in corners]
@@ -144,18 +132,18 @@ class Scene:
         }
 
 
-def _within(room_bytes: int, told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _within(room_bytes: int, documents: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return as many of the first documents as there is room for."""
-    sums = itertools.accumulate(_size([one]) for one in told)
-    return [one for one, total in zip(told, sums, strict=True) if total <= room_bytes]
+    sums = itertools.accumulate(_size([one]) for one in documents)
+    return [one for one, total in zip(documents, sums, strict=True) if total <= room_bytes]
 
 
-def _size(told: list[dict[str, Any]]) -> int:
-    return len(json.dumps(told, separators=(",", ":")))
+def _size(documents: list[dict[str, Any]]) -> int:
+    return len(json.dumps(documents, separators=(",", ":")))
 
 
 def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
-    """Return a detection of the base frame as a sight in the map."""
+    """Return a detection of the base frame as an observation in the map."""
     x, y, z = detection.position_m
     placed = base.compose(Pose2D(x, y, 0.0))
     on_map = replace(

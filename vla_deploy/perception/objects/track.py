@@ -1,4 +1,4 @@
-"""Hold what is known of one thing, and take in one more sight of it."""
+"""Hold what is known of one thing, and update it with each observation."""
 
 import math
 from collections.abc import Mapping
@@ -10,29 +10,29 @@ import numpy as np
 
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.images.detection import Detection, Vector
-from vla_deploy.perception.naming.class_fusion import Belief
+from vla_deploy.perception.naming.class_fusion import NameEvidence
 from vla_deploy.perception.naming.classes import OTHER
-from vla_deploy.perception.objects.filtering import Estimate, carried, corrected, dropped
+from vla_deploy.perception.objects.filtering import Estimate, carried, dropped, updated
 from vla_deploy.world.thing import Rest, Thing
 
 LEAST_GAIN = 0.2
 DOUBTFUL_GAIN = 0.05
-# Half-hidden sights in a row are wrong in the same way: so many of them count as one.
+# Half-hidden observations in a row have the same error: so many of them count as one.
 DOUBTFUL_LOOKS = 9.0
 KNOWN_LOOKS = 5
 ODD_SIZE_RATIO = 1.5
-MOST_ODD_SIGHTS = 8
-"""Nothing changes its size: what was seen `KNOWN_LOOKS` times and is told so much larger or smaller
-was cut out of the image with what stands beside it, unless more sights than these in a row say so.
+MAX_ODD_SIGHTINGS = 8
+"""Nothing changes its size: what was seen `KNOWN_LOOKS` times and appears so much larger or smaller
+was segmented together with its neighbour, unless more than these in a row agree.
 """
-# Not to recognise a thing says little against one that knew it.
+# Not recognising a thing is weak evidence.
 CLASS_WEIGHTS: Mapping[str, float] = MappingProxyType({OTHER: 0.25})
-TOLD_NAMES = 3
+PUBLISHED_NAMES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """Hold one image's detection in the map frame, and where its thing is by this sight alone."""
+    """Hold one image's detection in the map frame, and the position estimate by it alone."""
 
     detection: Detection
     seen: Estimate
@@ -43,21 +43,20 @@ class Sighting:
         return self.detection.truncated or self.detection.occluded
 
 
-def _no_class() -> Belief:
-    return Belief(OTHER, CLASS_WEIGHTS)
+def _no_class() -> NameEvidence:
+    return NameEvidence(OTHER, CLASS_WEIGHTS)
 
 
-def _no_colour() -> Belief:
-    return Belief("grey")
+def _no_colour() -> NameEvidence:
+    return NameEvidence("grey")
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Track:
     """Hold one thing; `object_id` is empty until it is confirmed, `held_by` names a hand.
 
-    `aliases` are the last ids under which the same thing was known before it was found to be the
-    same; `cause` tells why it is no longer where it was; `odd_sights` counts the last sights in a
-    row that told quite another size.
+    `aliases` are the last ids that were found to be of the same thing; `cause` is why it is no
+    longer where it was; `odd_sightings` counts the last ones in a row of quite another size.
     """
 
     estimate: Estimate
@@ -68,14 +67,14 @@ class Track:
     last_seen_ns: int
     seen_count: int = 0
     misses: int = 0
-    odd_sights: int = 0
+    odd_sightings: int = 0
     object_id: str = ""
     aliases: tuple[str, ...] = ()
     held_by: str = ""
     rests: Rest | None = None
     cause: str = ""
-    classes: Belief = field(default_factory=_no_class)
-    colours: Belief = field(default_factory=_no_colour)
+    classes: NameEvidence = field(default_factory=_no_class)
+    colours: NameEvidence = field(default_factory=_no_colour)
 
     @property
     def position_m(self) -> Vector:
@@ -93,9 +92,13 @@ class Track:
         """Return the likeliest colour."""
         return self.colours.best
 
+    def is_like(self, other: "Track | Detection") -> bool:
+        """Return whether something has the same class and colour."""
+        return (self.class_name, self.colour) == (other.class_name, other.colour)
+
     @property
     def thing(self) -> Thing:
-        """Return the thing as the world model takes it."""
+        """Return the thing for the world model."""
         x_m, y_m, z_m = (float(value) for value in self.estimate.sigma_m)
         return Thing(
             thing_id=self.object_id,
@@ -113,8 +116,8 @@ class Track:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the thing as the scene topic tells it."""
-        told: dict[str, Any] = {
+        """Return the thing for the scene topic."""
+        document: dict[str, Any] = {
             "id": self.object_id,
             "class": self.class_name,
             "colour": self.colour,
@@ -125,22 +128,22 @@ class Track:
             "seen_count": self.seen_count,
             "confidence": round(self.confidence * self.classes.share(self.class_name), 3),
             "sigma_m": [round(float(v), 4) for v in self.estimate.sigma_m],
-            "classes": _rounded(self.classes.shares(TOLD_NAMES)),
-            "colours": _rounded(self.colours.shares(TOLD_NAMES)),
+            "classes": _rounded(self.classes.shares(PUBLISHED_NAMES)),
+            "colours": _rounded(self.colours.shares(PUBLISHED_NAMES)),
         }
         if self.aliases:
-            told["aliases"] = list(self.aliases)
+            document["aliases"] = list(self.aliases)
         if self.held_by:
-            told["held_by"] = self.held_by
+            document["held_by"] = self.held_by
         if self.rests is not None:
-            told["rests"] = {"relation": self.rests.relation, "of": self.rests.of}
+            document["rests"] = {"relation": self.rests.relation, "of": self.rests.of}
         if self.cause:
-            told["cause"] = self.cause
-        return told
+            document["cause"] = self.cause
+        return document
 
 
 def new_track(sighting: Sighting, stamp_ns: int) -> Track:
-    """Return the track that a sight begins."""
+    """Return the track that an observation begins."""
     detection = sighting.detection
     track = Track(
         estimate=sighting.seen,
@@ -155,8 +158,8 @@ def new_track(sighting: Sighting, stamp_ns: int) -> Track:
     return track
 
 
-def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) -> None:
-    """Take in a sight; of what `was_moved` the old place says nothing."""
+def update_track(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) -> None:
+    """Update with an observation; where the thing `was_moved`, its old place says nothing."""
     detection = sighting.detection
     track.misses, track.cause = 0, ""
     track.last_seen_ns = stamp_ns
@@ -168,18 +171,18 @@ def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) 
         gain, track.estimate = 1.0, sighting.seen
     else:
         looks = DOUBTFUL_LOOKS if sighting.is_doubtful else 1.0
-        track.estimate = corrected(track.estimate, sighting.seen, looks)
+        track.estimate = updated(track.estimate, sighting.seen, looks)
     if detection.class_name == track.class_name:
-        # What is taken for another kind was cut out of the image in another way.
-        _take_form(track, detection, gain)
+        # What looks like another kind was segmented in another way.
+        _update_form(track, detection, gain)
 
 
-def _take_form(track: Track, detection: Detection, gain: float) -> None:
-    """Move size, yaw and confidence towards those of a sight, unless it is an odd one."""
+def _update_form(track: Track, detection: Detection, gain: float) -> None:
+    """Move size, yaw and confidence towards a detection's, unless its size is an odd one."""
     small_m, large_m = sorted(math.hypot(*one.size_m[:2]) for one in (track, detection))
     is_odd = track.seen_count > KNOWN_LOOKS and large_m > ODD_SIZE_RATIO * small_m
-    track.odd_sights = track.odd_sights + 1 if is_odd else 0
-    if 0 < track.odd_sights <= MOST_ODD_SIGHTS:
+    track.odd_sightings = track.odd_sightings + 1 if is_odd else 0
+    if 0 < track.odd_sightings <= MAX_ODD_SIGHTINGS:
         return
     track.size_m = _blend(track.size_m, detection.size_m, gain)
     turn_rad = half_turn(detection.yaw_rad - track.yaw_rad)
@@ -187,43 +190,43 @@ def _take_form(track: Track, detection: Detection, gain: float) -> None:
     track.confidence += gain * (detection.confidence - track.confidence)
 
 
-def take_in_hand(track: Track, hand: str, grip_m: Vector, stamp_ns: int) -> None:
-    """Seat a thing where the hand is that holds it."""
+def attach_to_hand(track: Track, hand: str, grip_m: Vector, stamp_ns: int) -> None:
+    """Place a thing at the hand that holds it."""
     track.estimate = carried(grip_m, stamp_ns)
     track.held_by, track.last_seen_ns, track.misses = hand, stamp_ns, 0
     track.rests, track.cause = None, ""
 
 
-def let_fall(track: Track, cause: str) -> None:
-    """Seat a thing that a hand has lost: somewhere near and below it."""
+def mark_dropped(track: Track, cause: str) -> None:
+    """Place a thing that a hand has lost: somewhere near and below it."""
     track.estimate = dropped(track.estimate)
     track.held_by, track.rests, track.cause = "", None, cause
 
 
-def recalled(told: Mapping[str, Any]) -> Track:
-    """Return the track that the scene topic's object tells of."""
-    x_m, y_m, z_m = (float(value) for value in told["size_m"])
-    stamp_ns, looks = int(told["last_seen_ns"]), int(told["seen_count"])
+def restored_track(document: Mapping[str, Any]) -> Track:
+    """Return the track of an object of the scene topic."""
+    x_m, y_m, z_m = (float(value) for value in document["size_m"])
+    stamp_ns, looks = int(document["last_seen_ns"]), int(document["seen_count"])
     track = Track(
         estimate=Estimate(
-            position_m=np.array(told["position_m"], dtype=np.float64),
-            covariance_m2=np.diag(np.square(np.array(told["sigma_m"], dtype=np.float64))),
+            position_m=np.array(document["position_m"], dtype=np.float64),
+            covariance_m2=np.diag(np.square(np.array(document["sigma_m"], dtype=np.float64))),
             stamp_ns=stamp_ns,
         ),
         size_m=(x_m, y_m, z_m),
-        yaw_rad=float(told["yaw_rad"]),
-        # What is told is the confidence in the sights times that in the class.
-        confidence=float(told["confidence"]) / max(told["classes"].values()),
+        yaw_rad=float(document["yaw_rad"]),
+        # The published confidence is that in the observations times that in the class.
+        confidence=float(document["confidence"]) / max(document["classes"].values()),
         first_seen_ns=stamp_ns,
         last_seen_ns=stamp_ns,
         seen_count=looks,
-        object_id=str(told["id"]),
-        aliases=tuple(told.get("aliases", ())),
-        rests=Rest(**told["rests"]) if "rests" in told else None,
-        cause=str(told.get("cause", "")),
+        object_id=str(document["id"]),
+        aliases=tuple(document.get("aliases", ())),
+        rests=Rest(**document["rests"]) if "rests" in document else None,
+        cause=str(document.get("cause", "")),
     )
-    track.classes.recall(told["classes"], looks)
-    track.colours.recall(told["colours"], looks)
+    track.classes.restore(document["classes"], looks)
+    track.colours.restore(document["colours"], looks)
     return track
 
 

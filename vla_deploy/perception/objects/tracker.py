@@ -1,24 +1,29 @@
-"""Remember things in the map frame: same thing, same id, from one image to the next."""
+"""Track things in the map frame: the same thing keeps its id from one image to the next.
+
+A thing that appears keeps the id of one that has left its place, if class and colour are
+the same, the size is similar, and a person could have carried it there in the time.
+"""
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
+from drivers.clock import NS_PER_S
 from vla_deploy.perception.images.detection import Vector
 from vla_deploy.perception.naming.classes import OTHER
-from vla_deploy.perception.objects.identity import is_missing, likeliest, may_be, take_over
-from vla_deploy.perception.objects.in_view import PlaceView
 from vla_deploy.perception.objects.matching import match
 from vla_deploy.perception.objects.track import (
     Sighting,
     Track,
-    absorb,
+    attach_to_hand,
     gap_m,
-    let_fall,
+    mark_dropped,
     new_track,
-    recalled,
-    take_in_hand,
+    restored_track,
+    update_track,
 )
 
 CONFIRM_HITS = 2
@@ -30,11 +35,19 @@ UNCONFIRMED_MISSES = 2
 MAX_OBJECTS = 64
 MAX_TRACKS = 128
 VANISHED_KEPT = 32
+SIZE_RATIO = 1.6
+# A person in a hurry, and what two observations of one place may differ by.
+CARRY_SPEED_M_S = 2.5
+SLACK_M = 0.5
+# One miss may be the detector's; after two in a row a thing is not where it was.
+MISSING_MISSES = 2
+# A bound on what a thing takes of the scene's cell: a client with an older id asks again.
+ALIASES_KEPT = 3
 GONE = "its place was seen without it"
 
 
 class Tracker:
-    """Match sights to things; confirm, remember and forget."""
+    """Match detections to things; confirm, remember and forget."""
 
     def __init__(self) -> None:
         self._tracks: list[Track] = []
@@ -49,33 +62,32 @@ class Tracker:
 
     @property
     def tracks(self) -> list[Track]:
-        """Return every track, confirmed or not: their places are what `views` judges."""
+        """Return every track, confirmed or not."""
         return list(self._tracks)
 
     @property
     def vanished(self) -> list[Track]:
-        """Return what is no longer where it was and has not been found again, the oldest first."""
+        """Return what has left its place and was not found again, the oldest first."""
         return list(self._vanished)
 
-    def update(self, sightings: list[Sighting], views: dict[int, PlaceView], stamp_ns: int) -> None:
-        """Take one image's sights; `views` maps `id(track)` to what is seen at its place."""
+    def update(self, sightings: list[Sighting], in_view: Collection[Track], stamp_ns: int) -> None:
+        """Process one image's sightings; `in_view` are the tracks whose places it shows clearly."""
         pairs = match(self._tracks, sightings, stamp_ns)
         matched = {id(track) for track, _, _ in pairs}
         taken = {id(sighting) for _, sighting, _ in pairs}
-        for track in self._tracks:
-            is_clear = views.get(id(track)) is PlaceView.CLEAR and not track.held_by
-            if is_clear and id(track) not in matched:
+        for track in in_view:
+            if not track.held_by and id(track) not in matched:
                 track.misses += 1
         for track, sighting, was_moved in pairs:
-            absorb(track, sighting, stamp_ns, was_moved=was_moved)
+            update_track(track, sighting, stamp_ns, was_moved=was_moved)
         for sighting in sightings:
             if id(sighting) not in taken and _is_sure(sighting) and not self._is_part(sighting):
                 self._tracks.append(new_track(sighting, stamp_ns))
         self._forget()
-        self._drop_doubles([track for track, _, _ in pairs])
+        self._merge_duplicates([track for track, _, _ in pairs])
         for track in list(self._tracks):
-            if not track.object_id and _is_believed(track):
-                self._name(track)
+            if not track.object_id and _is_confirmed(track):
+                self._identify(track)
 
     def carry(self, hand: str, class_name: str, grip_m: Vector, stamp_ns: int) -> Track | None:
         """Move the thing that a hand holds along with the hand; return it, None for none known.
@@ -88,7 +100,7 @@ class Tracker:
             self.release(hand)
             held = self._nearest(class_name, grip_m)
         if held is not None:
-            take_in_hand(held, hand, grip_m, stamp_ns)
+            attach_to_hand(held, hand, grip_m, stamp_ns)
         return held
 
     def held_by(self, hand: str) -> Track | None:
@@ -96,25 +108,26 @@ class Tracker:
         return next((track for track in self._tracks if track.held_by == hand), None)
 
     def release(self, hand: str) -> None:
-        """Take note that a hand has let go: the thing is near where the hand was."""
+        """Release what a hand carries: the thing is near where the hand was."""
         held = self.held_by(hand)
         if held is not None:
             held.held_by = ""
 
     def lose(self, hand: str, cause: str) -> None:
-        """Take note that a hand has lost what it carried: the thing is somewhere near."""
+        """Mark what a hand carries as lost: the thing is somewhere near."""
         held = self.held_by(hand)
         if held is not None:
-            let_fall(held, cause)
+            mark_dropped(held, cause)
 
-    def recall(
-        self, told: Iterable[Mapping[str, Any]], lost: Iterable[Mapping[str, Any]] = ()
+    def restore(
+        self, objects: Iterable[Mapping[str, Any]], lost: Iterable[Mapping[str, Any]] = ()
     ) -> None:
-        """Take over the things of a scene that was told before, as not in view now.
+        """Restore the things of an earlier scene, as not in view now.
 
         Ids of those that are `lost` stay theirs: another thing must not be taken for them.
         """
-        known, vanished = [recalled(one) for one in told], [recalled(one) for one in lost]
+        known = [restored_track(one) for one in objects]
+        vanished = [restored_track(one) for one in lost]
         self._tracks.extend(known)
         self._vanished.extend(vanished)
         for track in (*known, *vanished):
@@ -123,7 +136,7 @@ class Tracker:
                 self._used[kind] = max(self._used[kind], int(number))
 
     def _nearest(self, class_name: str, grip_m: Vector) -> Track | None:
-        # What is felt and not told of may be anything: only what is right there is meant.
+        # What is only felt may be of any class, so it must be close to the grip.
         gate_m = CARRY_GATE_M if class_name != OTHER else FELT_GATE_M
         near = [
             (distance_m, track.object_id, track)
@@ -139,7 +152,7 @@ class Tracker:
         """Return whether this is a half-hidden part of a known thing, seen a second time."""
         seen = sighting.detection
         return seen.occluded and any(
-            (track.class_name, track.colour) == (seen.class_name, seen.colour)
+            track.is_like(seen)
             and math.dist(track.position_m, seen.position_m) < 0.5 * max(track.size_m)
             for track in self._tracks
         )
@@ -154,27 +167,28 @@ class Tracker:
         for track in gone:
             self._tracks.remove(track)
         for track in gone:
-            if track.object_id and not self._live_on(track):
+            if track.object_id and not self._hand_down(track):
                 track.cause = track.cause or GONE
                 self._vanished.append(track)
         del self._vanished[:-VANISHED_KEPT]
         while len(self._tracks) > MAX_TRACKS:
             self._tracks.remove(min(self._tracks, key=lambda one: one.last_seen_ns))
 
-    def _live_on(self, gone: Track) -> bool:
+    def _hand_down(self, gone: Track) -> bool:
         """Give a thing's id to one that appeared elsewhere after it was last seen."""
         younger = [
             track
             for track in self._tracks
-            if track.object_id and track.first_seen_ns > gone.last_seen_ns and may_be(gone, track)
+            if track.object_id
+            and track.first_seen_ns > gone.last_seen_ns
+            and may_be_same(gone, track)
         ]
-        if not younger:
-            return False
-        take_over(min(younger, key=lambda one: gap_m(gone, one)), gone)
-        return True
+        if younger:
+            inherit_identity(min(younger, key=lambda one: gap_m(gone, one)), gone)
+        return bool(younger)
 
-    def _drop_doubles(self, seen: list[Track]) -> None:
-        """Let what is seen now take over the id of an unseen thing like it in the same place."""
+    def _merge_duplicates(self, seen: list[Track]) -> None:
+        """Merge unseen tracks into the ones seen now that are alike in the same place."""
         for track in seen:
             for other in [one for one in self._tracks if one not in seen]:
                 apart_m = math.dist(other.position_m[:2], track.position_m[:2])
@@ -182,28 +196,54 @@ class Tracker:
                 if alike and apart_m < 0.5 * min(track.size_m[:2]):
                     self._tracks.remove(other)
                     if other.object_id:
-                        take_over(track, other)
+                        inherit_identity(track, other)
 
-    def _name(self, track: Track) -> None:
+    def _identify(self, track: Track) -> None:
         """Give a track the id of the same kind of thing that has left its place, or a new one."""
-        missing = [one for one in self._tracks if is_missing(one)]
-        elder = likeliest(self._vanished, track) or likeliest(missing, track)
+        missing = [one for one in self._tracks if one.object_id and one.misses >= MISSING_MISSES]
+        elder = nearest_candidate(self._vanished, track) or nearest_candidate(missing, track)
         if elder is not None:
             (self._vanished if elder in self._vanished else self._tracks).remove(elder)
-            take_over(track, elder)
+            inherit_identity(track, elder)
             return
         self._used[track.class_name] += 1
         track.object_id = f"{track.class_name}_{self._used[track.class_name]}"
 
 
 def _is_sure(sighting: Sighting) -> bool:
-    """Return whether a sight is good enough to begin a track with."""
+    """Return whether a sighting is good enough to begin a track with."""
     seen = sighting.detection
     return not (seen.truncated or (seen.occluded and seen.class_name == OTHER))
 
 
-def _is_believed(track: Track) -> bool:
-    """Return whether enough looks agree on what a thing is."""
+def _is_confirmed(track: Track) -> bool:
+    """Return whether enough sightings agree on what a thing is."""
     return (
         track.seen_count >= CONFIRM_HITS and track.classes.share(track.class_name) > CONFIRM_SHARE
     )
+
+
+def may_be_same(elder: Track, newer: Track) -> bool:
+    """Return whether `newer` may be the thing that was known as `elder`, brought elsewhere."""
+    if not elder.is_like(newer):
+        return False
+    sizes = [float(np.prod(np.maximum(one.size_m, 1e-3))) ** (1.0 / 3.0) for one in (elder, newer)]
+    if max(sizes) > SIZE_RATIO * min(sizes):
+        return False
+    between_s = max(0.0, (newer.last_seen_ns - elder.last_seen_ns) / NS_PER_S)
+    return gap_m(elder, newer) <= SLACK_M + CARRY_SPEED_M_S * between_s
+
+
+def nearest_candidate(elders: Iterable[Track], newer: Track) -> Track | None:
+    """Return the nearest thing that `newer` may be, or None."""
+    able = [elder for elder in elders if may_be_same(elder, newer)]
+    return min(able, key=lambda elder: gap_m(elder, newer), default=None)
+
+
+def inherit_identity(newer: Track, elder: Track) -> None:
+    """Give a thing the id and the history of the one that it turned out to be."""
+    names = (newer.object_id, *newer.aliases, *elder.aliases)
+    other = dict.fromkeys(name for name in names if name and name != elder.object_id)
+    newer.aliases = tuple(other)[:ALIASES_KEPT]
+    newer.object_id = elder.object_id
+    newer.first_seen_ns = min(newer.first_seen_ns, elder.first_seen_ns)

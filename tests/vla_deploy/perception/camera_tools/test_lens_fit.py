@@ -117,7 +117,7 @@ def test_images_without_board_blurred_or_alike_are_left_out_with_the_reason(
 def test_no_more_images_are_taken_than_are_needed(images: Images, board: CalibrationBoard) -> None:
     offered = iter(images.items())
     told: list[str] = []
-    selection = select(offered, board, enough=2, tell=lambda view: told.append(view.name))
+    selection = select(offered, board, enough=2, on_view=lambda view: told.append(view.name))
     assert [view.name for view in selection.views] == told
     assert len(told) == 2
     assert len(list(offered)) == len(images) - 2 - len(selection.left_out)

@@ -3,7 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.perception.detectors.boxes import MAX_BOXES, Boxes, iou, sound, without_doubles
+from vla_deploy.perception.detectors.boxes import (
+    MAX_BOXES,
+    Boxes,
+    iou,
+    suppress_overlaps,
+    valid_boxes,
+)
 
 
 def boxes(*rows: tuple[tuple[float, ...], float, int]) -> Boxes:
@@ -31,7 +37,7 @@ def test_overlap_is_what_both_cover_over_what_either_covers(other, expected):
 
 
 def test_a_surer_box_takes_out_those_of_its_class_only():
-    left = without_doubles(
+    left = suppress_overlaps(
         boxes(
             ((0, 0, 10, 10), 0.9, 0),
             ((1, 0, 11, 10), 0.8, 1),
@@ -45,12 +51,12 @@ def test_a_surer_box_takes_out_those_of_its_class_only():
 
 def test_a_box_that_was_taken_out_takes_none_out_itself():
     chain = [((4 * n, 0, 4 * n + 10, 10), 0.9 - 0.1 * n, 0) for n in range(3)]
-    kept = without_doubles(boxes(*chain), 0.4)
+    kept = suppress_overlaps(boxes(*chain), 0.4)
     assert kept.corners_px[:, 0].tolist() == [0, 8]
 
 
 def test_unsure_empty_and_endless_boxes_are_left_out():
-    found = sound(
+    found = valid_boxes(
         boxes(
             ((0, 0, 10, 10), 0.3, 0),
             ((0, 0, 10, 10), 0.2, 0),
@@ -67,11 +73,11 @@ def test_unsure_empty_and_endless_boxes_are_left_out():
 
 def test_no_more_boxes_are_told_than_a_room_can_hold():
     many = boxes(*(((20 * n, 0, 20 * n + 10, 10), 0.9, 0) for n in range(MAX_BOXES + 50)))
-    assert len(without_doubles(many, 0.5)) == MAX_BOXES
+    assert len(suppress_overlaps(many, 0.5)) == MAX_BOXES
 
 
 def test_nothing_stays_nothing():
-    assert len(without_doubles(sound(boxes(), 0.1), 0.5)) == 0
+    assert len(suppress_overlaps(valid_boxes(boxes(), 0.1), 0.5)) == 0
 
 
 CORNERS = st.tuples(*[st.integers(0, 30)] * 2, *[st.integers(1, 20)] * 2)
@@ -83,7 +89,7 @@ def test_what_is_kept_is_free_of_doubles_and_covers_what_is_not(rows, threshold)
         ((x, y, x + w, y + h), 1.0 - 0.01 * number, kind)
         for number, ((x, y, w, h), kind) in enumerate(rows)
     ]
-    kept = without_doubles(boxes(*listed), threshold)
+    kept = suppress_overlaps(boxes(*listed), threshold)
     told = [tuple(one) for one in kept.corners_px.astype(int).tolist()]
     chosen = list(zip(told, kept.classes.tolist(), strict=True))
     for corners, _, kind in listed:

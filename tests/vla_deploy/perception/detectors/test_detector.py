@@ -124,7 +124,7 @@ def test_outputs_of_another_shape_fail_the_frame_and_nothing_else(
 def test_a_tier_names_the_model_and_the_last_one_is_the_smallest(shelf, profile, tier, name):
     detector = open_detector(shelf, profile, tier)
     assert (detector.stats().model, detector.stats().variant) == (name, Variant.INT8_U8S8)
-    assert detector.classes == ("red", "green", "blue")
+    assert detector.detection.classes == ("red", "green", "blue")
 
 
 def test_a_profile_without_a_detector_is_told(shelf, profile):
@@ -155,18 +155,29 @@ def test_a_model_that_does_not_run_as_asked_is_told_to_the_log(shelf, profile, c
     assert "degraded: CUDAExecutionProvider: this onnxruntime" in caplog.text
 
 
-def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, shelf, profile, rgb):
+@pytest.fixture
+def looker(shelf, profile, rgb):
+    return Looker(shelf, profile, rgb)
+
+
+@pytest.fixture
+def node(tmp_path, looker, profile):
+    """A stepping node that the supervisor has asked for a smaller model."""
     clock = MonotonicClock()
-    looker = Looker(shelf, profile, rgb)
-    first, executor = looker.detector, low_priority_thread(MonotonicClock())
+    executor = low_priority_thread(clock)
     node = ReconfigurableNode(
         "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, executor=executor
     )
     node.start()
-    directives = SharedSpace(tmp_path, clock).cell_writer("resource_directives")
     node.step()
+    directives = SharedSpace(tmp_path, clock).cell_writer("resource_directives")
     directives.put_document({"rate_ratio": {}, "model_tier": {"perception": 1}})
-    steps = 1
+    yield node
+    node.stop()
+
+
+def test_the_model_changes_between_two_steps_and_no_step_is_missed(node, looker, rgb):
+    first, steps = looker.detector, 1
     while looker.seen[-1][0] == "medium":
         node.step()
         steps += 1
@@ -175,32 +186,15 @@ def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, she
     assert len({count for _, count in looker.seen}) == 1, "both see the same"
     with pytest.raises(RunFailed, match="medium: its session is closed"):
         first.detect(rgb)
-    node.stop()
 
 
 def test_a_model_that_cannot_be_opened_leaves_the_present_one_at_work(
-    tmp_path, shelf, profile, rgb, caplog
+    tmp_path, node, looker, shelf, profile, caplog
 ):
-    clock = MonotonicClock()
-    looker = Looker(shelf, profile, rgb)
     (tmp_path / "models" / "small" / "model.toml").write_text("role = 'detector'")
-    node = ReconfigurableNode(
-        "perception",
-        looker,
-        profile,
-        ipc=tmp_path,
-        clock=clock,
-        host=NO_HOST,
-        executor=low_priority_thread(MonotonicClock()),
-    )
-    node.start()
-    SharedSpace(tmp_path, clock).cell_writer("resource_directives").put_document(
-        {"rate_ratio": {}, "model_tier": {"perception": 1}}
-    )
     while "degraded: no models of tier 1" not in caplog.text:
         node.step()
     assert "small/model.toml: " in caplog.text
     assert {name for name, _ in looker.seen} == {"medium"}
     with pytest.raises(ManifestInvalid):
         open_detector(shelf, profile, 1)
-    node.stop()

@@ -20,8 +20,8 @@ from vla_deploy.inference.store import ModelStore
 from vla_deploy.perception.images.detector_worker import (
     FAILURES_TO_DISMISS,
     DetectorAnswer,
-    Eyes,
-    open_network,
+    DetectorWorker,
+    load_detector,
 )
 
 
@@ -98,61 +98,61 @@ def clock():
 
 
 @pytest.fixture
-def eyes(executor, clock, shelf, model):
-    made = Eyes(executor, clock)
-    made.take(open_network(shelf, profile(), 0))
+def worker(executor, clock, shelf, model):
+    made = DetectorWorker(executor, clock)
+    made.replace(load_detector(shelf, profile(), 0))
     return made
 
 
-def test_an_answer_is_awaited_and_then_taken_once(eyes, executor, rgb):
-    eyes.ask(rgb)
-    assert eyes.answer() is None
+def test_an_answer_is_awaited_and_then_taken_once(worker, executor, rgb):
+    worker.ask(rgb)
+    assert worker.answer() is None
     executor.catch_up()
-    answer = eyes.answer()
-    assert [one.class_name for one in answer.view.voices] == ["red", "green", "blue"]
+    answer = worker.answer()
+    assert [one.class_name for one in answer.view.reliabilities] == ["red", "green", "blue"]
     assert {int(one) for one in answer.view.boxes.classes} == {0}
-    assert eyes.answer() == DetectorAnswer(view=None)
-    assert eyes.document()["model"]["runs"] == 1
+    assert worker.answer() == DetectorAnswer(view=None)
+    assert worker.document()["model"]["runs"] == 1
 
 
-def test_a_network_that_takes_too_long_is_done_without_until_it_answers(eyes, executor, clock, rgb):
-    eyes.ask(rgb)
+def test_things_are_named_by_form_until_a_slow_detector_answers(worker, executor, clock, rgb):
+    worker.ask(rgb)
     clock.ns = 1_100_000_000
-    assert eyes.answer() == DetectorAnswer(view=None)
-    assert eyes.document()["mode"] == "form"
-    assert eyes.document()["why"] == "no answer within 1 s"
-    eyes.ask(rgb)  # it is still busy with the first
-    assert eyes.answer() == DetectorAnswer(view=None)
+    assert worker.answer() == DetectorAnswer(view=None)
+    assert worker.document()["mode"] == "form"
+    assert worker.document()["why"] == "no answer within 1 s"
+    worker.ask(rgb)  # it is still busy with the first
+    assert worker.answer() == DetectorAnswer(view=None)
     executor.catch_up()
-    eyes.ask(rgb)
+    worker.ask(rgb)
     executor.catch_up()
-    assert eyes.answer().view is not None
-    assert (eyes.document()["mode"], eyes.document()["late"]) == ("network", 1)
+    assert worker.answer().view is not None
+    assert (worker.document()["mode"], worker.document()["late"]) == ("network", 1)
 
 
-def test_a_network_that_fails_again_and_again_is_asked_no_more(eyes, executor, rgb, caplog):
-    eyes.network.detector.close()
+def test_a_network_that_fails_again_and_again_is_asked_no_more(worker, executor, rgb, caplog):
+    worker.loaded.detector.close()
     for number in range(FAILURES_TO_DISMISS):
-        assert eyes.network.detector is not None
-        eyes.ask(rgb)
+        assert worker.loaded.detector is not None
+        worker.ask(rgb)
         executor.catch_up()
-        assert eyes.answer() == DetectorAnswer(view=None)
-        assert eyes.document()["mode"] == "form"
-        assert "session is closed" in eyes.document()["why"]
+        assert worker.answer() == DetectorAnswer(view=None)
+        assert worker.document()["mode"] == "form"
+        assert "session is closed" in worker.document()["why"]
         assert ("asked no more" in caplog.text) is (number + 1 == FAILURES_TO_DISMISS)
-    assert eyes.document()["model"] is None
-    eyes.ask(rgb)
-    assert eyes.answer() == DetectorAnswer(view=None)
+    assert worker.document()["model"] is None
+    worker.ask(rgb)
+    assert worker.answer() == DetectorAnswer(view=None)
 
 
-def test_a_network_that_is_replaced_still_answers_what_it_was_asked(eyes, executor, shelf, rgb):
-    eyes.ask(rgb)
-    eyes.release(eyes.take(open_network(shelf, profile(), 0)))
+def test_a_network_that_is_replaced_still_answers_what_it_was_asked(worker, executor, shelf, rgb):
+    worker.ask(rgb)
+    worker.release(worker.replace(load_detector(shelf, profile(), 0)))
     executor.catch_up()
-    assert eyes.answer().view is not None
-    eyes.ask(rgb)
+    assert worker.answer().view is not None
+    worker.ask(rgb)
     executor.catch_up()
-    assert eyes.answer().view is not None
+    assert worker.answer().view is not None
 
 
 def cut_off(folder, blobs):
@@ -190,12 +190,12 @@ def test_a_model_that_is_no_good_leaves_the_robot_without_one_and_says_why(
     shelf, model, blobs, spoil
 ):
     told = spoil(model, blobs)
-    network = open_network(shelf, profile(), 0)
+    network = load_detector(shelf, profile(), 0)
     assert network.detector is None
     assert told in network.why
     for changes in ({"required": True}, {}):
         with pytest.raises(InferenceError):
-            open_network(shelf, profile(**changes), 0, instead_of_one=not changes)
+            load_detector(shelf, profile(**changes), 0, replaces_one=not changes)
 
 
 def test_weights_that_give_no_numbers_are_refused_when_the_model_is_opened(
@@ -203,14 +203,14 @@ def test_weights_that_give_no_numbers_are_refused_when_the_model_is_opened(
 ):
     content = blobs.raw(red_gain=float("nan")).SerializeToString()
     lay_out(tmp_path / "models", blob_manifest, {Variant.INT8_U8S8: content})
-    network = open_network(shelf, profile(), 0)
+    network = load_detector(shelf, profile(), 0)
     assert network.detector is None
     assert "values are no numbers" in network.why
 
 
 def test_a_profile_that_names_no_detector_goes_by_form(shelf):
     bare = dataclasses.replace(load_profile("desktop"), models={})
-    network = open_network(shelf, bare, 0)
+    network = load_detector(shelf, bare, 0)
     assert (network.detector, network.why) == (None, "profile desktop names no detector")
 
 
@@ -240,9 +240,11 @@ def test_weights_that_give_no_numbers_for_an_image_fail_that_image(
     tmp_path, shelf, lay_out, blob_manifest, executor, clock, rgb
 ):
     lay_out(tmp_path / "models", blob_manifest, {Variant.INT8_U8S8: fails_on_bright_images()})
-    eyes = Eyes(executor, clock)
-    eyes.take(open_network(shelf, profile(), 0))
-    eyes.ask(rgb)
+    worker = DetectorWorker(executor, clock)
+    worker.replace(load_detector(shelf, profile(), 0))
+    worker.ask(rgb)
     executor.catch_up()
-    assert eyes.answer() == DetectorAnswer(view=None)
-    assert "blobs: output 'output': 672 of its 672 values are no numbers" in eyes.document()["why"]
+    assert worker.answer() == DetectorAnswer(view=None)
+    assert (
+        "blobs: output 'output': 672 of its 672 values are no numbers" in worker.document()["why"]
+    )

@@ -12,8 +12,8 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import DEPTH_SIGMA_PER_M
 from vla_deploy.perception.images.frame_check import LIMITS, ImageUse, StatisticLimit, judge_frame
+from vla_deploy.perception.images.frame_monitor import FrameMonitor
 from vla_deploy.perception.images.frame_statistics import FrameStatistics, measure_frame
-from vla_deploy.perception.images.frame_watch import FrameWatch
 
 WIDTH, HEIGHT = 160, 120
 CAMERA = Intrinsics(width=WIDTH, height=HEIGHT, fx=140.0, fy=140.0, cx=79.5, cy=59.5)
@@ -43,11 +43,11 @@ def turned(yaw_rad: float) -> Image:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def watch(*frames: RgbdFrame, turn_rad: float = 0.0, base: Pose2D = HERE) -> FrameWatch:
-    seen = FrameWatch()
+def watch(*frames: RgbdFrame, turn_rad: float = 0.0, base: Pose2D = HERE) -> FrameMonitor:
+    seen = FrameMonitor()
     for number, one in enumerate(frames):
         where = HERE if number == 0 else base
-        seen.came(one, 0)
+        seen.receive(one, 0)
         seen.judge(one, one.depth_m(), turned(number * turn_rad), where)
     return seen
 
@@ -160,8 +160,8 @@ def test_an_image_is_torn_with_one_that_came_and_was_not_judged() -> None:
     (rgb, depth), skipped = room(2, shift_px=40), frame(*room(1, shift_px=20))
     rgb[:60], depth[:60] = skipped.rgb[:60], skipped.depth[:60]
     seen, torn = watch(frame(*room(0))), frame(rgb, depth)
-    seen.came(skipped, 0)
-    seen.came(torn, 0)
+    seen.receive(skipped, 0)
+    seen.receive(torn, 0)
     assert seen.judge(torn, torn.depth_m(), turned(0.0), HERE).use is ImageUse.NOTHING
 
 
@@ -190,7 +190,7 @@ def test_colours_that_stay_while_the_camera_moves_leave_obstacles(rows: int) -> 
 
 
 def test_colours_that_stay_are_stale_however_slowly_the_camera_moves() -> None:
-    seen, rgb = FrameWatch(), room(0)[0]
+    seen, rgb = FrameMonitor(), room(0)[0]
     uses = []
     for number in range(12):
         one = frame(rgb, room(number)[1])
@@ -210,7 +210,7 @@ def test_a_wall_too_near_for_noise_in_its_depth_is_not_taken_for_frozen(driven_m
 
 @pytest.mark.parametrize("noise_seeds", [1, 1000], ids=["without noise", "noisy"])
 def test_a_robot_at_rest_whose_yaw_drifts_has_not_moved_its_camera(noise_seeds: int) -> None:
-    seen, second_ns = FrameWatch(), 1_000_000_000
+    seen, second_ns = FrameMonitor(), 1_000_000_000
     drift_rad_s = math.radians(0.5) / 60.0
     for second in range(0, 1200, 4):
         rgb, depth = room(second % noise_seeds)[0], room(second)[1]

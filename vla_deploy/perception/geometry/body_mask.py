@@ -70,9 +70,9 @@ class BodyMask:
 def _shapes(
     model: pinocchio.Model, path: str, moved_by: set[int]
 ) -> list[pinocchio.GeometryObject]:
-    """Return every collision shape, and the looks of what moves: shells may reach beyond.
+    """Return every collision shape, and the visual ones of moving parts, which may reach beyond.
 
-    The trunk's shells are left out: so near the camera, balls cover far more than they should.
+    The trunk's visual shapes are left out: so near the camera, balls would cover far too much.
     """
     collision, visual = (
         pinocchio.buildGeomFromMJCF(model, path, kind).geometryObjects

@@ -10,9 +10,9 @@ from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import ModelStore
+from vla_deploy.perception.detectors.adapters import read_counted, read_end_to_end
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.detector import Detector
-from vla_deploy.perception.detectors.yolo import read_counted, read_end_to_end
 
 COLOURS = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 SCORE, IOU = 0.25, 0.3
@@ -118,7 +118,7 @@ def test_raw_outputs_of_either_order_are_read_and_freed_of_doubles(
     detector = open_graph(
         blobs.raw(transposed=transposed), outputs=tensors(("output", shape, "float32"))
     )
-    same(detector.detect(scene), detector.classes, reference(blobs, scene))
+    same(detector.detect(scene), detector.detection.classes, reference(blobs, scene))
 
 
 def test_end_to_end_outputs_are_read_as_they_are(open_graph, blobs, scene):
@@ -130,7 +130,7 @@ def test_end_to_end_outputs_are_read_as_they_are(open_graph, blobs, scene):
     found = detector.detect(scene)
     scores = blobs.score_table(scene)
     assert len(found) == int((scores.max(axis=0) >= SCORE).sum()) > len(reference(blobs, scene))
-    names = {detector.classes[number] for number in found.classes}
+    names = {detector.detection.classes[number] for number in found.classes}
     assert names == {"red", "green", "blue"}
 
 
@@ -145,7 +145,7 @@ def test_what_a_graph_with_nms_leaves_behind_its_count_is_not_read(open_graph, b
             ("det_classes", (1, 10), "int32"),
         ),
     )
-    same(detector.detect(scene), detector.classes, reference(blobs, scene))
+    same(detector.detect(scene), detector.detection.classes, reference(blobs, scene))
 
 
 def test_boxes_come_back_in_the_pixels_of_a_letterboxed_image(open_graph, blobs):

@@ -1,8 +1,8 @@
-"""Fit upright and lying turned bodies to a cluster: where its axis is, how wide, how surely.
+"""Fit upright and lying bodies of revolution to a cluster: axis, radius and their error.
 
-The camera sees the near side only. So the far side is taken from what the form says: slices of an
-upright body are circles, a lying one is a cylinder that touches its support. Yaw is that of a
-lying body's axis; an upright one looks the same from all sides.
+The camera sees the near side only, so the far side follows from the form: slices of an upright body
+are circles, a lying one is a cylinder that touches its support. Yaw is that of a lying body's axis;
+an upright one looks the same from all sides.
 """
 
 import math
@@ -32,7 +32,7 @@ ON_SURFACE_RATIO = 0.06
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TurnedFit:
+class RevolutionFit:
     """Hold a body's axis in the base frame; sigmas are those of the place of its middle.
 
     `agreement` is the share of the points that lie on the fitted surface, 0 to 1.
@@ -57,8 +57,8 @@ class _Slice:
 
 def fit_upright(
     cluster: Cluster, camera_position: Array, pixel_m: float, sigma_m: float
-) -> TurnedFit | None:
-    """Return the axis of an upright turned body, or None where too little of it is seen.
+) -> RevolutionFit | None:
+    """Return the axis of an upright body of revolution, or None where too little of it is seen.
 
     `sigma_xy_m` is along the line of sight and across it.
     """
@@ -75,7 +75,7 @@ def fit_upright(
     middle_d, spread_d = _middle(np.array([one.along_m for one in kept]), weights)
     radius_m = 0.5 * _middle(np.array([one.width_m for one in kept]), weights)[0]
     x, y = origin + middle_d * sight + middle_u * across
-    return TurnedFit(
+    return RevolutionFit(
         xy=(float(x), float(y)),
         length_m=top_m,
         radius_m=radius_m,
@@ -116,7 +116,7 @@ def _slices(
 
 
 def _slice(u: Array, d: Array, pixel_m: float, sigma_m: float) -> _Slice | None:
-    """Return the circle of which one sees the near side, and perhaps the inside of the far one."""
+    """Return the circle of which the near side is seen, and perhaps the inside of the far one."""
     low, high = float(u.min()), float(u.max())
     middle, radius = 0.5 * (low + high), 0.5 * (high - low + pixel_m)
     front = np.abs(u - middle) < FRONT_RATIO * radius
@@ -128,13 +128,13 @@ def _slice(u: Array, d: Array, pixel_m: float, sigma_m: float) -> _Slice | None:
 
 
 def _nearest_peak(values: Array, window: float) -> float:
-    """Return the mean of the first place in which the values crowd."""
+    """Return the mean of the first peak in the density of values."""
     ordered = np.sort(values)
     ends = np.searchsorted(ordered, ordered + window, side="right")
     counts = ends - np.arange(len(ordered))
-    crowded = np.flatnonzero(counts >= PEAK_SHARE * counts.max())
-    # The crowd's fullest window, not the one that only touches it.
-    near = crowded[ordered[crowded] <= ordered[crowded[0]] + window]
+    dense = np.flatnonzero(counts >= PEAK_SHARE * counts.max())
+    # The fullest window of the peak, not the one that only touches it.
+    near = dense[ordered[dense] <= ordered[dense[0]] + window]
     first = int(near[np.argmax(counts[near])])
     return float(ordered[first : ends[first]].mean())
 
@@ -158,8 +158,10 @@ def _middle(values: Array, weights: Array) -> tuple[float, float]:
     return mean, spread / math.sqrt(len(kept))
 
 
-def fit_lying(cluster: Cluster, yaw_rad: float, pixel_m: float, sigma_m: float) -> TurnedFit | None:
-    """Return the cylinder on its side that fits best, from a first idea of its axis' yaw.
+def fit_lying(
+    cluster: Cluster, yaw_rad: float, pixel_m: float, sigma_m: float
+) -> RevolutionFit | None:
+    """Return the cylinder on its side that fits best, from a first estimate of its axis' yaw.
 
     `sigma_xy_m` is along the axis and across it. None means that no cylinder fits at all.
     """
@@ -183,18 +185,18 @@ def fit_lying(cluster: Cluster, yaw_rad: float, pixel_m: float, sigma_m: float) 
 def _improved(
     state: Array, xy: Array, heights: Array, reach_m: float
 ) -> tuple[Array, Array, NDArray[np.bool_]] | None:
-    """Take one Gauss-Newton step in offset, radius and yaw; return its covariance, too."""
+    """Take one Gauss-Newton step in offset, radius and yaw; return state, covariance, inliers."""
     offset, radius, yaw = state
     c, s = math.cos(yaw), math.sin(yaw)
     along = xy @ (c, s)
-    beside = xy @ (-s, c) - offset
+    across = xy @ (-s, c) - offset
     above = heights - radius
-    out = np.maximum(np.hypot(beside, above), 1e-6)
+    out = np.maximum(np.hypot(across, above), 1e-6)
     miss = out - radius
     near = np.abs(miss) < reach_m
     if np.count_nonzero(near) < LYING_POINTS:
         return None
-    slope = np.column_stack((-beside / out, -above / out - 1.0, -along * beside / out))[near]
+    slope = np.column_stack((-across / out, -above / out - 1.0, -along * across / out))[near]
     normal = slope.T @ slope
     if np.linalg.cond(normal) > 1e12:
         return None
@@ -213,16 +215,14 @@ def _as_lying(
     xy: Array,
     origin: Array,
     grain_m: float,
-) -> TurnedFit:
+) -> RevolutionFit:
     offset, radius, yaw = (float(value) for value in state)
-    axis, beside = (
-        np.array([math.cos(yaw), math.sin(yaw)]),
-        np.array([-math.sin(yaw), math.cos(yaw)]),
-    )
+    axis = np.array([math.cos(yaw), math.sin(yaw)])
+    across = np.array([-math.sin(yaw), math.cos(yaw)])
     # The whole cluster counts here: a neck is thinner than the body, an end cap is no part of it.
     low, high = np.percentile(xy @ axis, (0.5, 99.5))
-    x, y = origin + offset * beside + 0.5 * (low + high) * axis
-    return TurnedFit(
+    x, y = origin + offset * across + 0.5 * (low + high) * axis
+    return RevolutionFit(
         xy=(float(x), float(y)),
         length_m=float(high - low) + grain_m,
         radius_m=radius,

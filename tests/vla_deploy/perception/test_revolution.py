@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vla_deploy.perception.geometry.clusters import Cluster
-from vla_deploy.perception.geometry.forms import fit_lying, fit_upright
+from vla_deploy.perception.geometry.revolution import fit_lying, fit_upright
 from vla_deploy.perception.geometry.supports import Support
 
 CAMERA = np.array([0.0, 0.0, 1.2])

@@ -12,16 +12,20 @@ from vla_deploy.inference.manifest import (
     Measured,
     TensorLayout,
 )
-from vla_deploy.perception.naming.class_names import OTHER_WORDS, known_as
-from vla_deploy.perception.naming.class_weighting import Voice, voices_of
-from vla_deploy.perception.naming.classes import FURNITURE, OTHER, POSSIBLE, Form
-from vla_deploy.perception.naming.object_name import (
+from vla_deploy.perception.naming.class_fusion import (
     ClassVote,
     NameSource,
-    by_both,
-    by_form,
     chance_of,
+    fuse_name,
+    name_by_form,
 )
+from vla_deploy.perception.naming.class_weighting import (
+    CLASS_SYNONYMS,
+    ClassReliability,
+    class_reliabilities,
+    robot_class,
+)
+from vla_deploy.perception.naming.classes import FURNITURE, OTHER, POSSIBLE, Form
 
 IMAGE = ImageInput(
     width_px=640,
@@ -54,7 +58,7 @@ def row(name: str, precision: float, recall: float, count: int) -> ClassMeasured
 
 
 def test_a_networks_classes_go_by_the_robots_own_words() -> None:
-    assert [one.class_name for one in voices_of(COCO)] == [
+    assert [one.class_name for one in class_reliabilities(COCO)] == [
         "phone",
         "ball",
         FURNITURE,
@@ -64,21 +68,21 @@ def test_a_networks_classes_go_by_the_robots_own_words() -> None:
 
 @pytest.mark.parametrize("told", ["Cell Phone", "cell_phone", "cell-phone", " cell  phone"])
 def test_spelling_makes_no_other_class(told: str) -> None:
-    assert known_as(told) == "phone"
+    assert robot_class(told) == "phone"
 
 
 def test_every_other_word_stands_for_something_that_the_robot_knows() -> None:
-    assert set(OTHER_WORDS.values()) <= {*POSSIBLE, "person", "chair", FURNITURE}
-    assert all(OTHER_WORDS[name] == name for name in OTHER_WORDS.values())
+    assert set(CLASS_SYNONYMS.values()) <= {*POSSIBLE, "person", "chair", FURNITURE}
+    assert all(CLASS_SYNONYMS[name] == name for name in CLASS_SYNONYMS.values())
 
 
 @pytest.mark.parametrize("near", ["wine glass", "vase", "suitcase", "handbag", "laptop", "spoon"])
 def test_what_only_resembles_a_kind_keeps_its_own_name(near: str) -> None:
-    assert known_as(near) == near
+    assert robot_class(near) == near
 
 
 def test_many_boxes_count_as_they_were_measured_and_few_for_little() -> None:
-    many, few, *_ = voices_of(
+    many, few, *_ = class_reliabilities(
         measured(row("cell phone", 1.0, 1.0, 990), row("sports ball", 1.0, 1.0, 2))
     )
     assert (many.precision, many.recall) == pytest.approx((0.995, 0.99))
@@ -86,13 +90,13 @@ def test_many_boxes_count_as_they_were_measured_and_few_for_little() -> None:
 
 
 def test_a_class_that_no_labelled_image_showed_counts_as_unmeasured() -> None:
-    voices = voices_of(measured(row("cell phone", 0.9, 0.8, 500)))
-    assert voices[3] == Voice(class_name="teddy bear", precision=0.5, recall=0.0)
+    reliabilities = class_reliabilities(measured(row("cell phone", 0.9, 0.8, 500)))
+    assert reliabilities[3] == ClassReliability(class_name="teddy bear", precision=0.5, recall=0.0)
 
 
 def test_figures_without_counts_count_for_every_class_as_they_were_stated() -> None:
-    voices = voices_of(replace(COCO, measured=Measured(precision=0.8, recall=0.7)))
-    assert {(one.precision, one.recall) for one in voices} == {(0.8, 0.7)}
+    reliabilities = class_reliabilities(replace(COCO, measured=Measured(precision=0.8, recall=0.7)))
+    assert {(one.precision, one.recall) for one in reliabilities} == {(0.8, 0.7)}
 
 
 @pytest.mark.parametrize("form", [PHONE, SHAPELESS], ids=["a phone's form", "no form"])
@@ -100,19 +104,19 @@ def test_figures_without_counts_count_for_every_class_as_they_were_stated() -> N
 def test_words_that_say_nothing_of_the_kind_never_raise_a_names_confidence(
     form: Form, said: int
 ) -> None:
-    voice = voices_of(
+    voice = class_reliabilities(
         measured(row("cell phone", 0.95, 0.9, 500), row("dining table", 0.95, 0.9, 500))
     )[said]
     word = ClassVote(class_name=voice.class_name, chance=chance_of(0.99, voice.precision))
-    name = by_both(form, [word])
-    alone = by_form(form)
+    name = fuse_name(form, [word])
+    alone = name_by_form(form)
     assert (name.class_name, name.source) in {(form.name, alone.source), (OTHER, NameSource.NONE)}
     assert name.confidence <= alone.confidence
 
 
 def test_a_measured_word_for_a_cell_phone_makes_a_phone_surer() -> None:
-    phone = voices_of(measured(row("cell phone", 0.95, 0.9, 500)))[0]
+    phone = class_reliabilities(measured(row("cell phone", 0.95, 0.9, 500)))[0]
     word = ClassVote(class_name=phone.class_name, chance=chance_of(0.9, phone.precision))
-    name = by_both(PHONE, [word])
+    name = fuse_name(PHONE, [word])
     assert (name.class_name, name.source) == ("phone", NameSource.BOTH)
-    assert name.confidence > by_form(PHONE).confidence
+    assert name.confidence > name_by_form(PHONE).confidence

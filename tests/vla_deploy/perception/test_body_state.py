@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vla_deploy.perception.objects.history import KEEP_NS, JointHistory
+from vla_deploy.perception.objects.body_state import KEEP_NS, JointHistory
 
 TOLERANCE_NS = 50
 

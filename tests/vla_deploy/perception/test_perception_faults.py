@@ -122,15 +122,12 @@ def test_nothing_is_seen_in_a_spoiled_image_and_all_is_well_after_it(
     known = rig.known()
     rig.spoil = spoil
     rig.run_for(0.3)
-    scene, obstacles = rig.scene(), rig.space.cell_reader("near_obstacles")
-    before = obstacles.latest()
+    scene, before = rig.scene(), rig.sample("near_obstacles")
     rig.run_for(0.6)
-    after = obstacles.latest()
+    after = rig.sample("near_obstacles")
     assert rig.scene()["stamp_ns"] == scene["stamp_ns"]
     assert set(rig.known()) == set(known)
     assert [text.partition(":")[0] for text in rig.scene()["image"]["faults"]] == [fault]
-    assert before is not None
-    assert after is not None
     assert (after.sequence > before.sequence) is obstacles_go_on
     rig.spoil = lambda rgb, depth: (rgb, depth)
     rig.run_for(0.6)
@@ -165,11 +162,9 @@ def test_a_camera_that_is_unplugged_while_the_robot_drives_stops_telling_of_obst
     rig.run_for(0.5)
     rig.lines["camera"].unplug()
     rig.run_for(0.2)
-    before = rig.space.cell_reader("near_obstacles").latest()
+    before = rig.sample("near_obstacles")
     rig.run_for(0.5)
-    after = rig.space.cell_reader("near_obstacles").latest()
-    assert before is not None
-    assert after is not None
+    after = rig.sample("near_obstacles")
     assert after.sequence == before.sequence
     assert list(rig.scene()["away"]) == ["camera"]
     position_m, _ = rig.pose_error()

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vla_deploy.perception.objects.assignment import assign
+from vla_deploy.perception.objects.matching import assign
 
 LIMIT = 10.0
 shapes = st.tuples(st.integers(0, 4), st.integers(0, 4))

@@ -1,0 +1,76 @@
+"""Track the robot's pose: wheels and IMU from step to step, the lidar against the map."""
+
+from drivers.clock import NS_PER_S
+from drivers.imu.base import ImuSample
+from drivers.lidar.base import Scan
+from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
+from vla_deploy.navigation.localising.localisation import Localiser
+from vla_deploy.navigation.maps.grid_map import load_map
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+
+# Without a new yaw for this long, the wheels give the turn.
+FRESH_YAW_NS = NS_PER_S // 25
+
+
+class PoseTracker:
+    """Feed the `localiser` from the topics and the sensors, and publish the pose."""
+
+    def __init__(self, robot: RobotDescription, model: RobotModel, space: SharedSpace) -> None:
+        """Read the map, and start where an earlier instance in this run ended.
+
+        Raises:
+            MapInvalid: the robot file's map cannot be used.
+        """
+        # The driver has turned the beams: they count from the robot's front.
+        site = model.site_pose(robot.lidar.site, full_positions(robot))
+        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
+        self.localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
+        self._imu_yaw_rad: float | None = None
+        self._imu_ns = 0
+        self._base_stamp_ns = -1
+
+    def start(self, space: SharedSpace) -> None:
+        """Open the topics."""
+        self._base_state: CellReader = space.cell_reader("base_state")
+        self._writer: CellWriter = space.cell_writer("pose")
+
+    def add_imu(self, newest: ImuSample) -> None:
+        """Use a sample of the IMU from the next step on."""
+        self._imu_yaw_rad, self._imu_ns = newest.yaw_rad, newest.stamp_ns
+
+    def predict(self, now_ns: int) -> None:
+        """Dead-reckon and publish; without wheel odometry the pose stays as it is."""
+        sample = self._base_state.latest()
+        if sample is not None and sample.stamp_ns != self._base_stamp_ns:
+            self._base_stamp_ns = sample.stamp_ns
+            data = sample.data
+            odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
+            self.localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
+        pose = self.localiser.pose
+        self._writer.put(
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            yaw_rad=pose.yaw_rad,
+            match_ratio=self.localiser.match_ratio,
+            covariance=self.localiser.covariance.ravel(),
+            state=self.localiser.state,
+            doubt=self.localiser.doubt,
+        )
+
+    def correct(self, scan: Scan) -> None:
+        """Correct the pose by a scan."""
+        self.localiser.correct(scan.range_m, scan.beam_stamp_ns)
+
+    def _fresh_yaw_rad(self, now_ns: int) -> float | None:
+        """Return the IMU's yaw unless it is out of date: a frozen one would hide all turns."""
+        return self._imu_yaw_rad if now_ns - self._imu_ns <= FRESH_YAW_NS else None
+
+
+def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+    last = space.cell_reader("pose").latest()
+    if last is not None:
+        return Pose2D(*(float(last.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+    start = robot.start_pose
+    return Pose2D(start.x_m, start.y_m, start.yaw_rad)
