@@ -1,4 +1,4 @@
-"""Check that the gateway to ROS 2 would run, and who could reach the robot through it."""
+"""Check that the gateway to ROS 2 can run, and who can reach the robot through it."""
 
 import json
 import os
@@ -42,7 +42,7 @@ print(json.dumps(told))
 
 
 def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Start ROS's interpreter and let it import all that the gateway needs."""
+    """Start ROS's interpreter and import in it all that the gateway needs."""
     settings = _asked(context)
     if settings is None:
         return
@@ -89,7 +89,7 @@ def leftovers(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def logs(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Measure the logs of ROS: it never removes one."""
+    """Measure the logs of ROS, which never removes any."""
     if _asked(context) is None:
         return
     home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
@@ -144,7 +144,7 @@ def _domain(settings: RosSettings) -> DoctorFinding:
 
 
 def _reach(settings: RosSettings) -> DoctorFinding:
-    """Report who else can take part: DDS asks nobody for a password."""
+    """Report who else can take part: DDS has no password."""
     name, peers = "ROS discovery", os.environ.get("ROS_STATIC_PEERS", "")
     can = {
         Accepts.ALL: "see the robot, and command it",
@@ -153,8 +153,8 @@ def _reach(settings: RosSettings) -> DoctorFinding:
     }[settings.accept]
     keep_in = 'set discovery = "localhost" under [ros]; or encrypt: docs/ros.md'
     if settings.discovery not in ("localhost", "off"):
-        whoever = f"{settings.discovery}: every computer on this network can {can}"
-        return warn(name, whoever, keep_in)
+        reach = f"{settings.discovery}: every computer on this network can {can}"
+        return warn(name, reach, keep_in)
     if peers and settings.discovery != "off":
         return warn(name, f"{settings.discovery}, and {peers} can {can}", "unset ROS_STATIC_PEERS")
     return ok(name, f"{settings.discovery}: every user of this computer can {can}")

@@ -1,7 +1,7 @@
 """Say what keeps the robot's service from being installed or updated.
 
 InstallError
-├── TemplateBroken       a template of ours names what nobody fills in
+├── TemplateBroken       a template has a placeholder without a value
 ├── ArgumentRefused      a name or path cannot stand in a unit
 ├── NotPermitted         writing there needs another user
 ├── ReleaseRefused       the release cannot be added, used or removed; nothing was changed

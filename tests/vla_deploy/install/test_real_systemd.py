@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.install.release_build import LAUNCHER
-from vla_deploy.install.release_store import ReleaseStore
+from vla_deploy.install.releases import LAUNCHER, ReleaseStore
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
 TRIAL = "/opt/vla-deploy/trial"
