@@ -18,7 +18,7 @@ from vla_deploy.supervisor.profiles.profile_choice import (
     detect,
     start_profile,
 )
-from vla_deploy.supervisor.service_times import (
+from vla_deploy.supervisor.systemd import (
     RESTART_S,
     START_BURST,
     start_limit_s,

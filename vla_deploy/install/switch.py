@@ -11,7 +11,7 @@ from vla_deploy.install.commands import run_command
 from vla_deploy.install.errors import ReleaseRefused, SwitchFailed, SystemCommandFailed
 from vla_deploy.install.layout import SERVICE
 from vla_deploy.install.releases import ReleaseStore
-from vla_deploy.supervisor.status_line import trouble_in
+from vla_deploy.supervisor.systemd import trouble_in
 
 _POLL_NS = NS_PER_S // 5
 

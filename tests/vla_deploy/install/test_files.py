@@ -15,7 +15,7 @@ from vla_deploy.install.commands import before_uninstall
 from vla_deploy.install.errors import TemplateBroken
 from vla_deploy.install.files import filled, service_profile, slice_too_small
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.service_times import (
+from vla_deploy.supervisor.systemd import (
     RESTART_S,
     START_BURST,
     start_limit_s,

@@ -34,7 +34,7 @@ time.sleep(99)
 TINY = f"""
 import ctypes, signal, subprocess, sys
 from drivers.clock import MonotonicClock
-from vla_deploy.supervisor.notify import Notifier, own_target
+from vla_deploy.supervisor.systemd import Notifier, own_target
 def end_with_me():
     ctypes.CDLL(None).prctl(1, 15)
 clock, stop = MonotonicClock(), []

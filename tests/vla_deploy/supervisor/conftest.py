@@ -7,9 +7,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from vla_deploy.supervisor.notify import NotifyTarget
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.systemd import NotifyTarget
 from vla_deploy.supervisor.table import ProcessSpec, RestartPolicy
 
 CHILD = str(Path(__file__).with_name("child.py"))

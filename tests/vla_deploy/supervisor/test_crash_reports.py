@@ -7,8 +7,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.processes.crash_reports import CrashReports, signal_name, traceback_of
 from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.runs.log_files import BoundedFolder
 from vla_deploy.supervisor.runs.options import RunOptions
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
 
 STARTED = {"planner": (42, 1 * NS_PER_S)}
 

@@ -14,11 +14,10 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.supervisor.errors import ProcessGivenUp
-from vla_deploy.supervisor.notify import NotifyTarget
-from vla_deploy.supervisor.processes.predicates import twin_only
 from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
-from vla_deploy.supervisor.table import GivingUp, Watched
+from vla_deploy.supervisor.systemd import NotifyTarget
+from vla_deploy.supervisor.table import GivingUp, Watched, twin_only
 
 pytestmark = pytest.mark.stack
 
@@ -133,20 +132,6 @@ def test_what_the_run_does_not_want_is_not_started_and_says_why(stage):
         row = rows(supervisor)["a"]
     assert (row["state"], row["reason"]) == ("off", "the run has no twin")
     assert "a started" not in stage.events()
-
-
-def test_what_the_budgets_suspend_stops_and_comes_back(stage, step_until):
-    when = lambda context: context.suspended.get("b", "")  # noqa: E731
-    with stage.supervisor(stage.row("a"), stage.row("b", when=when)) as supervisor:
-        supervisor.start()
-        cell = supervisor.space.cell_writer("resource_directives")
-        cell.put_document({"rate_ratio": {}, "model_tier": {}, "suspended": ["b"]})
-        assert step_until(supervisor, lambda: rows(supervisor)["b"]["state"] == "off")
-        assert stage.events()[-2:] == ["b asked to stop", "b stopped"]
-        assert rows(supervisor)["b"]["reason"] == "suspended by the budgets"
-        cell.put_document({"rate_ratio": {}, "model_tier": {}, "suspended": []})
-        assert step_until(supervisor, lambda: rows(supervisor)["b"]["state"] == "ready")
-        assert rows(supervisor)["b"]["restarts"] == 0
 
 
 def test_what_a_killed_process_has_moved_out_of_its_group_ends_with_it(stage, step_until):

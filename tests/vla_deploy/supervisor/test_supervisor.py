@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from platforms import ProfileError
+from platforms import ProfileError, load_profile
 from vla_deploy.supervisor.errors import AlreadyRunning, DeviceAbsent, StartCrashed, StartFailed
 from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -171,6 +171,22 @@ def test_what_a_process_started_itself_in_its_group_ends_with_it(stage, tmp_path
         supervisor.start()
         pid = int(told.read_text())
     assert eventually(lambda: not is_running(pid))
+
+
+def test_a_child_has_its_nice_and_its_threads_from_its_start(stage):
+    # It sets nothing itself: a large program that is loading must not delay the others.
+    with stage.supervisor(stage.row("dashboard"), stage.row("a")) as supervisor:
+        supervisor.start()
+        (nice,) = stage.pids("dashboard")
+        (usual,) = stage.pids("a")
+        wanted = load_profile("desktop").processes["dashboard"]
+        own_nice = os.getpriority(os.PRIO_PROCESS, 0)
+        assert wanted.nice > 0
+        assert os.getpriority(os.PRIO_PROCESS, nice) == max(wanted.nice, own_nice)
+        assert psutil.Process(nice).environ()["OMP_NUM_THREADS"] == str(wanted.threads)
+        assert os.getpriority(os.PRIO_PROCESS, usual) == own_nice
+        own = os.environ.get("OMP_NUM_THREADS")
+        assert psutil.Process(usual).environ().get("OMP_NUM_THREADS") == own
 
 
 def test_a_second_supervisor_is_refused_with_who_and_what_to_do(stage):

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from platforms import LadderAction, LadderStep, LadderTiming
-from vla_deploy.supervisor.budgets.judge import BudgetFinding, lasts
-from vla_deploy.supervisor.budgets.lines import TOTAL
+from vla_deploy.supervisor.budgets.judge import TOTAL, BudgetFinding, lasts
 
 # A step that is needed again soon after it was undone stays twice as long, up to 2^5 times.
 _MOST_RELAPSES = 5

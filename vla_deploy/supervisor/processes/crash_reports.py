@@ -12,9 +12,8 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import TOPICS, SharedSpace, TopicKind
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.supervisor.processes.lifecycle import RUNNING, ProcessRecord, ProcessState
-from vla_deploy.supervisor.runs.log_files import as_line, last_output, read_log
+from vla_deploy.supervisor.runs.log_files import BoundedFolder, as_line, last_output, read_log
 from vla_deploy.supervisor.runs.options import RunOptions
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
 
 KEEP = 50
 LAST_LINES = 40

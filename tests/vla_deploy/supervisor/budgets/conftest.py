@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming, Profile, load_profile
 from platforms.probes import Reading
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, UsageSnapshot
+from vla_deploy.supervisor.budgets import BudgetKeeper, UsageSnapshot
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
@@ -76,16 +76,14 @@ class World:
             ClaimBook(self.space, self.clock),
         )
 
-    def go(self, seconds: float, *, measured: bool = True) -> Orders:
-        orders = Orders()
+    def go(self, seconds: float, *, measured: bool = True) -> None:
         for _ in range(round(2 * seconds)):
             self.clock.ns += NS_PER_S // 2
             if measured:
                 self.measure()
-            orders = self.keeper.step(self.running)
-            self.running = {k: v for k, v in self.pids.items() if k not in orders.suspended}
-            self.restarted += orders.restart
-        return orders
+            self.restarted += self.keeper.step(self.running)
+            suspended = self.keeper.suspended
+            self.running = {k: v for k, v in self.pids.items() if k not in suspended}
 
     def measure(self) -> None:
         self.feed.snapshots.append(self._snapshot())
