@@ -155,12 +155,6 @@ class Notifier:
         """Send that the run is coming to its end."""
         self._socket.send(STOPPING="1")
 
-    def reloading(self) -> None:
-        """Send that a profile is being taken over; READY follows with the next step."""
-        usec = self._clock.now_ns() // NS_PER_US
-        self._socket.send(RELOADING="1", MONOTONIC_USEC=str(usec))
-        self._ready = False
-
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
