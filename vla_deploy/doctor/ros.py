@@ -29,15 +29,15 @@ for name in sys.argv[1:]:
         importlib.import_module(name)
     except Exception as error:
         absent[name] = f"{type(error).__name__}: {error}"
-told = {"python": platform.python_version(), "absent": absent, "rclpy": "", "rmw": ""}
+report = {"python": platform.python_version(), "absent": absent, "rclpy": "", "rmw": ""}
 if "rclpy" not in absent:
     import rclpy
-    told["rclpy"] = importlib.metadata.version("rclpy")
+    report["rclpy"] = importlib.metadata.version("rclpy")
     try:
-        told["rmw"] = rclpy.get_rmw_implementation_identifier()
+        report["rmw"] = rclpy.get_rmw_implementation_identifier()
     except Exception as error:
-        told["rmw_fault"] = str(error)
-print(json.dumps(told))
+        report["rmw_fault"] = str(error)
+print(json.dumps(report))
 """
 
 
@@ -53,15 +53,15 @@ def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
         return
     variables = [f"{name}={value}" for name, value in found.variables.items()]
     try:
-        told = json.loads(
+        report = json.loads(
             context.ask(["env", *variables, str(found.python), "-c", _PROBE, *IMPORTS])
         )
     except (ValueMissing, ValueError) as error:
         yield fail("interpreter", f"{found.python} cannot be used: {error}", f"{found.python} -VV")
         return
-    yield ok("interpreter", f"Python {told['python']}, {found.origin}")
-    yield from _imported(told)
-    yield from _middleware(told)
+    yield ok("interpreter", f"Python {report['python']}, {found.origin}")
+    yield from _imported(report)
+    yield from _middleware(report)
 
 
 def usage(context: DoctorContext) -> Iterator[DoctorFinding]:
@@ -109,10 +109,10 @@ def _asked(context: DoctorContext) -> RosSettings | None:
     return settings if settings.enabled or by_profile else None
 
 
-def _imported(told: dict[str, Any]) -> Iterator[DoctorFinding]:
-    absent: dict[str, str] = told["absent"]
+def _imported(report: dict[str, Any]) -> Iterator[DoctorFinding]:
+    absent: dict[str, str] = report["absent"]
     if "rclpy" not in absent:
-        yield ok("rclpy", told["rclpy"])
+        yield ok("rclpy", report["rclpy"])
     for module, why in absent.items():
         yield fail(module, f"cannot be imported: {why}", remedy(module))
     messages = [name for name, one in IMPORTS.items() if one.is_message_package]
@@ -120,16 +120,16 @@ def _imported(told: dict[str, Any]) -> Iterator[DoctorFinding]:
         yield ok("ROS messages", f"all {len(messages)} packages")
 
 
-def _middleware(told: dict[str, Any]) -> Iterator[DoctorFinding]:
+def _middleware(report: dict[str, Any]) -> Iterator[DoctorFinding]:
     choose = f"export RMW_IMPLEMENTATION={TESTED_RMW}"
-    if told["rmw"] == TESTED_RMW:
+    if report["rmw"] == TESTED_RMW:
         yield ok("RMW", TESTED_RMW)
-    elif told["rmw"]:
-        yield warn("RMW", f"{told['rmw']}: the gateway was tested with {TESTED_RMW} only", choose)
-    elif "rclpy" in told["absent"]:
+    elif report["rmw"]:
+        yield warn("RMW", f"{report['rmw']}: the gateway was tested with {TESTED_RMW} only", choose)
+    elif "rclpy" in report["absent"]:
         yield missing("RMW", "unknown without rclpy")
     else:
-        yield fail("RMW", f"cannot be loaded: {told.get('rmw_fault', '')}", choose)
+        yield fail("RMW", f"cannot be loaded: {report.get('rmw_fault', '')}", choose)
 
 
 def _domain(settings: RosSettings) -> DoctorFinding:

@@ -49,17 +49,17 @@ OnDisk = Mapping[Path, str | None]
 
 
 def digest(text: str) -> str:
-    """Return what tells one content from another."""
+    """Return the digest of a content."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def paths_of(wanted: Iterable[InstalledFile], known: Known) -> tuple[Path, ...]:
     """Return every path that a decision must know the content of."""
     paths = [file.path for file in wanted]
-    return tuple(dict.fromkeys([*paths, *(beside(path) for path in paths), *known]))
+    return tuple(dict.fromkeys([*paths, *(new_version_path(path) for path in paths), *known]))
 
 
-def beside(path: Path) -> Path:
+def new_version_path(path: Path) -> Path:
     """Return where the new version of an edited file goes."""
     return path.with_name(path.name + NEW_SUFFIX)
 
@@ -78,7 +78,7 @@ def install_changes(
 
 
 def uninstall_changes(known: Known, on_disk: OnDisk) -> tuple[FileChange, ...]:
-    """Return what removes everything that we wrote and nobody has edited since."""
+    """Return what removes everything that we wrote and that is not edited since."""
     return tuple(
         FileChange(kind=_leaving(on_disk.get(path), digests), path=path, before=on_disk.get(path))
         for path, digests in known.items()
@@ -97,7 +97,7 @@ def _placed(file: InstalledFile, known: Known, on_disk: OnDisk) -> FileChange:
 
 
 def _beside(edited: FileChange, on_disk: OnDisk) -> FileChange:
-    path = beside(edited.path)
+    path = new_version_path(edited.path)
     kind = ChangeKind.SAME if on_disk.get(path) == edited.after else ChangeKind.BESIDE
     return replace(edited, kind=kind, path=path)
 

@@ -1,4 +1,4 @@
-"""Say what keeps the robot's service from being installed or updated.
+"""Define why the robot's service is not installed or updated.
 
 InstallError
 ├── TemplateBroken       a template has a placeholder without a value
@@ -24,7 +24,7 @@ class ArgumentRefused(InstallError):
 
 
 class NotPermitted(InstallError):
-    """Say who may, and how to look without it."""
+    """Name the user who may, and how to look without that right."""
 
 
 class ReleaseRefused(InstallError):

@@ -26,7 +26,7 @@ BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReleaseTrial:
-    """Say which release is on trial, which one it replaced, and who watches since which boot."""
+    """Hold the release on trial, the one it replaced, and its watcher's pid and boot."""
 
     to: str
     origin: str
@@ -87,7 +87,7 @@ class ReleaseStore:
             point(self.prefix / "previous", f"releases/{release_id}")
 
     def trial(self) -> ReleaseTrial | None:
-        """Return the trial that goes on or was cut off."""
+        """Return the trial that is under way or was interrupted."""
         file = self.prefix / "trial"
         if not file.is_file():
             return None
@@ -234,7 +234,7 @@ def version_of(wheel: Path) -> str:
 
 
 def add_release(store: ReleaseStore, release_id: str, source: ReleaseSource) -> Path:
-    """Build a release beside the others; it has its name only once it is complete.
+    """Build a release next to the others; it has its name only once it is complete.
 
     Raises:
         ReleaseRefused: the id is taken or no name.

@@ -1,4 +1,4 @@
-"""Publish what runs, for `status`, for control's watch on the supervisor, and for the demo."""
+"""Publish the process table: for `status`, for control, which watches it, and for the demo."""
 
 import os
 from collections.abc import Mapping

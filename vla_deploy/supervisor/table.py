@@ -152,7 +152,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         devices_command=_DEVICES,
         ready_topic="joint_state",
         ready_files=("ready/control",),
-        stop_timeout_s=12.0,  # it ramps down, and brings the arms down where power goes
+        stop_timeout_s=12.0,  # it ramps down, and lowers the arms where power is switched off
         watched=(
             Watched(topic="control_status", silence_limit_s=5.0),
             Watched(topic="joint_state", profile_rate="control_rate_hz"),
@@ -241,6 +241,6 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_timeout_s=60.0,
         watched=(Watched(topic="ros_status", silence_limit_s=10.0),),
         in_ros_environment=True,
-        giving_up=GivingUp.CARRY_ON,  # nobody beyond the robot moves it then
+        giving_up=GivingUp.CARRY_ON,  # it is then not moved over ROS
     ),
 )

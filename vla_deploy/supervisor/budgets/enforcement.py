@@ -40,7 +40,7 @@ _WHEN_OVER: Final[Mapping[str, str]] = {
 
 
 class Enforcer:
-    """Put every process into its control group; without one, hold back who is over its budget."""
+    """Put every process into its control group; without one, hold it back while it is over."""
 
     def __init__(self, cgroups: CgroupTree) -> None:
         self._cgroups = cgroups

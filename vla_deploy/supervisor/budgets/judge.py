@@ -130,7 +130,7 @@ def judge(
 
 
 def _as_before(line: Line, before: BudgetFinding | None, now_ns: int) -> BudgetFinding:
-    """Return the last finding of the line; a changed limit starts anew."""
+    """Return the last finding of the line, a fresh one for a changed limit."""
     if before is None or before.line != line:
         return BudgetFinding(line=line, since_ns=now_ns)
     return before

@@ -175,7 +175,7 @@ def _permits_next(spec: ProcessSpec, record: ProcessRecord) -> bool:
 def _run_step(
     spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, *, may_go: bool, now_ns: int
 ) -> Step:
-    if record.state is ProcessState.STOPPING:  # wanted again: it ends, then starts anew
+    if record.state is ProcessState.STOPPING:  # wanted again: it ends, then starts
         return _stop_step(spec, record, seen, may_go=True, now_ns=now_ns)
     if record.state in RUNNING:
         return _watch(spec, record, seen, now_ns)

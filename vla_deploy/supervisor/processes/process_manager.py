@@ -201,4 +201,4 @@ def _bound(path: Path) -> None:
         if path.stat().st_size > _MOST_OUTPUT_BYTES:
             os.truncate(path, 0)
     except FileNotFoundError:
-        return  # removed by somebody: without a name it cannot be shortened
+        return  # removed from outside: without a name it cannot be shortened

@@ -18,7 +18,7 @@ _GONE = (FileNotFoundError, ProcessLookupError)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessStat:
-    """Describe a process; the start, in clock ticks since boot, tells it from a later one."""
+    """Describe a process; its start, in clock ticks since boot, tells pids used again apart."""
 
     pid: int
     parent: int
@@ -29,7 +29,7 @@ class ProcessStat:
 
 
 def read_stat(pid: int) -> ProcessStat | None:
-    """Return what a process is and takes, or None when there is none.
+    """Return the state and the use of a process, or None when there is none.
 
     Raises:
         PermissionError: it may not be known.
@@ -66,7 +66,7 @@ def _read_if_known(pid: int) -> ProcessStat | None:
 def read_pss_bytes(pid: int) -> int | None:
     """Return a process' memory with shared pages counted once, or None when there is none.
 
-    The kernel goes through all its pages for this: rarely, please.
+    The kernel walks all its pages for this: read it rarely.
 
     Raises:
         PermissionError: it may not be known.
@@ -100,9 +100,8 @@ class Usage:
 class UsageMeter:
     """Keep the CPU time of every process and the peak memory of all together.
 
-    What a process has started itself counts as its own; who that is, is looked up every 2 s.
-    Memory is PSS, which counts shared pages once; RSS stands in where PSS cannot be read, and
-    `memory_kind` says so.
+    The descendants of a process count as its own; they are looked up every 2 s. Memory is PSS,
+    which counts shared pages once, or RSS where PSS cannot be read; `memory_kind` says which.
     """
 
     def __init__(self, start_ns: int) -> None:
@@ -146,9 +145,9 @@ class UsageMeter:
 
 
 class _Memory:
-    """Know the PSS of processes without asking for it often: it is dear, and RSS is cheap.
+    """Keep the PSS of processes, which is expensive to read, up to date by their RSS.
 
-    Who has grown or shrunk is measured anew at once, the others one at a time, in turn.
+    A process whose RSS has changed is measured at once, the others one at a time, in turn.
     """
 
     def __init__(self) -> None:
@@ -156,7 +155,7 @@ class _Memory:
         self._measured: dict[Instance, tuple[int, int]] = {}
 
     def refresh(self, stats: list[ProcessStat]) -> None:
-        """Measure who needs it, and forget who has ended."""
+        """Measure the processes that need it, and forget those that have ended."""
         present = {_instance(stat): stat for stat in stats}
         self._measured = {key: each for key, each in self._measured.items() if key in present}
         longest_ago = next(iter(self._measured), None)
@@ -166,7 +165,7 @@ class _Memory:
                 self._measured[key] = self._measure(stat), stat.rss_bytes
 
     def bytes_of(self, stat: ProcessStat) -> int:
-        """Return what was measured last, with what RSS has changed by since."""
+        """Return the last measurement plus the change of RSS since."""
         pss_bytes, rss_bytes = self._measured[_instance(stat)]
         return max(pss_bytes + stat.rss_bytes - rss_bytes, 0)
 
@@ -190,7 +189,7 @@ def _instance(stat: ProcessStat) -> Instance:
 
 
 def _running(family: list[Instance]) -> list[ProcessStat]:
-    """Return those that still are; the CPU time of one that ended meanwhile stays counted."""
+    """Return those that still run; the CPU time of one that has ended stays counted."""
     stats = (read_stat(pid) for pid, _ in family)
     return [
         stat for stat in stats if stat is not None and not stat.ended and _instance(stat) in family
@@ -198,7 +197,7 @@ def _running(family: list[Instance]) -> list[ProcessStat]:
 
 
 def _families(pids: Mapping[str, int]) -> dict[str, list[Instance]]:
-    """Group the named processes with their descendants, by one look at the process list."""
+    """Group the named processes with their descendants, by one read of the process list."""
     names = {pid: name for name, pid in pids.items()}
     known = read_all_stats()
     families: dict[str, list[Instance]] = {

@@ -30,9 +30,8 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """Identify the supervisor of a run; the start time tells it from a later process of its pid.
-
-    That is counted since the computer's start: no jump of the wall clock makes it another.
+    """Identify the supervisor of a run; the start time distinguishes it from a later
+    process of its pid, and is counted since boot: no jump of the wall clock changes it.
     """
 
     pid: int
@@ -41,13 +40,13 @@ class Owner:
     run_dir: str
 
     def is_alive(self) -> bool:
-        """Return whether that very process still runs; one that nobody has reaped does not."""
+        """Return whether that very process still runs; a zombie does not."""
         found = read_stat(self.pid)
         return found is not None and not found.ended and found.start_ticks == self.start_ticks
 
 
 def default_base() -> Path:
-    """Return where runs live unless told otherwise."""
+    """Return the default runtime directory."""
     if os.getuid() == 0:
         return Path("/run/vla-deploy")
     return user_base()
@@ -64,7 +63,7 @@ def running(base: Path) -> Owner | None:
 
 
 def free_base(base: Path) -> None:
-    """Make the runtime directory where it is missing, for what a run is derived from.
+    """Make the runtime directory if it is missing, for files that a run is derived from.
 
     Raises:
         AlreadyRunning: a supervisor holds it.
@@ -107,7 +106,7 @@ class Runtime:
         _point_to(base / "current", self.run_id)
 
     def close(self) -> None:
-        """Keep the logs, remove everything else of this run and let the next supervisor in."""
+        """Keep the logs, remove everything else of this run and release the lock."""
         _keep_logs(self.run_dir, self._old_logs)
         (self._base / "current").unlink(missing_ok=True)
         shutil.rmtree(self.ipc_dir, ignore_errors=True)
@@ -124,7 +123,7 @@ class Runtime:
         unfinished = directory.with_name(f".{directory.name}")
         unfinished.mkdir(mode=0o700)
         _write_owner(unfinished / _OWNER_FILE, self._owner)
-        unfinished.rename(directory)  # a sweeper never sees it without its owner
+        unfinished.rename(directory)  # a sweep never sees it without its owner
         link.symlink_to(directory)
         return directory
 
@@ -211,7 +210,7 @@ def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
 
 
 def _is_run(path: Path) -> bool:
-    """Return whether a folder is a run's, and not of somebody who chose the wrong directory."""
+    """Return whether a folder is a run's, not another one in a directory chosen by mistake."""
     is_named_so = _RUN_ID.fullmatch(path.name) is not None
     return is_named_so and path.is_dir() and not path.is_symlink()
 
