@@ -5,6 +5,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.processes.liveness import WINDOW_S, Liveness, Readiness
 from vla_deploy.supervisor.table import TABLE, ProcessSpec, Watched
@@ -14,22 +15,14 @@ PROFILE = load_profile("desktop")
 DEADLINE_S = 0.1  # what topics.py declares for base_state
 
 
-class StepClock:
-    time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
+class StepClock(ManualClock):
     def pass_s(self, seconds: float) -> None:
-        self.time_ns += round(seconds * NS_PER_S)
+        self.ns += round(seconds * NS_PER_S)
 
 
 @pytest.fixture
 def clock() -> StepClock:
-    return StepClock()
+    return StepClock(NS_PER_S)
 
 
 @pytest.fixture
@@ -45,9 +38,9 @@ def test_a_topic_counts_while_it_is_young(tmp_path, space, clock):
     readiness = judge(tmp_path, space, clock, ready_topic="base_state")
     assert not readiness.is_ready(os.getpid())
     space.cell_writer("base_state").commit()
-    clock.time_ns += round(DEADLINE_S * NS_PER_S)
+    clock.ns += round(DEADLINE_S * NS_PER_S)
     assert readiness.is_ready(os.getpid())
-    clock.time_ns += 1
+    clock.ns += 1
     assert not readiness.is_ready(os.getpid())
 
 

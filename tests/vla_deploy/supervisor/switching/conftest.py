@@ -10,6 +10,7 @@ import pytest
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.harness.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
@@ -21,17 +22,6 @@ from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.supervisor.profiles.profile_change import Member
 from vla_deploy.supervisor.profiles.profile_choice import ProfileChoice
 from vla_deploy.supervisor.profiles.profile_switch import ProfileSwitch
-
-
-class StepClock:
-    def __init__(self) -> None:
-        self.ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 class Kernel:
@@ -155,7 +145,7 @@ class Bench:
     """Hold four nodes without devices and the switch; every node steps every 50 ms."""
 
     def __init__(self, folder: Path, profile: str) -> None:
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.ipc = folder / "ipc"
         self.space = SharedSpace(self.ipc, self.clock)
         self.control_status = self.space.cell_writer("control_status")
