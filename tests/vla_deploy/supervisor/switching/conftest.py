@@ -95,7 +95,7 @@ class Supervision:
         self.switch.close()
 
 
-class Desk:
+class ProfileClient:
     """Ask for profiles as the command line does, and read what comes of it."""
 
     def __init__(self, space: SharedSpace, run_until: Callable[[Callable[[], bool], float], bool]):
@@ -127,7 +127,7 @@ class Desk:
         return last
 
 
-def adapting(
+def reconfigurable(
     name: str,
     node: Node,
     profile: Profile,
@@ -151,7 +151,7 @@ class Bench:
         self.control_status = self.space.cell_writer("control_status")
         self.table = self.space.cell_writer("process_table")
         self.directives = self.space.cell_writer("resource_directives")
-        self.desk = Desk(self.space, self.run_until)
+        self.client = ProfileClient(self.space, self.run_until)
         self.choice = ProfileChoice(folder / "state" / "profile.json")
         self.root = folder / "root"
         self.late_ticks = 0
@@ -159,7 +159,7 @@ class Bench:
         self.dead: set[str] = set()
         self.workers = {name: Worker() for name in ("control", "perception", "planner", "executor")}
         self.kernels = {name: Kernel() for name in self.workers}
-        self.asides: dict[str, Executor] = {name: InlineExecutor() for name in self.workers}
+        self.executors: dict[str, Executor] = {name: InlineExecutor() for name in self.workers}
         self.nodes: dict[str, ReconfigurableNode] = {}
         for name in self.workers:
             self.start(name, profile)
@@ -170,14 +170,14 @@ class Bench:
 
     def start(self, name: str, profile: str) -> None:
         """Start a process, also anew."""
-        self.nodes[name] = adapting(
+        self.nodes[name] = reconfigurable(
             name,
             self.workers[name],
             load_profile(profile),
             self.ipc,
             self.clock,
             self.kernels[name],
-            self.asides[name],
+            self.executors[name],
         )
         self.nodes[name].start()
 
@@ -218,7 +218,7 @@ class Bench:
         return True
 
     def reach(self, phase: str) -> None:
-        assert self.run_until(lambda: self.desk.status.get("phase") == phase, 60.0)
+        assert self.run_until(lambda: self.client.status.get("phase") == phase, 60.0)
 
     def names(self) -> set[str]:
         """Return the profiles that the nodes run under."""
@@ -232,7 +232,7 @@ class TwinRig:
         self.lockstep = step = Lockstep(tmp_path=folder)
         ipc, declared = folder / "ipc", load_profile(profile)
         space = SharedSpace(ipc, step.clock)
-        self.desk = Desk(space, step.run_until)
+        self.client = ProfileClient(space, step.run_until)
         self.joints = space.cell_reader("joint_state")
         self._control_status = space.cell_reader("control_status")
         self._operator = space.ring_writer("operator")
@@ -244,7 +244,9 @@ class TwinRig:
             "executor": ExecutorNode(step.context, step.robot, declared.executor_rate_hz),
         }
         for name, node in nodes.items():
-            step.add(adapting(name, node, declared, ipc, step.clock, Kernel(), InlineExecutor()))
+            step.add(
+                reconfigurable(name, node, declared, ipc, step.clock, Kernel(), InlineExecutor())
+            )
         switch = ProfileSwitch(
             profile,
             declared,
