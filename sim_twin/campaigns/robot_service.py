@@ -16,7 +16,7 @@ from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import running
-from vla_deploy.supervisor.service_times import RESTART_S, watchdog_s
+from vla_deploy.supervisor.systemd import RESTART_S, watchdog_s
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
 _READY_S: Final = 120.0

@@ -7,7 +7,7 @@ from typing import Final
 import psutil
 
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
-from vla_deploy.supervisor.runs.orphans import PROCESS_VARIABLE
+from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE
 
 MARK: Final = "VLA_CAMPAIGN_ROBOT"
 """The variable that tells whose robot a process belongs to, whatever its command line says."""

@@ -21,7 +21,7 @@ from sim_twin.physics.truth import fastest_joint
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.supervisor.runs.orphans import end_leftovers, run_id_of
+from vla_deploy.supervisor.runs.runtime import end_leftovers, run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
 _POLL_NS: Final = NS_PER_S // 50

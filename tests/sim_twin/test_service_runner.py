@@ -24,7 +24,7 @@ if mode == "someone else":
     subprocess.run([sys.executable, "-c", say], check=True)
     time.sleep(60)
 from drivers.clock import MonotonicClock
-from vla_deploy.supervisor.notify import Notifier, own_target
+from vla_deploy.supervisor.systemd import Notifier, own_target
 clock, stop, troubles = MonotonicClock(), [], ()
 notifier = Notifier(own_target(), clock)
 signal.signal(signal.SIGTERM, lambda *_: stop.append(1))

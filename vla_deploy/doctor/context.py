@@ -1,4 +1,4 @@
-"""Give the checks what they look at: a root, this process' rights, commands to ask, the time."""
+"""Give the checks what they read: a root, this process' rights, commands to run, the time."""
 
 import os
 import resource
@@ -23,7 +23,7 @@ _CAP_IPC_LOCK: Final = 14
 _CAP_SYS_NICE: Final = 23
 
 Asker = Callable[[Sequence[str]], str]
-"""Run a command and return what it prints; raises Missing where it cannot be had."""
+"""Run a command and return what it prints; raise `ValueMissing` where it cannot be run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Rights:
 class DoctorContext:
     """Hold everything that the checks look at; `is_live` is False for a recorded tree.
 
-    `profile_fault` tells why the profile is not the chosen one.
+    `profile_fault` is why the profile is not the chosen one, empty where it is.
     """
 
     tree: Tree
@@ -63,7 +63,7 @@ def live_context(
     models: Path,
     profile_fault: str = "",
 ) -> DoctorContext:
-    """Return this very computer; `models` is where a person has added some, beside root's."""
+    """Return this very computer; `models` is the folder of models that the user added."""
     return DoctorContext(
         tree=Tree(),
         is_live=True,
@@ -81,7 +81,7 @@ def live_context(
 def recorded_context(
     root: Path, profile: Profile | None, robot: RobotDescription | None
 ) -> DoctorContext:
-    """Return a recorded tree; nothing is measured or asked, as that would be another computer."""
+    """Return a recorded tree; no command runs and nothing is measured: that is another computer."""
     return DoctorContext(
         tree=Tree(root),
         is_live=False,
@@ -113,7 +113,7 @@ def ask_command(command: Sequence[str]) -> str:
     """Return what a command prints.
 
     Raises:
-        Missing: it is not installed, fails, or does not end in time.
+        ValueMissing: it is not installed, fails, or does not end in time.
     """
     try:
         done = subprocess.run(
@@ -148,3 +148,13 @@ def _capabilities() -> int:
         return 0
     row = next((line for line in status.splitlines() if line.startswith("CapEff:")), "CapEff: 0")
     return int(row.split()[1], 16)
+
+
+_EXTLINUX: Final = "/boot/extlinux/extlinux.conf"
+
+
+def boot_option(tree: Tree, option: str) -> str:
+    """Return the command to type: Jetsons boot by extlinux, most others by GRUB."""
+    if tree.exists(_EXTLINUX):
+        return f"sudoedit {_EXTLINUX}   # add {option} to APPEND; reboot"
+    return f"sudoedit /etc/default/grub   # add {option}; sudo update-grub; reboot"

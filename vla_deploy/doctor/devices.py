@@ -1,4 +1,4 @@
-"""Check the robot's devices: are they there, may we use them, are they set up for 250 Hz."""
+"""Check the robot's devices: presence, rights, set-up for 250 Hz, calibration, the spoken stop."""
 
 import grp
 import json
@@ -8,10 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from platforms.tree import ValueMissing
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble, warn
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import CameraMounting, LensCalibration
+from vla_deploy.runtime.one_line import one_line
+from vla_deploy.runtime.state_dir import engines_dir_of
+from vla_deploy.speech.stop_words.listener import OFF
+from vla_deploy.speech.stop_words.spotter import open_spotter
+from vla_deploy.supervisor.runs.runtime import default_base
 
 LATENCY_MS: Final = 1
 _NAME_ONE: Final = "vla-deploy doctor --robot butler"
@@ -152,3 +162,59 @@ def sound(context: DoctorContext) -> Iterator[DoctorFinding]:
             yield ok(device.device, device.path)
         else:
             yield warn(device.device, f"no sound card is called {device.path!r}", "aplay -l")
+
+
+def camera_calibration(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Return whether lens and mounting of the robot's camera were calibrated, and how well."""
+    if context.robot is None:
+        return
+    name, camera = context.robot.name, context.robot.camera
+    yield _lens(camera.lens, name)
+    yield _mounting(camera.mounting, name)
+
+
+def _lens(lens: LensCalibration | None, name: str) -> DoctorFinding:
+    if lens is None:
+        remedy = f"vla-deploy camera calibrate --robot {name}"
+        return warn("camera lens", "as the camera itself tells it, never measured", remedy)
+    error_px = lens.reprojection_error_px
+    error = "error not told" if error_px is None else f"error {error_px:.2f} px"
+    made_at = lens.made_at or "at a time not told"
+    return ok("camera lens", f"calibrated {made_at}, f {lens.intrinsics.fx:.1f} px, {error}")
+
+
+def _mounting(mounting: CameraMounting | None, name: str) -> DoctorFinding:
+    if mounting is None:
+        remedy = f"vla-deploy camera hand-eye --robot {name}"
+        return warn("camera mounting", "as the MJCF draws it, never measured", remedy)
+    shift_mm = 1000.0 * float(np.linalg.norm(mounting.translation_m))
+    measured = f"calibrated {mounting.made_at}, {shift_mm:.1f} mm from where it is drawn"
+    return ok("camera mounting", measured)
+
+
+_SPOKEN_STOP: Final = "spoken stop"
+
+
+def spoken_stop(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Check that stop words are switched on and that their model runs."""
+    profile, robot = context.profile, context.robot
+    if profile is None:
+        yield missing(_SPOKEN_STOP, "no profile to look at", "vla-deploy doctor --profile desktop")
+    elif robot is not None and robot.microphone is None:
+        yield missing(_SPOKEN_STOP, f"{robot.name} has no microphone: nobody can stop it by voice")
+    elif profile.speech.stop_words == OFF:
+        remedy = 'set speech.stop_words = "normal" in the profile'
+        yield warn(_SPOKEN_STOP, "switched off: nobody can stop the robot by voice", remedy)
+    else:
+        engines = engines_dir_of(default_base())
+        shelf = ModelShelf(store=context.models, engines=engines, clock=context.clock)
+        try:
+            spotter = open_spotter(shelf, profile)
+        except InferenceError as error:
+            yield warn(_SPOKEN_STOP, one_line(error), "vla-deploy models list")
+            return
+        chosen = profile.speech.stop_words
+        words = ", ".join(spotter.words)
+        yield ok(
+            _SPOKEN_STOP, f"{words}; sensitivity {chosen}, from {spotter.thresholds[chosen]:g} on"
+        )

@@ -6,8 +6,7 @@ from typing import Final
 from platforms.probes import open_probes, read_power_modes
 from platforms.probes.thermal import ZONES
 from platforms.tree import Tree, ValueMissing, number_in
-from vla_deploy.doctor.boot import boot_option
-from vla_deploy.doctor.context import DoctorContext
+from vla_deploy.doctor.context import DoctorContext, boot_option
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 
 MARGIN_K: Final = 10.0

@@ -1,15 +1,18 @@
-"""Check what control needs of the kernel: real-time rights, locked memory, quick wake-ups."""
+"""Check what control needs of the kernel: real-time rights, locked memory, wake-ups, limits."""
 
 import gzip
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from platforms.probes import Cgroup, read_cgroup
+from platforms.probes.cgroup import MOUNT, UNIFIED
 from platforms.tree import ValueMissing
-from vla_deploy.doctor.context import UNLIMITED, DoctorContext
+from vla_deploy.doctor.context import UNLIMITED, DoctorContext, boot_option
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble, warn
 
 LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
@@ -18,7 +21,7 @@ WAKE_UP_TEST_S: Final = 1.0
 LATE_RATIO: Final = 0.2  # of the period: a tick this late counts as late
 FAIR_SERVER: Final = "/sys/kernel/debug/sched/fair_server"
 _QUANTILE: Final = 0.99
-_SWITCH: Final = "CONFIG_RT_GROUP_SCHED=y"
+_GROUP_OPTION: Final = "CONFIG_RT_GROUP_SCHED=y"
 _ANY_OPTION: Final = "CONFIG_"
 
 
@@ -60,7 +63,7 @@ def fifo(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def serial_data(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Check that the kernel's workers which carry serial data may go before ordinary processes."""
+    """Check that the kernel's workers for serial data may run before ordinary processes."""
     if not wanted_priority(context):
         yield ok("serial data", "as any ordinary process, as the profile has no real-time priority")
     elif context.rights.may_raise_others:
@@ -119,15 +122,15 @@ def group_scheduling(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def has_group_scheduling(context: DoctorContext) -> bool | None:
-    """Return whether the kernel has RT_GROUP_SCHED; None where it does not tell."""
+    """Return whether the kernel has RT_GROUP_SCHED; None where that is unknown."""
     if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
         return True
     options = _kernel_options(context)
-    return _SWITCH in options if _ANY_OPTION in options else None
+    return _GROUP_OPTION in options if _ANY_OPTION in options else None
 
 
 def _kernel_options(context: DoctorContext) -> str:
-    """Return how the kernel was configured: it may carry that itself, or /boot has it."""
+    """Return the kernel's configuration, from the kernel itself or from /boot."""
     try:
         packed = (context.tree.root / "proc/config.gz").read_bytes()
         return gzip.decompress(packed).decode(errors="replace")
@@ -201,3 +204,62 @@ def _scheduled(priority: int) -> Iterator[str]:
         yield f"with SCHED_FIFO {priority}"
     finally:
         os.sched_setscheduler(0, policy, parameters)
+
+
+@dataclass(frozen=True, slots=True)
+class SystemLimit:
+    """Name the file that sets a limit, what it limits, and what takes its place where it is not."""
+
+    file: str
+    what: str
+    instead: str
+
+
+CONTROLLERS: Mapping[str, SystemLimit] = {
+    "cpu": SystemLimit("cpu.max", "processor time", "nice and affinity"),
+    "memory": SystemLimit("memory.max", "memory", "rlimits and the ladder"),
+    "cpuset": SystemLimit("cpuset.cpus", "which processors", "affinity"),
+    "io": SystemLimit("io.max", "disk traffic", "nothing"),
+    "pids": SystemLimit("pids.max", "number of processes", "rlimits"),
+}
+_UNIFIED: Final = "systemd.unified_cgroup_hierarchy=1"
+_OPTIONS: Final = "zgrep CGROUP /proc/config.gz   # what this kernel was built with"
+
+
+def control_groups(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Return the version, and for each controller whether its limit is real."""
+    cgroup = read_cgroup(context.tree)
+    if cgroup.version != 2 or CONTROLLERS.keys().isdisjoint(cgroup.controllers):
+        had = f"version {cgroup.version}" if cgroup.version else "none"
+        because = f" ({cgroup.reason})" if cgroup.reason else ""
+        yield warn(
+            "control groups",
+            f"{had}{because}: no limit is real",
+            boot_option(context.tree, _UNIFIED),
+        )
+        return
+    yield ok("control groups", "version 2")
+    for name, limit in CONTROLLERS.items():
+        objection, remedy = _objection(context, cgroup, name, limit)
+        if objection:
+            measured = f"not real, {objection}: {limit.instead} instead"
+            yield warn(f"limit of {name}", measured, remedy)
+        else:
+            note = ", but not of CUDA memory" if name == "memory" and context.board.l4t else ""
+            yield ok(f"limit of {name}", f"real: {limit.what}{note}")
+
+
+def _objection(
+    context: DoctorContext, cgroup: Cgroup, name: str, limit: SystemLimit
+) -> tuple[str, str]:
+    """Return why a limit is not real and the remedy, or nothing twice."""
+    if name not in cgroup.controllers:
+        remedy = f"echo +{name} | sudo tee /sys/fs/cgroup/cgroup.subtree_control"
+        return "not enabled here", remedy
+    if cgroup.folder in (MOUNT, UNIFIED):
+        return "we are in the root group", "sudo vla-deploy install   # the service has its own"
+    if not context.tree.exists(f"{cgroup.folder}/{limit.file}"):
+        return f"the kernel has no {limit.file}", _OPTIONS
+    if name == "cpu" and wanted_priority(context) and has_group_scheduling(context):
+        return "RT_GROUP_SCHED would refuse SCHED_FIFO", _OPTIONS
+    return "", ""

@@ -1,4 +1,4 @@
-"""Check that the gateway to ROS 2 would run, and who could reach the robot through it."""
+"""Check that the gateway to ROS 2 can run, and who can reach the robot through it."""
 
 import json
 import os
@@ -29,20 +29,20 @@ for name in sys.argv[1:]:
         importlib.import_module(name)
     except Exception as error:
         absent[name] = f"{type(error).__name__}: {error}"
-told = {"python": platform.python_version(), "absent": absent, "rclpy": "", "rmw": ""}
+report = {"python": platform.python_version(), "absent": absent, "rclpy": "", "rmw": ""}
 if "rclpy" not in absent:
     import rclpy
-    told["rclpy"] = importlib.metadata.version("rclpy")
+    report["rclpy"] = importlib.metadata.version("rclpy")
     try:
-        told["rmw"] = rclpy.get_rmw_implementation_identifier()
+        report["rmw"] = rclpy.get_rmw_implementation_identifier()
     except Exception as error:
-        told["rmw_fault"] = str(error)
-print(json.dumps(told))
+        report["rmw_fault"] = str(error)
+print(json.dumps(report))
 """
 
 
 def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Start ROS's interpreter and let it import all that the gateway needs."""
+    """Start ROS's interpreter and import in it all that the gateway needs."""
     settings = _asked(context)
     if settings is None:
         return
@@ -53,15 +53,15 @@ def environment(context: DoctorContext) -> Iterator[DoctorFinding]:
         return
     variables = [f"{name}={value}" for name, value in found.variables.items()]
     try:
-        told = json.loads(
+        report = json.loads(
             context.ask(["env", *variables, str(found.python), "-c", _PROBE, *IMPORTS])
         )
     except (ValueMissing, ValueError) as error:
         yield fail("interpreter", f"{found.python} cannot be used: {error}", f"{found.python} -VV")
         return
-    yield ok("interpreter", f"Python {told['python']}, {found.origin}")
-    yield from _imported(told)
-    yield from _middleware(told)
+    yield ok("interpreter", f"Python {report['python']}, {found.origin}")
+    yield from _imported(report)
+    yield from _middleware(report)
 
 
 def usage(context: DoctorContext) -> Iterator[DoctorFinding]:
@@ -89,7 +89,7 @@ def leftovers(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def logs(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Measure the logs of ROS: it never removes one."""
+    """Measure the logs of ROS, which never removes any."""
     if _asked(context) is None:
         return
     home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
@@ -109,10 +109,10 @@ def _asked(context: DoctorContext) -> RosSettings | None:
     return settings if settings.enabled or by_profile else None
 
 
-def _imported(told: dict[str, Any]) -> Iterator[DoctorFinding]:
-    absent: dict[str, str] = told["absent"]
+def _imported(report: dict[str, Any]) -> Iterator[DoctorFinding]:
+    absent: dict[str, str] = report["absent"]
     if "rclpy" not in absent:
-        yield ok("rclpy", told["rclpy"])
+        yield ok("rclpy", report["rclpy"])
     for module, why in absent.items():
         yield fail(module, f"cannot be imported: {why}", remedy(module))
     messages = [name for name, one in IMPORTS.items() if one.is_message_package]
@@ -120,16 +120,16 @@ def _imported(told: dict[str, Any]) -> Iterator[DoctorFinding]:
         yield ok("ROS messages", f"all {len(messages)} packages")
 
 
-def _middleware(told: dict[str, Any]) -> Iterator[DoctorFinding]:
+def _middleware(report: dict[str, Any]) -> Iterator[DoctorFinding]:
     choose = f"export RMW_IMPLEMENTATION={TESTED_RMW}"
-    if told["rmw"] == TESTED_RMW:
+    if report["rmw"] == TESTED_RMW:
         yield ok("RMW", TESTED_RMW)
-    elif told["rmw"]:
-        yield warn("RMW", f"{told['rmw']}: the gateway was tested with {TESTED_RMW} only", choose)
-    elif "rclpy" in told["absent"]:
+    elif report["rmw"]:
+        yield warn("RMW", f"{report['rmw']}: the gateway was tested with {TESTED_RMW} only", choose)
+    elif "rclpy" in report["absent"]:
         yield missing("RMW", "unknown without rclpy")
     else:
-        yield fail("RMW", f"cannot be loaded: {told.get('rmw_fault', '')}", choose)
+        yield fail("RMW", f"cannot be loaded: {report.get('rmw_fault', '')}", choose)
 
 
 def _domain(settings: RosSettings) -> DoctorFinding:
@@ -144,7 +144,7 @@ def _domain(settings: RosSettings) -> DoctorFinding:
 
 
 def _reach(settings: RosSettings) -> DoctorFinding:
-    """Report who else can take part: DDS asks nobody for a password."""
+    """Report who else can take part: DDS has no password."""
     name, peers = "ROS discovery", os.environ.get("ROS_STATIC_PEERS", "")
     can = {
         Accepts.ALL: "see the robot, and command it",
@@ -153,8 +153,8 @@ def _reach(settings: RosSettings) -> DoctorFinding:
     }[settings.accept]
     keep_in = 'set discovery = "localhost" under [ros]; or encrypt: docs/ros.md'
     if settings.discovery not in ("localhost", "off"):
-        whoever = f"{settings.discovery}: every computer on this network can {can}"
-        return warn(name, whoever, keep_in)
+        reach = f"{settings.discovery}: every computer on this network can {can}"
+        return warn(name, reach, keep_in)
     if peers and settings.discovery != "off":
         return warn(name, f"{settings.discovery}, and {peers} can {can}", "unset ROS_STATIC_PEERS")
     return ok(name, f"{settings.discovery}: every user of this computer can {can}")

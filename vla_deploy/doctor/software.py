@@ -1,4 +1,4 @@
-"""Check what is installed: Python and packages, models, OpenGL, ROS, the systemd unit."""
+"""Check Python, packages, models, OpenGL, the systemd unit and the dashboard."""
 
 import importlib.metadata
 import importlib.util
@@ -14,6 +14,18 @@ from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError, ModelUnknown
 from vla_deploy.inference.file_check import check_parts, checked_file
 from vla_deploy.inference.store import ModelStore
+from vla_deploy.runtime.net import (
+    SETTINGS_FILE,
+    DashboardSettings,
+    DashboardSettingsInvalid,
+    PortTaken,
+    TlsUnusable,
+    open_port,
+    read_settings,
+    server_context,
+)
+from vla_deploy.runtime.state_dir import config_dir_of
+from vla_deploy.supervisor.runs.runtime import default_base, running
 
 PROJECT: Final = "vla-deploy"
 EGL_SCRIPT: Final = Path(__file__).with_name("egl.py")
@@ -89,7 +101,7 @@ def models(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 
 def _fault_of(store: ModelStore, name: str) -> str:
-    """Read a model whole; return what keeps it from being used."""
+    """Read a whole model; return what keeps it from being used."""
     try:
         model = store.load(name)
         for variant in model.manifest.files:
@@ -103,7 +115,7 @@ def _fault_of(store: ModelStore, name: str) -> str:
 
 
 def open_gl(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Open EGL in a process of its own, as a broken driver may take its caller along."""
+    """Open EGL in a process of its own: a broken driver may crash it."""
     try:
         yield ok("OpenGL (EGL)", context.ask((sys.executable, str(EGL_SCRIPT))).strip())
     except ValueMissing as missing_egl:
@@ -127,3 +139,49 @@ def service(context: DoctorContext) -> Iterator[DoctorFinding]:
         yield fail("service", measured, f"journalctl -u {UNIT} -n 50")
     else:
         yield warn("service", measured, f"sudo systemctl enable --now {UNIT}")
+
+
+_DASHBOARD: Final = "dashboard"
+_LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+def dashboard(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Check settings, ports and certificate of the user who runs the robot on this computer."""
+    base = default_base()
+    file = config_dir_of(base) / SETTINGS_FILE
+    try:
+        settings = read_settings(base)
+    except DashboardSettingsInvalid as error:
+        yield fail(_DASHBOARD, "; ".join(error.faults), f"sudoedit {file}")
+        return
+    yield from _ports(settings, is_running=running(base) is not None)
+    yield from _encryption(settings, file)
+
+
+def _ports(settings: DashboardSettings, *, is_running: bool) -> Iterator[DoctorFinding]:
+    for name, port in (("page", settings.port), ("stop door", settings.stop_port)):
+        label = f"{_DASHBOARD}, {name}"
+        if is_running:
+            yield ok(label, f"a robot runs; see: vla-deploy {_DASHBOARD}")
+            continue
+        try:
+            open_port(settings.host, port, search=False).close()
+        except PortTaken as error:
+            yield warn(label, str(error), f"sudo ss -ltnp 'sport = :{port}'")
+        else:
+            yield ok(label, f"{settings.host}:{port} is free")
+
+
+def _encryption(settings: DashboardSettings, file: Path) -> Iterator[DoctorFinding]:
+    """Check that passwords do not travel in the clear, and that the certificate can be read."""
+    if settings.scheme == "http":
+        if settings.host not in _LOOPBACK:
+            told = f"{settings.host} is reached from elsewhere without TLS: passwords can be read"
+            yield warn(f"{_DASHBOARD}, TLS", told, f"sudoedit {file}  # tls_certificate, tls_key")
+        return
+    try:
+        server_context(settings.tls_certificate, settings.tls_key)
+    except TlsUnusable as error:
+        yield fail(f"{_DASHBOARD}, TLS", str(error), f"sudoedit {file}")
+    else:
+        yield ok(f"{_DASHBOARD}, TLS", f"{settings.tls_certificate} can be used")

@@ -5,22 +5,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from platforms.tree import ValueMissing
-from vla_deploy.doctor import (
-    camera,
-    clocks,
-    computer,
-    dashboard,
-    devices,
-    limits,
-    power,
-    realtime,
-    ros,
-    software,
-    speech,
-    storage,
-)
+from vla_deploy.doctor import computer, devices, power, realtime, ros, software
 from vla_deploy.doctor.context import DoctorContext
-from vla_deploy.doctor.finding import DoctorFinding, missing, warn
+from vla_deploy.doctor.finding import DoctorFinding, Section, missing, warn
 
 _log = logging.getLogger(__name__)
 Examination = Callable[[DoctorContext], Iterator[DoctorFinding]]
@@ -42,11 +29,11 @@ CHECKS: tuple[Check, ...] = (
     Check("Computer", "memory", computer.memory),
     Check("Computer", "user", computer.user, live=True),
     Check("Devices", "device files", devices.device_files),
-    Check("Devices", "camera calibration", camera.camera_calibration),
+    Check("Devices", "camera calibration", devices.camera_calibration),
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),
     Check("Devices", "sound", devices.sound),
-    Check("Devices", "spoken stop", speech.spoken_stop, live=True),
+    Check("Devices", "spoken stop", devices.spoken_stop, live=True),
     Check("Real time", "kernel", realtime.preempt_rt),
     Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),
     Check("Real time", "serial data", realtime.serial_data, live=True),
@@ -55,37 +42,29 @@ CHECKS: tuple[Check, ...] = (
     Check("Real time", "RT_GROUP_SCHED", realtime.group_scheduling),
     Check("Real time", "memory lock", realtime.memory_lock, live=True),
     Check("Real time", "wake-up", realtime.wake_up, live=True),
-    Check("Limits", "control groups", limits.control_groups),
-    Check("Clocks", "clock source", clocks.clock_source),
-    Check("Clocks", "wall time", clocks.wall_time, live=True),
-    Check("Clocks", "jump since boot", clocks.jump_since_boot),
+    Check("Limits", "control groups", realtime.control_groups),
+    Check("Clocks", "clock source", computer.clock_source),
+    Check("Clocks", "wall time", computer.wall_time, live=True),
+    Check("Clocks", "jump since boot", computer.jump_since_boot),
     Check("Power", "temperature", power.heat),
     Check("Power", "throttling", power.throttling),
     Check("Power", "power mode", power.power_mode),
     Check("Power", "CPU governor", power.governor),
     Check("Power", "isolated CPUs", power.isolated_processors),
-    Check("Storage", "disk", storage.disks, live=True),
-    Check("Storage", "shared memory", storage.shared_memory, live=True),
-    Check("Storage", "swap", storage.swap),
+    Check("Storage", "disk", computer.disks, live=True),
+    Check("Storage", "shared memory", computer.shared_memory, live=True),
+    Check("Storage", "swap", computer.swap),
     Check("Software", "Python", software.python, live=True),
     Check("Software", "packages", software.packages, live=True),
     Check("Software", "models", software.models, live=True),
     Check("Software", "OpenGL (EGL)", software.open_gl, live=True),
     Check("Software", "service", software.service),
-    Check("Software", "dashboard", dashboard.dashboard, live=True),
+    Check("Software", "dashboard", software.dashboard, live=True),
     Check("ROS", "use", ros.usage),
     Check("ROS", "interpreter", ros.environment, live=True),
     Check("ROS", "DDS leftovers", ros.leftovers, live=True),
     Check("ROS", "ROS logs", ros.logs, live=True),
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """Hold the findings of one topic."""
-
-    topic: str
-    findings: tuple[DoctorFinding, ...]
 
 
 def examine(context: DoctorContext) -> tuple[Section, ...]:
@@ -104,7 +83,7 @@ def _findings(context: DoctorContext, check: Check) -> list[DoctorFinding]:
         findings.extend(check.run(context))
     except (ValueMissing, OSError) as error:
         findings.append(missing(check.name, str(error)))
-    except Exception as error:  # a check that breaks must not take the others with it
+    except Exception as error:  # a check that breaks must not end the others
         _log.exception("the check %r broke", check.name)
         measured = f"the check itself broke: {type(error).__name__}: {error}"
         findings.append(warn(check.name, measured, "vla-deploy doctor --json   # and report it"))

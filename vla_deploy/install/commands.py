@@ -1,11 +1,13 @@
-"""Name the programs of the system that make it take note of what was written, and run them."""
+"""Name the programs that apply what was written, check that they can run here, and run them."""
 
 import shlex
+import shutil
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
-from vla_deploy.install.errors import SystemCommandFailed
+from vla_deploy.install.errors import SystemCommandFailed, ToolMissing
 from vla_deploy.install.files import InstalledFile
 from vla_deploy.install.layout import RELEASE_FILES, SERVICE, STATE_FOLDERS, InstallLayout
 
@@ -37,9 +39,9 @@ def before_uninstall(paths: Iterable[Path]) -> tuple[Command, ...]:
 
 
 def after_uninstall(layout: InstallLayout, *, purge: bool) -> tuple[Command, ...]:
-    """Return what makes the system forget; with `purge` also state, releases and user.
+    """Return what makes the system forget the units; `purge` also removes state and releases.
 
-    Of the prefix only what is known to be ours goes: others may keep files there.
+    Only what is known to be ours leaves the prefix: others may keep files there.
     """
     if not purge:
         return _RELOAD
@@ -65,3 +67,42 @@ def run_command(command: Sequence[str]) -> str:
         words = (done.stderr or done.stdout).strip() or "nothing said"
         raise SystemCommandFailed(f"`{shlex.join(command)}` ended with {done.returncode}: {words}")
     return done.stdout
+
+
+# Who has to be running for a program to reach it; a container often has the program alone.
+_ANSWERS: Final[Mapping[str, Path]] = {
+    "systemctl": Path("/run/systemd/system"),
+    "udevadm": Path("/run/udev/control"),
+}
+
+
+def missing_tools(
+    commands: Iterable[Command], answers: Mapping[str, Path] = _ANSWERS
+) -> dict[str, str]:
+    """Return what keeps each program from working, by its name; nothing when all can."""
+    programs = dict.fromkeys(command[0] for command in commands)
+    faults = {program: _fault(program, answers) for program in programs}
+    return {program: fault for program, fault in faults.items() if fault}
+
+
+def require_tools(commands: Iterable[Command]) -> None:
+    """Refuse where a program cannot do its work.
+
+    Raises:
+        ToolMissing: one cannot; all of them are named.
+    """
+    faults = missing_tools(commands)
+    if faults:
+        raise ToolMissing(
+            f"this computer cannot run the service: {'; '.join(faults.values())}; nothing was "
+            "changed. Use a computer that systemd has booted, or make an image with --root DIR"
+        )
+
+
+def _fault(program: str, answers: Mapping[str, Path]) -> str:
+    if shutil.which(program) is None:
+        return f"{program} is not on the PATH"
+    answer = answers.get(program)
+    if answer is not None and not answer.exists():
+        return f"{program} reaches nobody, as there is no {answer}"
+    return ""

@@ -1,7 +1,7 @@
-"""Say what keeps the robot's service from being installed or updated.
+"""Define why the robot's service is not installed or updated.
 
 InstallError
-├── TemplateBroken       a template of ours names what nobody fills in
+├── TemplateBroken       a template has a placeholder without a value
 ├── ArgumentRefused      a name or path cannot stand in a unit
 ├── NotPermitted         writing there needs another user
 ├── ReleaseRefused       the release cannot be added, used or removed; nothing was changed
@@ -24,7 +24,7 @@ class ArgumentRefused(InstallError):
 
 
 class NotPermitted(InstallError):
-    """Say who may, and how to look without it."""
+    """Name the user who may, and how to look without that right."""
 
 
 class ReleaseRefused(InstallError):

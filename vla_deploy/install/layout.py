@@ -10,7 +10,7 @@ STATE_FOLDERS = (
     Path("/var/log/vla-deploy"),
     Path("/etc/vla-deploy"),
 )
-# What the releases leave in the prefix, beside the files that the manifest lists.
+# What the releases leave in the prefix, apart from the files that the manifest lists.
 RELEASE_FILES = ("releases", "current", "previous", "trial", "trial-started", "last-rollback")
 DEFAULT_PREFIX = Path("/opt/vla-deploy")
 

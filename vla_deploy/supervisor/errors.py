@@ -1,10 +1,10 @@
-"""Group what the supervisor refuses to do.
+"""Define why the supervisor does not start or go on.
 
 SupervisorError
 ├── AlreadyRunning      another supervisor holds the runtime directory: stop it or choose another
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
 ├── ProcessGivenUp      the robot cannot go on without that process: the run ends
-└── StartFailed         a process did not become ready: its last words are in the message
+└── StartFailed         a process did not become ready: its last log lines are in the message
     ├── StartCrashed    it crashed or hung on its way: another try may help
     └── DeviceAbsent    a device it needs is not there, or silent: plug it in, switch it on
 """
@@ -15,24 +15,24 @@ class SupervisorError(Exception):
 
 
 class AlreadyRunning(SupervisorError):
-    """Say who holds the runtime directory."""
+    """Name the supervisor that holds the runtime directory."""
 
 
 class RuntimeUnavailable(SupervisorError):
-    """Say why the runtime directory cannot be used."""
+    """Give the reason why the runtime directory cannot be used."""
 
 
 class StartFailed(SupervisorError):
-    """Say which process did not become ready, and why."""
+    """Name the process that did not become ready, and why."""
 
 
 class StartCrashed(StartFailed):
-    """Say which process crashed or hung before it was ready: no fault of file or wiring."""
+    """Name the process that crashed or hung before it was ready: no fault of file or wiring."""
 
 
 class DeviceAbsent(StartFailed):
-    """Say which process did not find its device in several tries, and which device that is."""
+    """Name the process that did not find its device in several tries, and the device."""
 
 
 class ProcessGivenUp(SupervisorError):
-    """Say which process the robot cannot do without was given up, and why."""
+    """Name the process that was given up and that the robot cannot do without, and why."""

@@ -3,28 +3,23 @@
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 
-WINDOW_NS = 2 * NS_PER_S
-_JUDGED_TICKS = 2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HealthLimits:
-    """Declare what in time means; the loop's limits are of the supervisor itself."""
-
-    status_age_s: float = 1.0
-    tick_rate_ratio: float = 0.5
-    late_ratio: float = 0.5
-    loop_age_s: float = 2.0
+WINDOW_NS: Final = 2 * NS_PER_S
+STATUS_AGE_S: Final = 1.0
+TICK_RATE_RATIO: Final = 0.5
+LATE_RATIO: Final = 0.5
+LOOP_AGE_S: Final = 2.0
+"""How long the supervisor's own loop may be held up."""
+JUDGED_TICKS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TickCount:
-    """Count control's ticks at a moment; control's pid tells its instances apart."""
+    """Hold control's tick counts at a moment; the pid distinguishes its instances."""
 
     now_ns: int
     pid: int
@@ -33,16 +28,11 @@ class TickCount:
 
 
 class Health:
-    """Watch what control tells of its ticks, its judgements and its buses."""
+    """Judge what control publishes of its ticks, its judgements and its buses."""
 
     def __init__(
-        self,
-        space: SharedSpace,
-        clock: Clock,
-        control_rate_hz: Callable[[], float],
-        limits: HealthLimits | None = None,
+        self, space: SharedSpace, clock: Clock, control_rate_hz: Callable[[], float]
     ) -> None:
-        self._limits = limits or HealthLimits()
         self._clock = clock
         self._rate_hz = control_rate_hz
         self._status = space.cell_reader("control_status")
@@ -54,16 +44,16 @@ class Health:
         now_ns = self._clock.now_ns()
         looked_ns, self._looked_ns = self._looked_ns, now_ns
         gap_s = 0.0 if looked_ns is None else (now_ns - looked_ns) / NS_PER_S
-        return (*loop_troubles(gap_s, self._limits), *self._control_troubles(now_ns))
+        return (*loop_troubles(gap_s), *self._control_troubles(now_ns))
 
     def _control_troubles(self, now_ns: int) -> tuple[str, ...]:
         sample = self._status.latest()
         if sample is None:
             return ("control: has not told its status yet",)
-        age_s, limit_s = sample.age_s(now_ns), self._limits.status_age_s
-        if age_s > limit_s:
+        age_s = sample.age_s(now_ns)
+        if age_s > STATUS_AGE_S:
             self._history.clear()
-            return (f"control: control_status: age {age_s:.2f} s, limit {limit_s:g} s",)
+            return (f"control: control_status: age {age_s:.2f} s, limit {STATUS_AGE_S:g} s",)
         status = sample.document()
         self._note(
             TickCount(
@@ -74,7 +64,7 @@ class Health:
             )
         )
         return (
-            *tick_troubles(self._history[0], self._history[-1], self._rate_hz(), self._limits),
+            *tick_troubles(self._history[0], self._history[-1], self._rate_hz()),
             *safety_troubles(status),
             *bus_troubles(status),
         )
@@ -87,39 +77,37 @@ class Health:
             self._history.popleft()
 
 
-def loop_troubles(gap_s: float, limits: HealthLimits) -> Iterator[str]:
-    """Return whether the supervisor's own loop was held up."""
-    if gap_s > limits.loop_age_s:
-        yield f"supervisor: held up for {gap_s:.1f} s, limit {limits.loop_age_s:g} s"
+def loop_troubles(gap_s: float) -> Iterator[str]:
+    """Yield a trouble where the supervisor's own loop was held up."""
+    if gap_s > LOOP_AGE_S:
+        yield f"supervisor: held up for {gap_s:.1f} s, limit {LOOP_AGE_S:g} s"
 
 
-def tick_troubles(
-    first: TickCount, last: TickCount, rate_hz: float, limits: HealthLimits
-) -> Iterator[str]:
-    """Return whether control ticks too seldom or too often late, once there is a whole window."""
+def tick_troubles(first: TickCount, last: TickCount, rate_hz: float) -> Iterator[str]:
+    """Yield a trouble where control ticks too seldom or too late, over a whole window."""
     if last.now_ns - first.now_ns < WINDOW_NS:
         return
     ticks = last.tick - first.tick
     measured_hz = ticks * NS_PER_S / (last.now_ns - first.now_ns)
-    least_hz = limits.tick_rate_ratio * rate_hz
+    least_hz = TICK_RATE_RATIO * rate_hz
     if measured_hz < least_hz:
         yield f"control: tick rate {measured_hz:.0f} Hz, limit {least_hz:.0f} Hz"
     late_ratio = (last.late_ticks - first.late_ticks) / max(ticks, 1)
-    if late_ratio > limits.late_ratio:
-        yield f"control: late ticks {late_ratio:.0%}, limit {limits.late_ratio:.0%}"
+    if late_ratio > LATE_RATIO:
+        yield f"control: late ticks {late_ratio:.0%}, limit {LATE_RATIO:.0%}"
 
 
 def safety_troubles(status: Mapping[str, Any]) -> Iterator[str]:
-    """Return whether ticks go by that safety has not judged."""
+    """Yield a trouble where safety has not judged the last ticks."""
     unjudged = int(status["tick"]) - int(status["judged_tick"])
-    if unjudged > _JUDGED_TICKS:
-        yield f"safety: the last {unjudged} ticks were not judged, limit {_JUDGED_TICKS}"
+    if unjudged > JUDGED_TICKS:
+        yield f"safety: the last {unjudged} ticks were not judged, limit {JUDGED_TICKS}"
 
 
 def bus_troubles(status: Mapping[str, Any]) -> Iterator[str]:
-    """Return which buses have lost devices.
+    """Yield a trouble for each bus that has lost devices.
 
-    With the emergency stop latched nothing is told: a button may cut the power of the devices.
+    None with the emergency stop latched: its button may cut the power of the devices.
     """
     if status["estop_latched"]:
         return

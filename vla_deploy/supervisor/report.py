@@ -1,4 +1,4 @@
-"""Publish what runs, for `status`, for control's watch on the supervisor, and for the demo."""
+"""Publish the process table: for `status`, for control, which watches it, and for the demo."""
 
 import os
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.budgets.sampler import UsageSnapshot
 from vla_deploy.supervisor.processes.lifecycle import ProcessRecord
 from vla_deploy.supervisor.processes.liveness import Vital
-from vla_deploy.supervisor.processes.process_manager import Crew
+from vla_deploy.supervisor.processes.process_manager import ProcessManager
 from vla_deploy.supervisor.runs.options import RunOptions
 
 _SUPERVISOR = "supervisor"
@@ -32,18 +32,18 @@ class ProcessTableWriter:
     def publish(
         self,
         records: Mapping[str, ProcessRecord],
-        crew: Crew,
+        processes: ProcessManager,
         vitals: Mapping[str, tuple[Vital, ...]],
         refusal: str,
         snapshot: UsageSnapshot | None,
     ) -> None:
         """Publish the table with what was measured; `refusal` is why no command is taken."""
-        self._head["profile"] = crew.profile
-        pids = crew.pids()
+        self._head["profile"] = processes.profile
+        pids = processes.pids()
         usages = {} if snapshot is None else _usages(snapshot)
         rows = [
             {
-                **_row(name, record, pids, crew, vitals.get(name, ())),
+                **_row(name, record, pids, processes, vitals.get(name, ())),
                 **usages.get(name, _UNKNOWN_USAGE),
             }
             for name, record in records.items()
@@ -76,14 +76,14 @@ def _row(
     name: str,
     record: ProcessRecord,
     pids: Mapping[str, int],
-    crew: Crew,
+    processes: ProcessManager,
     vitals: tuple[Vital, ...],
 ) -> dict[str, Any]:
     return {
         "name": name,
         "state": record.state.value,
         "pid": pids.get(name),
-        "fresh": name in pids and crew.is_fresh(name),
+        "fresh": name in pids and processes.is_fresh(name),
         "restarts": record.restarts,
         "exit_code": record.exit_code,
         "reason": record.reason,

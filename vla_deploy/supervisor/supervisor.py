@@ -20,10 +20,9 @@ from vla_deploy.supervisor.errors import (
     StartFailed,
     SupervisorError,
 )
-from vla_deploy.supervisor.notify import NotifyTarget, own_target
-from vla_deploy.supervisor.processes.failure_policy import Consequences
-from vla_deploy.supervisor.processes.last_words import complaint, last_words
 from vla_deploy.supervisor.processes.lifecycle import (
+    SETTLED,
+    TROUBLED,
     Action,
     ProcessRecord,
     ProcessState,
@@ -32,21 +31,20 @@ from vla_deploy.supervisor.processes.lifecycle import (
     wind_down,
 )
 from vla_deploy.supervisor.processes.liveness import Vital
-from vla_deploy.supervisor.processes.predicates import RunContext
 from vla_deploy.supervisor.profiles.profile_change import Member
+from vla_deploy.supervisor.runs.log_files import complaint, last_words
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.run import Run
-from vla_deploy.supervisor.status_line import status_line
-from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
+from vla_deploy.supervisor.systemd import NotifyTarget, own_target, status_line
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RunContext
 
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
 _HELD_UP_NS = 3 * NS_PER_S  # longer than any load explains, shorter than any silence allowed
-_TROUBLE = frozenset({ProcessState.BACKOFF, ProcessState.GIVEN_UP, ProcessState.ABORTING})
 _ON_THE_WAY = frozenset(
     {ProcessState.WAITING, ProcessState.STARTING, ProcessState.BACKOFF, ProcessState.ABORTING}
 )
-_MENDED_BY_A_PERSON: Mapping[int | None, type[StartFailed]] = {
+_REPAIRED_BY_A_PERSON: Mapping[int | None, type[StartFailed]] = {
     EXIT_CONFIGURATION: StartFailed,
     EXIT_DEVICE_ABSENT: DeviceAbsent,
 }
@@ -79,7 +77,7 @@ class Supervisor:
         self._records = {spec.name: ProcessRecord() for spec in table}
         self._vitals: dict[str, tuple[Vital, ...]] = {}
         self._alarms: frozenset[str] = frozenset()
-        self._consequences = Consequences(table)
+        self._given_up = FailurePolicy(table)
         self._report_due_ns = 0
         self._stepped_ns: int | None = None
         self._run: Run | None = None
@@ -92,29 +90,17 @@ class Supervisor:
 
     @property
     def run_dir(self) -> Path:
-        """Return the directory of the run.
-
-        Raises:
-            SupervisorError: the run is not started.
-        """
+        """Return the directory of the run, which must be started."""
         return self._started().runtime.run_dir
 
     @property
     def clock(self) -> Clock:
-        """Return the clock of the run.
-
-        Raises:
-            SupervisorError: the run is not started.
-        """
+        """Return the clock of the run, which must be started."""
         return self._started().clock
 
     @property
     def space(self) -> SharedSpace:
-        """Return the run's shared memory.
-
-        Raises:
-            SupervisorError: the run is not started.
-        """
+        """Return the run's shared memory, which must be started."""
         return self._started().space
 
     def start(self) -> None:
@@ -147,7 +133,7 @@ class Supervisor:
             _arm(self._run.space)
 
     def step(self) -> None:
-        """Look once, act once; where `run_until_stopped` does not run, call it every 50 ms."""
+        """Observe and act once; where `run_until_stopped` does not run, call it every 50 ms."""
         self._step(stopping=False)
 
     def run_until_stopped(self) -> None:
@@ -159,17 +145,17 @@ class Supervisor:
         while not self.stop_requested:
             self._pause()
             self.step()
-            if self._consequences.end:
-                raise ProcessGivenUp(self._consequences.end)
+            if self._given_up.end:
+                raise ProcessGivenUp(self._given_up.end)
 
     def request_stop(self) -> None:
-        """Let `start` and `run_until_stopped` return soon."""
+        """Make `start` and `run_until_stopped` return soon."""
         self.stop_requested = True
 
     def stop(self, *, power_off: bool = True) -> None:
         """Stop every process, the last started first, and remove the run; twice is allowed.
 
-        Without `power_off` control leaves arms as they hold: nobody has asked for letting them go.
+        Without `power_off` control keeps the arms powered: nobody asked to switch the robot off.
         """
         if self._run is None:
             return
@@ -201,14 +187,13 @@ class Supervisor:
             self._pause()
 
     def _is_ready(self) -> bool:
-        settled = (ProcessState.READY, ProcessState.OFF)
         return all(
-            self._records[spec.name].state in settled or spec.giving_up is GivingUp.CARRY_ON
+            self._records[spec.name].state in SETTLED or spec.giving_up is GivingUp.CARRY_ON
             for spec in self._table
         )
 
     def _failure(self, name: str, record: ProcessRecord) -> StartFailed:
-        kind = _MENDED_BY_A_PERSON.get(record.exit_code)
+        kind = _REPAIRED_BY_A_PERSON.get(record.exit_code)
         if kind is not None:
             why = complaint(self.run_dir, name) or record.reason
             return kind(f"{name} did not start: {why}")
@@ -220,11 +205,11 @@ class Supervisor:
         now_ns = run.clock.now_ns()
         self._forgive_when_held_up(now_ns)
         self._records, actions = self._decide(stopping=stopping, now_ns=now_ns)
-        run.crew.perform((*actions, *self._end_offenders(run, now_ns)))
-        run.crashes.note(before, self._records, run.crew.started)
+        run.processes.perform((*actions, *self._abort_over_budget(run, now_ns)))
+        run.crashes.note(before, self._records, run.processes.started)
         changed = _log_changes(before, self._records)
         if changed:
-            self._consequences.take(self._records, run.space)
+            self._given_up.take(self._records, run.space)
         if changed or now_ns >= self._report_due_ns:
             self._report(now_ns)
         run.serial_workers.step(wanted=self.profile.realtime_priority > 0)
@@ -239,29 +224,28 @@ class Supervisor:
         self, *, stopping: bool, now_ns: int
     ) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
         run = self._started()
-        seen = run.crew.observe()
+        seen = run.processes.observe()
         if stopping:
             return wind_down(self._table, self._records, seen, now_ns=now_ns)
         return reconcile(
             self._table, self._records, seen, unwanted=self._unwanted(run), now_ns=now_ns
         )
 
-    def _end_offenders(self, run: Run, now_ns: int) -> list[Action]:
-        """End those that the budgets want started anew."""
+    def _abort_over_budget(self, run: Run, now_ns: int) -> list[Action]:
+        """Abort the processes that the budgets want started again."""
         actions: list[Action] = []
-        for name, reason in run.budgets.step(run.crew.pids()).restart.items():
+        for name, reason in run.budgets.step(run.processes.pids()).items():
             if self._records[name].state in (ProcessState.STARTING, ProcessState.READY):
                 self._records[name], act = abort(self._records[name], reason, now_ns)
                 actions += [(act, name)] if act else []
         return actions
 
     def _unwanted(self, run: Run) -> dict[str, str]:
-        run.directives.refresh()
         context = RunContext(
             twin=self._options.twin,
             robot=self._robot,
             profile=self.profile,
-            suspended=run.directives.suspended,
+            suspended=dict.fromkeys(run.budgets.suspended, "suspended by the budgets"),
             ros=self._options.ros,
         )
         reasons = {spec.name: spec.when(context) for spec in self._table}
@@ -271,38 +255,38 @@ class Supervisor:
         }
 
     def _follow_profile(self, run: Run) -> tuple[str, ...]:
-        """Let a profile change go on, and return which processes are started again for it."""
+        """Go on with a profile change; return the processes that are started again for it."""
         states = {name: self._records[name].state for name in NODES if name in self._records}
-        pids = run.crew.pids()
+        pids = run.processes.pids()
         members = {
-            name: Member(pid=pids[name], started_under=run.crew.started_under[name])
+            name: Member(pid=pids[name], started_under=run.processes.started_under[name])
             for name, state in states.items()
             if state is ProcessState.READY and name in pids
         }
         absent = {name: state.value for name, state in states.items() if state in _ON_THE_WAY}
         restarts = run.switch.step(members, absent)
-        self.profile = run.crew.in_force = run.switch.in_force
-        run.crew.profile = run.switch.profile
+        self.profile = run.switch.in_force
+        run.processes.profile = run.switch.profile
         return restarts
 
     def _report(self, now_ns: int) -> None:
         run = self._started()
         if now_ns >= self._report_due_ns:
             self._report_due_ns = now_ns + _REPORT_NS
-            vitals = run.crew.examine(run.directives.rate_ratios)
-            # One that was told to end owes no more data.
+            vitals = run.processes.examine(run.budgets.rate_ratios)
+            # A process that is ending need not write any more.
             self._vitals = {
                 name: signs
                 for name, signs in vitals.items()
                 if self._records[name].state is ProcessState.READY
             }
-            run.crew.bound_output()
+            run.processes.bound_output()
             self._log_alarms()
         run.report.publish(
             self._records,
-            run.crew,
+            run.processes,
             self._vitals,
-            self._consequences.refusal,
+            self._given_up.refusal,
             run.budgets.snapshot,
         )
 
@@ -321,11 +305,11 @@ class Supervisor:
         self._alarms = frozenset(alarms)
 
     def _forgive_when_held_up(self, now_ns: int) -> None:
-        """Hold no silence against others that this process may have had in common with them."""
+        """Forgive silence after this process was held up: the others may have been, too."""
         stepped_ns, self._stepped_ns = self._stepped_ns, now_ns
         if stepped_ns is not None and now_ns - stepped_ns > _HELD_UP_NS:
             _log.warning("the supervisor was held up for %.1f s", (now_ns - stepped_ns) / NS_PER_S)
-            self._started().crew.forgive_silence()
+            self._started().processes.forgive_silence()
 
     def _pause(self) -> None:
         clock = self.clock
@@ -336,6 +320,36 @@ class Supervisor:
         if self._run is None:
             raise SupervisorError("the run is not started: call start() first")
         return self._run
+
+
+class FailurePolicy:
+    """Do what the table declares for processes that were given up.
+
+    `end` is why the run must end, `refusal` why no command is taken; "" where nothing is.
+    """
+
+    def __init__(self, table: tuple[ProcessSpec, ...]) -> None:
+        self.end = ""
+        self.refusal = ""
+        self._table = table
+        self._known: set[str] = set()
+
+    def take(self, records: Mapping[str, ProcessRecord], space: SharedSpace) -> None:
+        """Act on every process that is newly given up."""
+        for spec in self._table:
+            record = records[spec.name]
+            if record.state is ProcessState.GIVEN_UP and spec.name not in self._known:
+                self._known.add(spec.name)
+                self._take(spec, f"{spec.name} was given up: {record.reason}", space)
+
+    def _take(self, spec: ProcessSpec, why: str, space: SharedSpace) -> None:
+        _log.error("%s; %s", why, spec.giving_up.value)
+        if spec.giving_up is GivingUp.END_RUN:
+            self.end = f"{why}; see: vla-deploy crashes list"
+        elif spec.giving_up is GivingUp.NO_COMMANDS:
+            self.refusal = f"{why}; see: vla-deploy crashes list, then start the run anew"
+            # The planner may be the one that is gone: the executor gets the cancel directly.
+            space.ring_writer("plan").publish({"command_id": "supervisor", "cancel": True})
 
 
 def _arm(space: SharedSpace) -> None:
@@ -355,7 +369,7 @@ def _log_changes(before: Mapping[str, ProcessRecord], after: Mapping[str, Proces
     changed = [name for name, record in after.items() if record.state is not before[name].state]
     for name in changed:
         record = after[name]
-        level = logging.WARNING if record.state in _TROUBLE else logging.INFO
+        level = logging.WARNING if record.state in TROUBLED else logging.INFO
         _log.log(
             level, "%s: %s%s", name, record.state.value, record.reason and f" ({record.reason})"
         )

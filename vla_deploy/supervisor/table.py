@@ -1,31 +1,68 @@
 """Declare every process of the robot: the one process table, in start order.
 
-They stop in the reverse order. Whoever starts waits until all before it are ready; rows that go
-with the previous one start together, and stop together.
+They stop in the reverse order. A process starts when all before it are ready; rows that go with the
+previous one start together, and stop together.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
-from vla_deploy.supervisor.processes.predicates import (
-    Predicate,
-    all_of,
-    always,
-    budgeted,
-    not_suspended,
-    ros_asked,
-    twin_only,
-)
+from platforms import Profile
+from vla_deploy.robots import RobotDescription
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunContext:
+    """Hold all that decides which processes run; `suspended` maps a process to the reason."""
+
+    twin: bool
+    robot: RobotDescription
+    profile: Profile
+    suspended: Mapping[str, str] = field(default_factory=dict)
+    ros: bool = False
+
+
+Predicate = Callable[[RunContext], str]
+"""Return why the process does not run now, or "" when it does."""
+
+
+def always(_: RunContext) -> str:
+    """Run whatever the robot, the profile and the budgets say."""
+    return ""
+
+
+def twin_only(context: RunContext) -> str:
+    """Run only where the twin stands for the hardware."""
+    return "" if context.twin else "the run has no twin"
+
+
+def optional(process: str) -> Predicate:
+    """Return a predicate: run where the profile has a budget for it and it is not suspended."""
+
+    def judge(context: RunContext) -> str:
+        profile = context.profile
+        if process not in profile.budgets:
+            return f"profile {profile.name} has no budget for it"
+        return context.suspended.get(process, "")
+
+    return judge
+
+
+def ros_asked(context: RunContext) -> str:
+    """Run where the run, the robot file or the profile asks for ROS 2."""
+    if context.ros or context.robot.ros.enabled or context.profile.ros:
+        return optional("ros")(context)
+    return "nobody asks for ROS 2: run --ros, or [ros] of the robot file"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestartPolicy:
     """Declare when an ended process is started again, and when no more.
 
-    One that has been ready for `stable_s` starts with a clean sheet: its failures are forgotten.
-    Failures in a row are counted, not timed: one that hangs, or never gets ready, takes minutes to
-    fail. One that fails more than `most_in_window` times within `window_s` is given up as well,
-    however stably it ran in between.
+    Failures in a row are counted, not timed: a process that hangs, or never gets ready, takes
+    minutes to fail. They are forgotten once it has been ready for `stable_s`. One that fails more
+    than `most_in_window` times within `window_s` is given up even if it ran stably in between.
     """
 
     initial_s: float = 0.25
@@ -38,7 +75,7 @@ class RestartPolicy:
 
 
 class GivingUp(Enum):
-    """Say what becomes of the robot when a process is given up."""
+    """Declare what happens to the robot when a process is given up."""
 
     END_RUN = "the run ends with an error, for the service manager to start it anew"
     NO_COMMANDS = "the running command is cancelled, and commands are refused with the reason"
@@ -115,7 +152,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         devices_command=_DEVICES,
         ready_topic="joint_state",
         ready_files=("ready/control",),
-        stop_timeout_s=12.0,  # it ramps down, and brings the arms down where power goes
+        stop_timeout_s=12.0,  # it ramps down, and lowers the arms where power is switched off
         watched=(
             Watched(topic="control_status", silence_limit_s=5.0),
             Watched(topic="joint_state", profile_rate="control_rate_hz"),
@@ -136,7 +173,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="perception",
         command=("-m", "vla_deploy.perception", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(budgeted("perception"), not_suspended("perception")),
+        when=optional("perception"),
         ready_topic="scan",
         ready_files=("ready/perception",),
         watched=(Watched(topic="scene", silence_limit_s=10.0, profile_rate="perception_rate_hz"),),
@@ -145,7 +182,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="speech",
         command=("-m", "vla_deploy.speech", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(budgeted("speech"), not_suspended("speech")),
+        when=optional("speech"),
         with_previous=True,
         ready_topic="speech_status",
         ready_files=("ready/speech",),
@@ -156,7 +193,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="planner",
         command=("-m", "vla_deploy.planning", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(budgeted("planner"), not_suspended("planner")),
+        when=optional("planner"),
         with_previous=True,
         ready_files=("ready/planner",),
         watched=(Watched(topic="planner_status", silence_limit_s=5.0),),
@@ -165,7 +202,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="executor",
         command=("-m", "vla_deploy.skills", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(budgeted("executor"), not_suspended("executor")),
+        when=optional("executor"),
         with_previous=True,
         ready_topic="executor_status",
         ready_files=("ready/executor",),
@@ -185,7 +222,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="dashboard",
         command=("-m", "vla_deploy.dashboard", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(budgeted("dashboard"), not_suspended("dashboard")),
+        when=optional("dashboard"),
         with_previous=True,
         ready_topic="dashboard_status",
         ready_files=("ready/dashboard",),
@@ -197,13 +234,13 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="ros",
         command=("-m", "vla_deploy.gateways.ros", *_NODE),
         devices_command=_DEVICES,
-        when=all_of(ros_asked, budgeted("ros"), not_suspended("ros")),
+        when=ros_asked,
         with_previous=True,
         ready_topic="ros_status",
         ready_files=("ready/ros",),
         ready_timeout_s=60.0,
         watched=(Watched(topic="ros_status", silence_limit_s=10.0),),
         in_ros_environment=True,
-        giving_up=GivingUp.CARRY_ON,  # nobody beyond the robot moves it then
+        giving_up=GivingUp.CARRY_ON,  # it is then not moved over ROS
     ),
 )

@@ -11,7 +11,7 @@ import pytest
 
 from sim_twin.campaigns.strays import MARK, strays
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
-from vla_deploy.supervisor.runs.orphans import PROCESS_VARIABLE
+from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE
 
 pytestmark = pytest.mark.stack
 RUN = "20260101-120000-1"

@@ -1,13 +1,25 @@
 import grp
 import json
 import os
+import shutil
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from vla_deploy.doctor import FindingLevel
-from vla_deploy.doctor.devices import can_link, device_files, latency_timers, sound
+from platforms import load_profile
+from vla_deploy.doctor import DoctorContext, FindingLevel
+from vla_deploy.doctor.devices import (
+    camera_calibration,
+    can_link,
+    device_files,
+    latency_timers,
+    sound,
+    spoken_stop,
+)
+from vla_deploy.inference.store import EMBEDDED, ModelStore
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.description import CameraMounting, LensCalibration
 
 SERVOS = load_robot("butler").servo_bus.path
 TIMER = "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
@@ -125,3 +137,89 @@ def test_sound_cards_are_found_by_their_name(computer) -> None:
     computer.write("/proc/asound/cards", " 1 [Array]: USB-Audio - ReSpeaker 4 Mic Array\n")
     levels = {one.name: one.level for one in sound(computer.context(robot="butler"))}
     assert levels == {"microphone": FindingLevel.OK, "speaker": FindingLevel.WARN}
+
+
+def test_a_camera_that_was_never_measured_is_told_with_the_command(computer) -> None:
+    findings = list(camera_calibration(computer.context(robot="butler")))
+    assert [one.level for one in findings] == [FindingLevel.WARN, FindingLevel.WARN]
+    assert [one.remedy.split()[2] for one in findings] == ["calibrate", "hand-eye"]
+    assert list(camera_calibration(computer.context())) == []
+
+
+def test_a_measured_camera_is_told_with_date_and_error(computer) -> None:
+    robot = load_robot("butler")
+    lens = LensCalibration(
+        intrinsics=robot.camera.intrinsics,
+        distortion_model="plumb_bob",
+        reprojection_error_px=0.213,
+        views=12,
+        made_at="2026-11-22",
+        tool="",
+    )
+    mounting = CameraMounting(
+        site=robot.camera.site,
+        model=robot.camera.model,
+        focal_px=robot.camera.focal_px,
+        translation_m=(0.003, 0.0, 0.004),
+        quaternion_xyzw=(0.0, 0.0, 0.0, 1.0),
+        residual_m=0.001,
+        made_at="2026-11-22",
+    )
+    camera = replace(robot.camera, lens=lens, mounting=mounting)
+    context = replace(computer.context(), robot=replace(robot, camera=camera))
+    first, second = camera_calibration(context)
+    assert (first.level, second.level) == (FindingLevel.OK, FindingLevel.OK)
+    assert "2026-11-22" in first.measured
+    assert "0.21 px" in first.measured
+    assert "5.0 mm" in second.measured
+
+
+def with_stop_words(context: DoctorContext, sensitivity: str) -> DoctorContext:
+    profile = load_profile("desktop")
+    speech = replace(profile.speech, stop_words=sensitivity)
+    profile = replace(profile, speech=speech)
+    store = ModelStore(context.models.user, system=context.models.user.parent / "system")
+    return replace(context, profile=profile, models=store)
+
+
+def test_the_shipped_model_is_opened_and_its_words_are_told(computer) -> None:
+    (finding,) = spoken_stop(with_stop_words(computer.context(robot="butler"), "normal"))
+    assert finding.level is FindingLevel.OK
+    assert finding.measured.startswith("stop, halt, freeze; sensitivity normal, from 0.")
+
+
+def test_a_model_that_root_has_added_is_found(computer) -> None:
+    context = with_stop_words(computer.context(robot="butler"), "normal")
+    assert context.profile is not None
+    folder = computer.root / "system" / "louder"
+    shutil.copytree(EMBEDDED / "stop_words", folder)
+    manifest = folder / "model.toml"
+    manifest.write_text(manifest.read_text().replace("stop_words", "louder", 1))
+    choice = replace(context.profile.models["key_words"], tiers=("louder",))
+    profile = replace(context.profile, models={"key_words": choice})
+    (finding,) = spoken_stop(replace(context, profile=profile))
+    assert finding.level is FindingLevel.OK
+
+
+def test_switched_off_is_a_warning_that_says_how_to_switch_it_on(computer) -> None:
+    (finding,) = spoken_stop(with_stop_words(computer.context(robot="butler"), "off"))
+    assert finding.level is FindingLevel.WARN
+    assert "nobody can stop the robot by voice" in finding.measured
+    assert "speech.stop_words" in finding.remedy
+
+
+def test_without_a_model_it_is_a_warning(computer) -> None:
+    context = with_stop_words(computer.context(robot="butler"), "normal")
+    assert context.profile is not None
+    bare = replace(context, profile=replace(context.profile, models={}))
+    (finding,) = spoken_stop(bare)
+    assert finding.level is FindingLevel.WARN
+    assert "[models.key_words]" in finding.measured
+
+
+def test_a_robot_without_a_microphone_says_so(computer) -> None:
+    context = with_stop_words(computer.context(robot="butler"), "normal")
+    assert context.robot is not None
+    deaf = replace(context, robot=replace(context.robot, microphone=None))
+    (finding,) = spoken_stop(deaf)
+    assert (finding.level, finding.name) == (FindingLevel.MISSING, "spoken stop")

@@ -171,3 +171,72 @@ def test_the_measurement_leaves_the_scheduling_as_it_was(computer) -> None:
     before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
     list(checks.wake_up(computer.context("robot")))
     assert (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) == before
+
+
+CGROUP = "/sys/fs/cgroup/cgroup.controllers"
+
+
+@pytest.fixture
+def groups(computer):
+    """Put us into a group of our own that has two controllers."""
+    computer.write("/proc/self/cgroup", "0::/robot\n")
+    computer.write(CGROUP, "cpu memory pids\n")
+    folder = "/sys/fs/cgroup/robot"
+    computer.write(f"{folder}/cgroup.controllers", "cpu memory\n")
+    for name in ("cpu.max", "memory.max"):
+        computer.write(f"{folder}/{name}", "max\n")
+    return computer
+
+
+def limit_of(computer, name, profile="desktop"):
+    findings = checks.control_groups(computer.context(profile))
+    return next(one for one in findings if one.name == f"limit of {name}")
+
+
+def test_each_controller_is_told_real_or_not(groups) -> None:
+    assert limit_of(groups, "memory").level is FindingLevel.OK
+    assert limit_of(groups, "cpu").level is FindingLevel.OK
+    pids = limit_of(groups, "pids")
+    assert pids.level is FindingLevel.WARN
+    assert pids.measured == "not real, not enabled here: rlimits instead"
+    assert pids.remedy.startswith("echo +pids")
+
+
+def test_nothing_is_limited_in_the_root_group(groups) -> None:
+    groups.write("/proc/self/cgroup", "0::/\n")
+    memory = limit_of(groups, "memory")
+    assert memory.level is FindingLevel.WARN
+    assert "we are in the root group" in memory.measured
+    assert memory.remedy.startswith("sudo vla-deploy install")
+
+
+def test_a_controller_without_its_file_limits_nothing(groups) -> None:
+    (groups.root / "sys/fs/cgroup/robot/cpu.max").unlink()
+    cpu = limit_of(groups, "cpu")
+    assert (cpu.level, limit_of(groups, "memory").level) == (FindingLevel.WARN, FindingLevel.OK)
+    assert cpu.measured == "not real, the kernel has no cpu.max: nice and affinity instead"
+
+
+def test_processor_time_is_not_limited_where_that_would_cost_control_its_priority(groups) -> None:
+    options = gzip.compress(b"CONFIG_RT_GROUP_SCHED=y\n", mtime=0)
+    groups.write("/proc/config.gz").write_bytes(options)
+    cpu = limit_of(groups, "cpu", "robot")
+    assert cpu.level is FindingLevel.WARN
+    assert "RT_GROUP_SCHED would refuse SCHED_FIFO" in cpu.measured
+    assert limit_of(groups, "memory", "robot").level is FindingLevel.OK
+
+
+def test_a_jetson_is_told_that_cuda_memory_is_not_counted(board_tree, computer) -> None:
+    computer.root = board_tree("orin_nano_8gb_super")
+    assert limit_of(computer, "memory").measured == "real: memory, but not of CUDA memory"
+
+
+@pytest.mark.parametrize("boot", ["/boot/extlinux/extlinux.conf", "/etc/default/grub"])
+def test_old_control_groups_limit_nothing_and_the_remedy_fits_the_boot_loader(
+    computer, boot
+) -> None:
+    computer.write("/proc/self/cgroup", "3:memory:/\n")
+    computer.write(boot)
+    (finding,) = checks.control_groups(computer.context())
+    assert finding.level is FindingLevel.WARN
+    assert f"sudoedit {boot}" in finding.remedy

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.install.release_build import LAUNCHER
-from vla_deploy.install.release_store import ReleaseStore
+from vla_deploy.install.releases import LAUNCHER, ReleaseStore
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
 TRIAL = "/opt/vla-deploy/trial"
@@ -35,7 +34,7 @@ time.sleep(99)
 TINY = f"""
 import ctypes, signal, subprocess, sys
 from drivers.clock import MonotonicClock
-from vla_deploy.supervisor.notify import Notifier, own_target
+from vla_deploy.supervisor.systemd import Notifier, own_target
 def end_with_me():
     ctypes.CDLL(None).prctl(1, 15)
 clock, stop = MonotonicClock(), []

@@ -12,8 +12,7 @@ import pytest
 
 from vla_deploy.cli.main import main
 from vla_deploy.install.errors import InstallError, ReleaseRefused
-from vla_deploy.install.release_build import ReleaseSource, add_release, version_of
-from vla_deploy.install.release_store import ReleaseStore
+from vla_deploy.install.releases import ReleaseSource, ReleaseStore, add_release, version_of
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = next(path for path in sys.path if path.endswith("site-packages"))

@@ -8,9 +8,17 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.install.errors import ReleaseRefused, SystemCommandFailed
-from vla_deploy.install.release_store import ReleaseStore
-from vla_deploy.install.service_control import ServiceState, trouble_within
-from vla_deploy.install.switch import NEXT, End, Switch, SwitchPlan, SwitchStep, recover
+from vla_deploy.install.releases import ReleaseStore
+from vla_deploy.install.switch import (
+    NEXT,
+    End,
+    ServiceState,
+    Switch,
+    SwitchPlan,
+    SwitchStep,
+    recover,
+    trouble_within,
+)
 
 GUARD = Path(__file__).parents[3] / "systemd" / "release-guard"
 TROUBLES = (

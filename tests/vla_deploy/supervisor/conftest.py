@@ -7,9 +7,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from vla_deploy.supervisor.notify import NotifyTarget
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.systemd import NotifyTarget
 from vla_deploy.supervisor.table import ProcessSpec, RestartPolicy
 
 CHILD = str(Path(__file__).with_name("child.py"))
@@ -90,3 +90,35 @@ def eventually() -> Callable[[Callable[[], bool]], bool]:
 @pytest.fixture
 def python() -> str:
     return sys.executable
+
+
+@pytest.fixture
+def step_until(eventually) -> Callable[[Supervisor, Callable[[], bool]], bool]:
+    def wait(supervisor: Supervisor, condition: Callable[[], bool]) -> bool:
+        def look() -> bool:
+            supervisor.step()
+            return condition()
+
+        return eventually(look)
+
+    return wait
+
+
+@pytest.fixture
+def rows() -> Callable[[Supervisor], dict[str, dict]]:
+    def read(supervisor: Supervisor) -> dict[str, dict]:
+        document = supervisor.space.cell_reader("process_table").latest().document()
+        return {row["name"]: row for row in document["processes"]}
+
+    return read
+
+
+@pytest.fixture
+def is_running() -> Callable[[int], bool]:
+    def look(pid: int) -> bool:
+        try:
+            return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+        except psutil.NoSuchProcess:
+            return False
+
+    return look

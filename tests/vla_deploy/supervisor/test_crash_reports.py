@@ -4,23 +4,14 @@ import resource
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.processes.crash_reports import CrashReports, signal_name, traceback_of
 from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.runs.log_files import BoundedFolder
 from vla_deploy.supervisor.runs.options import RunOptions
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
 
 STARTED = {"planner": (42, 1 * NS_PER_S)}
-
-
-class StepClock:
-    time_ns = 3 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
 
 
 @pytest.fixture
@@ -32,10 +23,10 @@ def folder(tmp_path):
 def crashes(tmp_path, folder):
     run_dir = tmp_path / "run-1"
     (run_dir / "logs").mkdir(parents=True)
-    clock = StepClock()
+    clock = ManualClock(3 * NS_PER_S)
     space = SharedSpace(run_dir / "ipc", clock)
     space.cell_writer("base_state").commit()
-    clock.time_ns += NS_PER_S // 2
+    clock.ns += NS_PER_S // 2
     return CrashReports(folder, run_dir, RunOptions(), space, clock)
 
 

@@ -3,27 +3,18 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.health import Health
 
 RATE_HZ = 250.0
 
 
-class StepClock:
-    time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
 class Control:
     """Play a control that writes its status, and let time pass meanwhile."""
 
     def __init__(self, directory: Path) -> None:
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         space = SharedSpace(directory, self.clock)
         self.cell = space.cell_writer("control_status")
         self.health = Health(space, self.clock, lambda: RATE_HZ)
@@ -38,7 +29,7 @@ class Control:
     def work(self, seconds: float, rate_hz: float = RATE_HZ, late_ratio: float = 0.0):
         """Tick for a while, 20 looks a second, and return the last troubles."""
         for _ in range(round(seconds * 20)):
-            self.clock.time_ns += NS_PER_S // 20
+            self.clock.ns += NS_PER_S // 20
             self.status["tick"] += round(rate_hz / 20)
             self.status["judged_tick"] = self.status["tick"]
             self.status["late_ticks"] += round(late_ratio * rate_hz / 20)
@@ -67,10 +58,10 @@ def test_a_control_in_time_is_in_no_trouble(control):
 def test_a_silent_control_is_told_with_age_and_limit(control):
     control.work(3.0)
     for _ in range(20):
-        control.clock.time_ns += NS_PER_S // 20
+        control.clock.ns += NS_PER_S // 20
         troubles = control.health.troubles()
     assert not any("age" in trouble for trouble in troubles)
-    control.clock.time_ns += NS_PER_S // 20
+    control.clock.ns += NS_PER_S // 20
     assert control.health.troubles() == ("control: control_status: age 1.05 s, limit 1 s",)
 
 
@@ -120,7 +111,7 @@ def test_a_bus_that_the_emergency_stop_may_have_made_dark_is_no_trouble(control)
 
 def test_a_supervisor_that_was_held_up_tells_so_once(control):
     control.work(3.0)
-    control.clock.time_ns += 3 * NS_PER_S
+    control.clock.ns += 3 * NS_PER_S
     assert "supervisor: held up for 3.0 s, limit 2 s" in control.look()
     assert not any("held up" in trouble for trouble in control.look())
 

@@ -10,13 +10,12 @@ from vla_deploy.supervisor.processes.lifecycle import (
     ProcessRecord,
     ProcessSeen,
     ProcessState,
-    give_up_s,
     is_settled,
     reconcile,
     wind_down,
 )
-from vla_deploy.supervisor.processes.predicates import twin_only
-from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RestartPolicy
+from vla_deploy.supervisor.systemd import give_up_s
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RestartPolicy, twin_only
 
 S = 1_000_000_000
 POLICY = RestartPolicy(initial_s=1.0, factor=2.0, cap_s=5.0, max_restarts=4)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.supervisor.runs.serial_workers import PRIORITY, SerialWorkers
 
 needs_real_time = pytest.mark.skipif(
@@ -20,22 +21,12 @@ ORDINARY = (os.SCHED_OTHER, 0)
 RAISED = (os.SCHED_FIFO, PRIORITY)
 
 
-class StepClock:
-    time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
 class Computer:
     """Lay out a /proc of processes that sleep, under names of the kernel's."""
 
     def __init__(self, proc: Path) -> None:
         self.proc = proc
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.started: list[subprocess.Popen[bytes]] = []
         (proc / "loadavg").write_text("0.15 0.10 0.04 1/180 2\n")
         self.workers = SerialWorkers(self.clock, proc)
@@ -55,7 +46,7 @@ class Computer:
         (self.proc / "loadavg").write_text(f"0.15 0.10 0.04 1/180 {pid}\n")
 
     def look(self, *, wanted: bool = True, after_s: float = 1.0) -> None:
-        self.clock.time_ns += round(after_s * NS_PER_S)
+        self.clock.ns += round(after_s * NS_PER_S)
         self.workers.step(wanted=wanted)
 
     def close(self) -> None:

@@ -6,7 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -14,32 +14,14 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.supervisor.errors import ProcessGivenUp
-from vla_deploy.supervisor.notify import NotifyTarget
-from vla_deploy.supervisor.processes.predicates import twin_only
 from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
-from vla_deploy.supervisor.table import GivingUp, Watched
+from vla_deploy.supervisor.systemd import NotifyTarget
+from vla_deploy.supervisor.table import GivingUp, Watched, twin_only
 
 pytestmark = pytest.mark.stack
 
 BEATING = (Watched(topic="base_state", silence_limit_s=0.5),)
-
-
-def rows(supervisor: Supervisor) -> dict[str, dict]:
-    document = supervisor.space.cell_reader("process_table").latest().document()
-    return {row["name"]: row for row in document["processes"]}
-
-
-@pytest.fixture
-def step_until(eventually) -> Callable[[Supervisor, Callable[[], bool]], bool]:
-    def wait(supervisor: Supervisor, condition: Callable[[], bool]) -> bool:
-        def look() -> bool:
-            supervisor.step()
-            return condition()
-
-        return eventually(look)
-
-    return wait
 
 
 def reports(stage) -> list[dict]:
@@ -48,14 +30,9 @@ def reports(stage) -> list[dict]:
     ]
 
 
-def is_running(pid: int) -> bool:
-    try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
-
-
-def test_a_frozen_process_is_ended_by_its_data_and_started_again(stage, step_until):
+def test_a_frozen_process_is_ended_by_its_data_and_started_again(
+    stage, step_until, rows, is_running
+):
     with stage.supervisor(stage.row("a", "base", watched=BEATING)) as supervisor:
         supervisor.start()
         first = stage.pids("a")[0]
@@ -104,7 +81,7 @@ def test_the_row_says_what_giving_up_means_the_run_ends(stage):
     assert [report["given_up"] for report in reports(stage)] == [False, False, False, True]
 
 
-def test_the_row_says_what_giving_up_means_commands_are_refused(stage, step_until):
+def test_the_row_says_what_giving_up_means_commands_are_refused(stage, step_until, rows):
     row = stage.row("a", "crash-later", giving_up=GivingUp.NO_COMMANDS)
     with stage.supervisor(row, stage.row("b")) as supervisor:
         supervisor.start()
@@ -116,7 +93,7 @@ def test_the_row_says_what_giving_up_means_commands_are_refused(stage, step_unti
         assert rows(supervisor)["b"]["state"] == "ready"
 
 
-def test_the_row_says_what_giving_up_means_the_others_carry_on(stage, step_until):
+def test_the_row_says_what_giving_up_means_the_others_carry_on(stage, step_until, rows):
     row = stage.row("a", "crash", giving_up=GivingUp.CARRY_ON)
     with stage.supervisor(stage.row("b"), row) as supervisor:
         supervisor.start()
@@ -126,7 +103,7 @@ def test_the_row_says_what_giving_up_means_the_others_carry_on(stage, step_until
         assert rows(supervisor)["b"]["state"] == "ready"
 
 
-def test_what_the_run_does_not_want_is_not_started_and_says_why(stage):
+def test_what_the_run_does_not_want_is_not_started_and_says_why(stage, rows):
     with stage.supervisor(stage.row("a", when=twin_only), stage.row("b")) as supervisor:
         supervisor.start()
         supervisor.step()
@@ -135,21 +112,9 @@ def test_what_the_run_does_not_want_is_not_started_and_says_why(stage):
     assert "a started" not in stage.events()
 
 
-def test_what_the_budgets_suspend_stops_and_comes_back(stage, step_until):
-    when = lambda context: context.suspended.get("b", "")  # noqa: E731
-    with stage.supervisor(stage.row("a"), stage.row("b", when=when)) as supervisor:
-        supervisor.start()
-        cell = supervisor.space.cell_writer("resource_directives")
-        cell.put_document({"rate_ratio": {}, "model_tier": {}, "suspended": ["b"]})
-        assert step_until(supervisor, lambda: rows(supervisor)["b"]["state"] == "off")
-        assert stage.events()[-2:] == ["b asked to stop", "b stopped"]
-        assert rows(supervisor)["b"]["reason"] == "suspended by the budgets"
-        cell.put_document({"rate_ratio": {}, "model_tier": {}, "suspended": []})
-        assert step_until(supervisor, lambda: rows(supervisor)["b"]["state"] == "ready")
-        assert rows(supervisor)["b"]["restarts"] == 0
-
-
-def test_what_a_killed_process_has_moved_out_of_its_group_ends_with_it(stage, step_until):
+def test_what_a_killed_process_has_moved_out_of_its_group_ends_with_it(
+    stage, step_until, is_running
+):
     with stage.supervisor(stage.row("b", "family")) as supervisor:
         supervisor.start()
         (grandchild,) = stage.pids("grandchild")
@@ -293,7 +258,7 @@ with Supervisor(RunOptions(runtime_base=Path(base)), table) as supervisor:
     ("last", "moment"), [("never-ready", "b started"), ("stubborn", "b asked to stop")]
 )
 def test_kill_9_of_the_supervisor_while_it_starts_or_stops_leaves_nothing_for_long(
-    stage, eventually, last, moment
+    stage, eventually, last, moment, is_running
 ):
     child = str(Path(__file__).with_name("child.py"))
     words = [sys.executable, "-c", HELD, child, str(stage.events_path), str(stage.base), last]

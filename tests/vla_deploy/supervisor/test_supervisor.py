@@ -8,10 +8,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from platforms import ProfileError
+from platforms import ProfileError, load_profile
 from vla_deploy.supervisor.errors import AlreadyRunning, DeviceAbsent, StartCrashed, StartFailed
 from vla_deploy.supervisor.runs.runtime import running
-from vla_deploy.supervisor.supervisor import Supervisor
 
 pytestmark = pytest.mark.stack
 
@@ -37,19 +36,6 @@ with Supervisor(RunOptions(runtime_base=Path(base)), table) as supervisor:
 """
 
 
-def step_until(supervisor: Supervisor, eventually, condition) -> bool:
-    def look() -> bool:
-        supervisor.step()
-        return condition()
-
-    return eventually(look)
-
-
-def rows(supervisor: Supervisor) -> dict[str, dict]:
-    document = supervisor.space.cell_reader("process_table").latest().document()
-    return {row["name"]: row for row in document["processes"]}
-
-
 def test_processes_start_and_stop_in_order_and_leave_nothing(stage):
     with stage.supervisor(stage.row("a"), stage.row("b"), stage.row("c")) as supervisor:
         supervisor.start()
@@ -61,24 +47,23 @@ def test_processes_start_and_stop_in_order_and_leave_nothing(stage):
     assert stage.leftovers() == []
 
 
-def test_a_killed_process_is_restarted_and_the_table_says_so(stage, eventually):
+def test_a_killed_process_is_restarted_and_the_table_says_so(stage, step_until, rows):
     with stage.supervisor(stage.row("a"), stage.row("b")) as supervisor:
         supervisor.start()
         os.kill(stage.pids("a")[0], signal.SIGKILL)
-        assert step_until(supervisor, eventually, lambda: rows(supervisor)["a"]["restarts"] == 1)
-        assert step_until(supervisor, eventually, lambda: rows(supervisor)["a"]["state"] == "ready")
+        assert step_until(supervisor, lambda: rows(supervisor)["a"]["restarts"] == 1)
+        assert step_until(supervisor, lambda: rows(supervisor)["a"]["state"] == "ready")
         row = rows(supervisor)["a"]
         assert (row["pid"], row["exit_code"]) == (stage.pids("a")[1], -9)
         assert len(stage.pids("b")) == 1
 
 
-def test_the_table_reports_memory_and_cpu_of_every_process(stage, eventually):
+def test_the_table_reports_memory_and_cpu_of_every_process(stage, step_until):
     with stage.supervisor(stage.row("a")) as supervisor:
         supervisor.start()
         reader = supervisor.space.cell_reader("process_table")
         assert step_until(
             supervisor,
-            eventually,
             lambda: reader.latest().document()["processes"][0]["memory_mb"] is not None,
         )
         document = reader.latest().document()
@@ -113,7 +98,7 @@ def test_an_absent_device_fails_the_start_after_several_tries_with_the_process_o
     assert stage.events().count("b started") == 4
 
 
-def test_a_device_that_appears_late_only_delays_the_start(stage):
+def test_a_device_that_appears_late_only_delays_the_start(stage, rows):
     with stage.supervisor(stage.row("a", "wired-later")) as supervisor:
         supervisor.start()
         row = rows(supervisor)["a"]
@@ -127,7 +112,7 @@ def test_a_process_that_never_gets_ready_fails_the_start(stage):
 
 
 def test_a_process_that_the_computer_cannot_start_fails_alone_and_is_tried_again(
-    stage, eventually, caplog
+    stage, caplog, step_until, rows
 ):
     with stage.supervisor(stage.row("a"), stage.row("b")) as supervisor:
         supervisor.start()
@@ -135,16 +120,15 @@ def test_a_process_that_the_computer_cannot_start_fails_alone_and_is_tried_again
         output.unlink()
         table = supervisor.space.cell_reader("process_table")
         told = table.latest().sequence
-        assert step_until(supervisor, eventually, lambda: table.latest().sequence > told)
+        assert step_until(supervisor, lambda: table.latest().sequence > told)
         output.mkdir()  # nothing can be written there
         os.kill(stage.pids("b")[0], signal.SIGKILL)
         assert step_until(
             supervisor,
-            eventually,
             lambda: "could not be started" in rows(supervisor)["b"]["reason"],
         )
         output.rmdir()
-        assert step_until(supervisor, eventually, lambda: rows(supervisor)["b"]["state"] == "ready")
+        assert step_until(supervisor, lambda: rows(supervisor)["b"]["state"] == "ready")
         assert rows(supervisor)["a"]["restarts"] == 0
     assert "b: back-off (could not be started: [Errno 21] Is a directory" in caplog.text
 
@@ -156,7 +140,9 @@ def test_a_stubborn_process_is_killed_after_its_stop_timeout(stage):
     assert not psutil.pid_exists(stage.pids("a")[0])
 
 
-def test_what_a_process_started_itself_in_its_group_ends_with_it(stage, tmp_path, eventually):
+def test_what_a_process_started_itself_in_its_group_ends_with_it(
+    stage, tmp_path, eventually, is_running
+):
     script = tmp_path / "parent.py"
     script.write_text(
         "import subprocess, sys, pathlib, time\n"
@@ -171,6 +157,22 @@ def test_what_a_process_started_itself_in_its_group_ends_with_it(stage, tmp_path
         supervisor.start()
         pid = int(told.read_text())
     assert eventually(lambda: not is_running(pid))
+
+
+def test_a_child_has_its_nice_and_its_threads_from_its_start(stage):
+    # It sets nothing itself: a large program that is loading must not delay the others.
+    with stage.supervisor(stage.row("dashboard"), stage.row("a")) as supervisor:
+        supervisor.start()
+        (nice,) = stage.pids("dashboard")
+        (usual,) = stage.pids("a")
+        wanted = load_profile("desktop").processes["dashboard"]
+        own_nice = os.getpriority(os.PRIO_PROCESS, 0)
+        assert wanted.nice > 0
+        assert os.getpriority(os.PRIO_PROCESS, nice) == max(wanted.nice, own_nice)
+        assert psutil.Process(nice).environ()["OMP_NUM_THREADS"] == str(wanted.threads)
+        assert os.getpriority(os.PRIO_PROCESS, usual) == own_nice
+        own = os.environ.get("OMP_NUM_THREADS")
+        assert psutil.Process(usual).environ().get("OMP_NUM_THREADS") == own
 
 
 def test_a_second_supervisor_is_refused_with_who_and_what_to_do(stage):
@@ -246,7 +248,7 @@ def test_a_run_whose_folder_is_gone_still_ends(stage, caplog):
 
 
 def test_kill_9_of_the_supervisor_ends_its_children_and_the_next_start_sweeps_the_rest(
-    stage, python, eventually
+    stage, python, eventually, is_running
 ):
     supervisor = start_supervisor(stage, python)
     (a,), (b,), (grandchild,) = (stage.pids(name) for name in ("a", "b", "grandchild"))
@@ -272,10 +274,3 @@ def start_supervisor(stage, python) -> subprocess.Popen:
     with supervisor.stdout:
         assert supervisor.stdout.readline() == "ready\n"
     return supervisor
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False

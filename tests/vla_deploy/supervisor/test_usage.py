@@ -8,8 +8,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.supervisor.processes import usage
-from vla_deploy.supervisor.processes.proc_files import ProcessStat
-from vla_deploy.supervisor.processes.usage import UsageMeter
+from vla_deploy.supervisor.processes.usage import ProcessStat, UsageMeter
 
 BURN = "import time\nwhile time.process_time() < 0.3: pass\nprint('done', flush=True)\ninput()"
 

@@ -22,19 +22,27 @@ from vla_deploy.install import (
     system_files,
     uninstall_changes,
 )
-from vla_deploy.install.changes import paths_of
+from vla_deploy.install.changes import (
+    afterwards,
+    apply_changes,
+    during,
+    paths_of,
+    read_files,
+    read_manifest,
+    write_manifest,
+)
 from vla_deploy.install.commands import (
     Command,
     after_install,
     after_uninstall,
     before_uninstall,
+    missing_tools,
+    require_tools,
     run_command,
 )
-from vla_deploy.install.disk import apply_changes, read_files, remove_if_empty
+from vla_deploy.install.disk import remove_if_empty
+from vla_deploy.install.files import service_profile
 from vla_deploy.install.layout import DEFAULT_PREFIX
-from vla_deploy.install.manifest import afterwards, during, read_manifest, write_manifest
-from vla_deploy.install.service_profile import service_profile
-from vla_deploy.install.tools import missing_tools, require_tools
 from vla_deploy.robots import load_robot
 
 INSTALL_EXAMPLES = """  vla-deploy install --robot butler --dry-run

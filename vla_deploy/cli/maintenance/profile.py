@@ -14,8 +14,8 @@ from platforms.profile_source import ProfileSource, flat, read_source
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import RobotSession, attach, base_of
+from vla_deploy.install.files import slice_too_small
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
-from vla_deploy.install.service_profile import slice_too_small
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome, ChangePhase
 from vla_deploy.supervisor.profiles.profile_choice import choice_of, detect, start_profile
 from vla_deploy.supervisor.runs.runtime import running

@@ -15,12 +15,10 @@ from drivers.clock import MonotonicClock
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.maintenance.install import add_layout_arguments, layout_of
+from vla_deploy.install.changes import installed_choice
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
-from vla_deploy.install.manifest import installed_choice
-from vla_deploy.install.release_build import ReleaseSource, add_release, version_of
-from vla_deploy.install.release_store import ReleaseStore
-from vla_deploy.install.service_control import SystemdService
-from vla_deploy.install.switch import End, Switch, SwitchPlan, recover
+from vla_deploy.install.releases import ReleaseSource, ReleaseStore, add_release, version_of
+from vla_deploy.install.switch import End, Switch, SwitchPlan, SystemdService, recover
 from vla_deploy.supervisor.profiles.profile_choice import start_profile
 
 EXAMPLES = """  vla-deploy release list

@@ -3,7 +3,6 @@
 import contextlib
 import gzip
 import os
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -22,10 +21,10 @@ class CgroupRefused(Exception):
 
 
 class CgroupTree:
-    """Own the subtree below the control group that the service manager gave us.
+    """Own the subtree below the control group that the service manager delegated.
 
-    The kernel forbids processes beside groups that have controllers, so the supervisor moves into a
-    group of its own first. `refusals` says for each controller why it cannot be used.
+    The kernel allows no processes in a group that hands controllers on, so the supervisor first
+    moves into a group of its own. `refusals` has for each controller why it cannot be used.
     """
 
     def __init__(
@@ -57,16 +56,20 @@ class CgroupTree:
         Raises:
             CgroupRefused: the kernel did not move it.
         """
-        self._write(self._group(group) / "cgroup.procs", str(pid), confirm=False)
+        _put(self._group(group) / "cgroup.procs", str(pid))
 
-    def limit(self, group: str, file: str, value: str, accepted: Iterable[str] = ()) -> None:
-        """Set one limit and read it back; `accepted` are other spellings of the same.
+    def limit(self, group: str, file: str, value: str) -> None:
+        """Set one limit and read it back.
 
         Raises:
             CgroupRefused: there is no such file, or something else reads back.
         """
         path = self._group(group) / file
-        self._write(path, value, confirm=True, accepted=(value, *accepted))
+        if not path.exists():
+            raise CgroupRefused(f"there is no {path.name}: this kernel cannot do that in groups")
+        _put(path, value)
+        if (got := _read(path)) != value:
+            raise CgroupRefused(f"{path} says {got!r} after {value!r} was written")
 
     def close(self) -> None:
         """Remove the groups that were made here; the supervisor's own goes with the unit."""
@@ -99,26 +102,16 @@ class CgroupTree:
         except CgroupRefused:
             if self._moved:
                 raise
-            self._step_aside()
+            self._leave_group()
             _put(path, f"+{controller}")
         if controller not in _read(path).split():
             raise CgroupRefused(f"{path} does not list {controller} after it was written")
 
-    def _step_aside(self) -> None:
-        """Leave the group that shall get controllers: it may not hold processes of its own."""
+    def _leave_group(self) -> None:
+        """Leave the group that is to hand controllers on: it must hold no processes."""
         self._moved = True
         own = self._group(SUPERVISOR)
         _put(own / "cgroup.procs", str(os.getpid()))
-
-    def _write(
-        self, path: Path, value: str, *, confirm: bool, accepted: Iterable[str] = ()
-    ) -> None:
-        if not path.exists():
-            raise CgroupRefused(f"there is no {path.name}: this kernel cannot do that in groups")
-        _put(path, value)
-        got = _read(path) if confirm else ""
-        if confirm and got not in accepted:
-            raise CgroupRefused(f"{path} says {got!r} after {value!r} was written")
 
 
 def _objection(found: Cgroup, controller: str) -> str:
@@ -163,4 +156,4 @@ def _kernel_config(root: Path) -> bytes:
     try:
         return gzip.decompress((root / _KERNEL_CONFIG.lstrip("/")).read_bytes())
     except (OSError, EOFError):
-        return b""  # most desktops do not tell; then control's own warning does
+        return b""  # unknown on most desktops; control itself warns when it is refused SCHED_FIFO

@@ -1,4 +1,4 @@
-"""Write the cells by which the budgets are shown and obeyed."""
+"""Compose the documents by which the budgets are shown and followed."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -18,7 +18,7 @@ _OF_A_PROCESS: Final = "gpu_memory_used_bytes."
 
 
 def directives(taken: Iterable[Taken]) -> dict[str, Any]:
-    """Return what the processes shall do: the `resource_directives` cell.
+    """Return the `resource_directives` document, which the processes follow.
 
     A process with several slow steps in force keeps the smallest of their ratios; each
     smaller_model step brings it one tier down.
@@ -37,7 +37,7 @@ def _of(steps: Iterable[LadderStep], action: LadderAction) -> list[LadderStep]:
 
 
 def stop_reason(taken: Iterable[Taken]) -> str:
-    """Return why the robot shall not move, or nothing."""
+    """Return why the robot must not move, or ""."""
     stops = [one.why for one in taken if one.step.action is LadderAction.PROTECTIVE_STOP]
     return stops[0] if stops else ""
 
@@ -82,15 +82,15 @@ def history_rows(changes: Iterable[LadderMove], now_ns: int) -> list[dict[str, A
 
 
 def board(readings: Iterable[Reading]) -> dict[str, Any]:
-    """Return what the probes read, or why not; what belongs to one process is told of that."""
-    told: dict[str, float] = {}
+    """Return what the probes read, or why not, without the readings of single processes."""
+    values: dict[str, float] = {}
     missing: dict[str, str] = {}
     for reading in islice(readings, _MOST_READINGS):
         if reading.value is None:
             missing[reading.name] = _short(reading.reason)
         elif not reading.name.startswith(_OF_A_PROCESS):
-            told[reading.name] = float(f"{reading.value:.9g}")
-    return {"readings": told, "missing": missing}
+            values[reading.name] = float(f"{reading.value:.9g}")
+    return {"readings": values, "missing": missing}
 
 
 def enforcement_rows(enforced: Mapping[str, Enforced]) -> list[dict[str, Any]]:

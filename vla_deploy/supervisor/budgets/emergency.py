@@ -7,10 +7,10 @@ from typing import Final
 from platforms.probes import Reading
 
 _MB: Final = 1_000_000
-# Below this the kernel soon kills whom it likes, or the board hangs.
+# Below this the kernel soon kills processes of its choice, or the board hangs.
 LEAST_MEMORY_RATIO: Final = 0.02
 LEAST_MEMORY_MB: Final = 64
-# At its critical trip point the kernel switches the board off, with the robot in motion.
+# At its critical trip point the kernel switches the board off while the robot moves.
 CRITICAL_MARGIN_C: Final = 3.0
 _ZONE: Final = "temperature_c."
 _EVENTS: Final = "throttle_events."
@@ -53,7 +53,7 @@ def _critical_c(zone: Path) -> float | None:
 class Emergencies:
     """Judge what the probes read against what the board itself calls critical.
 
-    `read_trips_c` is asked again whenever a zone tells a temperature for the first time: zones may
+    `read_trips_c` is called again when a zone has a temperature for the first time: zones may
     appear late.
     """
 
@@ -64,7 +64,7 @@ class Emergencies:
         self._zones: set[str] = set()
 
     def judge(self, readings: Mapping[str, Reading]) -> str:
-        """Return why the robot must stop at once, or nothing; `hint` tells of load peaks."""
+        """Return why the robot must stop at once, or ""; `hint` names load peaks."""
         peaks = _value(readings, _HINT)
         self.hint = f"{peaks:g} peaks of current throttled the board" if peaks else ""
         return "; ".join([*_memory(readings), *self._heat(readings), *_supply(readings)])

@@ -10,7 +10,7 @@ from vla_deploy.supervisor.budgets.cgroup import CgroupRefused, CgroupTree, cpu_
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused, MemoryHold
 from vla_deploy.supervisor.budgets.judge import BudgetFinding
 
-# The ladder acts at the budget itself; the kernel stops whoever runs past it all the same.
+# The ladder acts at the budget itself; the kernel stops a process that exceeds it further.
 HIGH_RATIO: Final = 1.2
 HARD_RATIO: Final = 1.5
 CONTROL_WEIGHT: Final = "1000"
@@ -25,35 +25,47 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Enforced:
-    """Say in words for one process how its memory and its CPU budget are enforced."""
+    """Describe for one process how its memory and its CPU budget are enforced."""
 
     memory: str
     cpu: str
 
 
-IDLE: Final = Enforced(memory="none, because it does not run", cpu="none, because it does not run")
+_IDLE: Final = "none, because it does not run"
+_METRICS: Final = ("cpu_ratio", "memory_mb")
+_WHEN_OVER: Final[Mapping[str, str]] = {
+    "memory_mb": "rlimit once it is over",
+    "cpu_ratio": "nice and affinity once it is over",
+}
 
 
 class Enforcer:
-    """Put every process into its control group; without one, hold back who is over its budget."""
+    """Put every process into its control group; without one, hold it back while it is over."""
 
     def __init__(self, cgroups: CgroupTree) -> None:
         self._cgroups = cgroups
         self._budgets: Mapping[str, ProcessBudget] = {}
         self._pids: dict[str, int] = {}
-        self._rules: dict[str, Enforced] = {}
+        self._rules: dict[tuple[str, str], str] = {}
+        """How each metric of a process is enforced, in words."""
         self._refused: dict[tuple[str, str], str] = {}
         self._held: dict[tuple[str, str], CpuHold | MemoryHold] = {}
 
     @property
     def enforced(self) -> dict[str, Enforced]:
         """Return for every process that has a budget how it is enforced now."""
-        return {name: self._rules.get(name, IDLE) for name in self._budgets}
+        return {
+            name: Enforced(
+                memory=self._rules.get(("memory_mb", name), _IDLE),
+                cpu=self._rules.get(("cpu_ratio", name), _IDLE),
+            )
+            for name in self._budgets
+        }
 
     def adopt(self, budgets: Mapping[str, ProcessBudget]) -> None:
-        """Enforce these budgets from now on; who is held back by the ones before is released.
+        """Enforce these budgets from now on; processes held back by the former are released.
 
-        Before the processes hear of the profile: what they then set for themselves shall stay.
+        It comes before the processes get the profile: what they then set themselves must stay.
         """
         for (_, name), held in self._held.items():
             try:
@@ -65,37 +77,36 @@ class Enforcer:
         self._pids.clear()
 
     def enforce(self, pids: Mapping[str, int], findings: Iterable[BudgetFinding]) -> None:
-        """Take in new processes, hold back who is over, release who no longer is."""
+        """Take in new processes; hold back what is over its budget, release what no longer is."""
         for name in [name for name in self._pids if name not in pids]:
             self._forget(name)
         for name, pid in pids.items():
             if name in self._budgets and self._pids.get(name) != pid:
-                self._welcome(name, pid)
+                self._admit(name, pid)
         over = {finding.line.key: finding for finding in findings if finding.over}
         for name in sorted(self._pids.keys() - EXEMPT.keys()):
-            for metric in ("cpu_ratio", "memory_mb"):
+            for metric in _METRICS:
                 self._settle(metric, name, over.get((metric, name)))
 
     def close(self) -> None:
-        """Give back what was made."""
+        """Remove the control groups."""
         self._cgroups.close()
 
     def _forget(self, name: str) -> None:
         self._pids.pop(name, None)
-        self._rules.pop(name, None)
-        for metric in ("cpu_ratio", "memory_mb"):
+        for metric in _METRICS:
+            self._rules.pop((metric, name), None)
             self._held.pop((metric, name), None)
             self._refused.pop((metric, name), None)
 
-    def _welcome(self, name: str, pid: int) -> None:
+    def _admit(self, name: str, pid: int) -> None:
         self._forget(name)
         self._pids[name] = pid
         if name in EXEMPT:
             weight = {"cpu.weight": CONTROL_WEIGHT} if name == "control" else {}
-            self._rules[name] = Enforced(
-                memory=f"none, because {EXEMPT[name]}",
-                cpu=f"none, because {EXEMPT[name]}" + self._preferred(name, pid, weight),
-            )
+            none = f"none, because {EXEMPT[name]}"
+            self._rules["memory_mb", name] = none
+            self._rules["cpu_ratio", name] = none + self._preferred(name, pid, weight)
             return
         budget = self._budgets[name]
         memory = {
@@ -103,21 +114,22 @@ class Enforcer:
             "memory.max": memory_bytes(HARD_RATIO * budget.memory_mb),
         }
         cpu = {"cpu.max": cpu_max(HARD_RATIO * budget.cpu_ratio)}
-        self._rules[name] = Enforced(
-            memory=self._grouped("memory_mb", name, pid, "memory", memory),
-            cpu=self._grouped("cpu_ratio", name, pid, "cpu", cpu),
-        )
-        self._bound_tasks(name, pid)
+        self._group("memory_mb", name, pid, "memory", memory)
+        self._group("cpu_ratio", name, pid, "cpu", cpu)
+        refusal = self._limited(name, pid, "pids", {"pids.max": MOST_TASKS})
+        if refusal:
+            _log.debug("budgets: %s: its number of tasks is not bounded: %s", name, refusal)
 
-    def _grouped(
+    def _group(
         self, metric: str, name: str, pid: int, controller: str, limits: Mapping[str, str]
-    ) -> str:
+    ) -> None:
         """Set limits in the process' group; where that fails, note that it is to be held back."""
-        refusal = self._limited(name, pid, controller, limits)
-        if not refusal:
-            return "cgroup: " + ", ".join(f"{file} {value}" for file, value in limits.items())
-        self._refused[metric, name] = refusal
-        return f"{_WHEN_OVER[metric]}, because {refusal}"
+        if refusal := self._limited(name, pid, controller, limits):
+            self._refused[metric, name] = refusal
+            text = f"{_WHEN_OVER[metric]}, because {refusal}"
+        else:
+            text = "cgroup: " + ", ".join(f"{file} {value}" for file, value in limits.items())
+        self._rules[metric, name] = text
 
     def _limited(self, name: str, pid: int, controller: str, limits: Mapping[str, str]) -> str:
         refusal = self._cgroups.refusals.get(controller, "")
@@ -136,11 +148,6 @@ class Enforcer:
             return ""
         return f"; cgroup: cpu.weight {CONTROL_WEIGHT}"
 
-    def _bound_tasks(self, name: str, pid: int) -> None:
-        refusal = self._limited(name, pid, "pids", {"pids.max": MOST_TASKS})
-        if refusal:
-            _log.debug("budgets: %s: its number of tasks is not bounded: %s", name, refusal)
-
     def _settle(self, metric: str, name: str, excess: BudgetFinding | None) -> None:
         """Hold a process back while it is over, where its group does not; release it after that.
 
@@ -157,9 +164,12 @@ class Enforcer:
                 held.release()
                 del self._held[key]
         except HoldRefused as error:
-            self._warn(metric, name, f"{'none' if held is None else held}, because {error}")
-            return
-        self._say(metric, name, self._described(key))
+            text = f"{'none' if held is None else held}, because {error}"
+            if text != self._rules[key]:  # logged when it begins, not with each measurement
+                _log.warning("budgets: %s: %s is enforced by %s", name, metric, text)
+        else:
+            text = f"{self._held.get(key, _WHEN_OVER[metric])}, because {self._refused[key]}"
+        self._rules[key] = text
 
     def _hold(self, excess: BudgetFinding) -> CpuHold | MemoryHold:
         pid, limit = self._pids[excess.line.process], excess.line.limit
@@ -167,26 +177,3 @@ class Enforcer:
             return CpuHold.take(pid, limit)
         used_mb = excess.measured if excess.measured is not None else limit
         return MemoryHold.take(pid, HARD_RATIO * limit - used_mb)
-
-    def _described(self, key: tuple[str, str]) -> str:
-        held, refusal = self._held.get(key), self._refused[key]
-        return f"{held}, because {refusal}" if held else f"{_WHEN_OVER[key[0]]}, because {refusal}"
-
-    def _say(self, metric: str, name: str, text: str) -> None:
-        rule = self._rules[name]
-        memory = text if metric == "memory_mb" else rule.memory
-        cpu = text if metric == "cpu_ratio" else rule.cpu
-        self._rules[name] = Enforced(memory=memory, cpu=cpu)
-
-    def _warn(self, metric: str, name: str, text: str) -> None:
-        """Say what was refused, and log it when it begins, not with each measurement."""
-        rule = self._rules[name]
-        self._say(metric, name, text)
-        if self._rules[name] != rule:
-            _log.warning("budgets: %s: %s is enforced by %s", name, metric, text)
-
-
-_WHEN_OVER: Final[Mapping[str, str]] = {
-    "memory_mb": "rlimit once it is over",
-    "cpu_ratio": "nice and affinity once it is over",
-}

@@ -1,7 +1,7 @@
 """Hold a process back from outside, where no control group can: nice, affinity, RLIMIT_DATA.
 
-All of it is undone when the process keeps its budget again, except what somebody else has changed
-meanwhile: a process that follows another profile sets its own affinity. Address space (RLIMIT_AS)
+All of it is undone when the process keeps its budget again, except what has been changed from
+elsewhere: a process that follows another profile sets its own affinity. Address space (RLIMIT_AS)
 is never limited: memory-mapped models and shared memory count there without being used.
 """
 
@@ -21,12 +21,12 @@ _CAP_SYS_NICE: Final = 1 << 23
 
 
 class HoldRefused(Exception):
-    """Say why a process cannot be held back."""
+    """Give the reason why a process cannot be held back."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Claim:
-    """Say what the kernel grants one thread: its nice, and the cores that it may run on."""
+    """Hold what the kernel grants one thread: its nice, and the cores that it may run on."""
 
     nice: int
     cores: frozenset[int]
@@ -49,7 +49,7 @@ class _Claim:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CpuHold:
-    """Remember what each thread of a process had before it was held back."""
+    """Keep what each thread of a process had before it was held back."""
 
     pid: int
     cores: frozenset[int]
@@ -77,18 +77,18 @@ class CpuHold:
         return hold
 
     def release(self) -> None:
-        """Give each thread back what it had; of a process that is gone nothing is held.
+        """Restore what each thread had; a process that has ended needs nothing.
 
         Raises:
             HoldRefused: it is not ours.
         """
         with _translated(self.pid):
             for thread in _threads(self.pid):
-                with suppress(ProcessLookupError):  # it ended meanwhile
+                with suppress(ProcessLookupError):  # it has ended
                     self._release_thread(thread)
 
     def _take_every_thread(self) -> None:
-        # Who is started meanwhile by a thread that is not held yet inherits the high claim.
+        # A thread that is started by one not held yet inherits the high claim.
         seen: set[int] = set()
         while new := _threads(self.pid) - seen:
             seen |= new
@@ -103,7 +103,7 @@ class CpuHold:
         self.before[thread].held(self.cores).set(thread)
 
     def _release_thread(self, thread: int) -> None:
-        """Give back what is still as the hold left it; later threads inherited their claim."""
+        """Restore what is still as the hold left it; later threads inherited their claim."""
         before = self.before.get(thread) or self.before.get(self.pid)
         if before is None:
             return
@@ -116,7 +116,7 @@ class CpuHold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryHold:
-    """Remember the soft limit on private memory that a process had before."""
+    """Keep the soft limit on private memory that a process had before."""
 
     pid: int
     limit_bytes: int
@@ -128,7 +128,7 @@ class MemoryHold:
 
     @classmethod
     def take(cls, pid: int, growth_mb: float) -> "MemoryHold":
-        """Let the private memory of a process grow by so much and no more.
+        """Limit the growth of a process' private memory.
 
         Raises:
             HoldRefused: it is gone or not ours, or the limit does not read back.
@@ -144,7 +144,7 @@ class MemoryHold:
         return cls(pid=pid, limit_bytes=limit, soft=soft, hard=hard)
 
     def release(self) -> None:
-        """Let the process grow as before; of one that is gone nothing is held.
+        """Restore the limit; a process that has ended needs nothing.
 
         Raises:
             HoldRefused: it is not ours.
@@ -163,7 +163,7 @@ def _translated(pid: int) -> Iterator[None]:
 
 
 def _threads(pid: int) -> set[int]:
-    """Return the threads of a process, none of one that is gone: nice and cores belong to each."""
+    """Return the threads of a process, none if it has ended: nice and cores belong to each."""
     try:
         return {int(path.name) for path in (_PROC / str(pid) / "task").iterdir()}
     except (FileNotFoundError, ProcessLookupError):

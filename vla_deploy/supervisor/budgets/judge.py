@@ -1,17 +1,68 @@
-"""Judge measurements against their lines, with hysteresis; a missing number decides nothing."""
+"""Judge measurements against their limits, with hysteresis; a missing number decides nothing."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
 from drivers.clock import NS_PER_S
-from platforms import LadderTiming
-from vla_deploy.supervisor.budgets.lines import Line
+from platforms import LadderTiming, ProcessBudget, TotalBudget
+
+TOTAL = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """Declare one limit; `process` is empty for the whole robot, `at_least` marks a lower limit."""
+
+    metric: str
+    limit: float
+    process: str = TOTAL
+    at_least: bool = False
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Return what the line is looked up by."""
+        return self.metric, self.process
+
+    def is_beyond(self, value: float) -> bool:
+        """Return whether a value breaks the limit."""
+        return value < self.limit if self.at_least else value > self.limit
+
+    def is_relieved(self, value: float, release_ratio: float) -> bool:
+        """Return whether a value is so far from the limit that the excess has ended."""
+        if self.at_least:
+            return value >= self.limit / release_ratio
+        return value <= self.limit * release_ratio
+
+
+def lines_of(budgets: Mapping[str, ProcessBudget], total: TotalBudget) -> tuple[Line, ...]:
+    """Return every line that a profile declares, those of processes first."""
+    own = [
+        Line(metric=metric, limit=getattr(budget, metric), process=process)
+        for process, budget in budgets.items()
+        for metric in ("memory_mb", "cpu_ratio")
+    ]
+    whole = [
+        Line(metric=metric, limit=limit, at_least=metric == "disk_free_mb")
+        for metric in _TOTAL_METRICS
+        if (limit := getattr(total, metric)) is not None
+    ]
+    return (*own, *whole)
+
+
+_TOTAL_METRICS = (
+    "memory_mb",
+    "cpu_ratio",
+    "gpu_memory_mb",
+    "power_w",
+    "temperature_c",
+    "disk_free_mb",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurement:
-    """Carry one number, or None and why; `ended` tells that there is nobody to be measured."""
+    """Hold one number, or None and why; `ended` means that the process does not run."""
 
     value: float | None
     reason: str = ""
@@ -79,7 +130,7 @@ def judge(
 
 
 def _as_before(line: Line, before: BudgetFinding | None, now_ns: int) -> BudgetFinding:
-    """Return what was known of the line; a changed limit starts anew."""
+    """Return the last finding of the line, a fresh one for a changed limit."""
     if before is None or before.line != line:
         return BudgetFinding(line=line, since_ns=now_ns)
     return before
@@ -90,7 +141,7 @@ def _judge_one(
 ) -> BudgetFinding:
     value = measurement.value
     if value is None and not measurement.ended:
-        return _told(
+        return _with_standing(
             replace(before, beyond_since_ns=None, relieved_since_ns=None),
             BudgetStanding.MISSING,
             measurement,
@@ -104,7 +155,7 @@ def _judge_one(
         relieved_since_ns=_since(before.relieved_since_ns, relieved, now_ns),
     )
     over = _is_over(timed, timing, now_ns)
-    return _told(replace(timed, over=over), _standing(timed, over), measurement, now_ns)
+    return _with_standing(replace(timed, over=over), _standing(timed, over), measurement, now_ns)
 
 
 def _since(since_ns: int | None, holds: bool, now_ns: int) -> int | None:
@@ -132,7 +183,7 @@ def _standing(timed: BudgetFinding, over: bool) -> BudgetStanding:
     return BudgetStanding.RISING if timed.beyond_since_ns is not None else BudgetStanding.OK
 
 
-def _told(
+def _with_standing(
     finding: BudgetFinding, standing: BudgetStanding, got: Measurement, now_ns: int
 ) -> BudgetFinding:
     since_ns = finding.since_ns if standing is finding.standing else now_ns

@@ -1,15 +1,19 @@
-"""Keep the budgets of one run: judge what was measured, take and undo steps, tell everyone."""
+"""Keep the budgets of one run: judge what was measured, take and undo steps, publish them."""
 
 import logging
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import LadderAction, Profile
+from platforms.probes import ProbeSet, open_probes
 from vla_deploy.ipc import ClaimBook, SharedSpace
+from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.documents import (
     board,
     directives,
@@ -19,15 +23,26 @@ from vla_deploy.supervisor.budgets.documents import (
     rows,
     stop_reason,
 )
-from vla_deploy.supervisor.budgets.emergency import Emergencies
+from vla_deploy.supervisor.budgets.emergency import Emergencies, critical_trips_c
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
-from vla_deploy.supervisor.budgets.judge import BudgetFinding, Findings, Measurement, judge
+from vla_deploy.supervisor.budgets.judge import (
+    BudgetFinding,
+    Findings,
+    Line,
+    Measurement,
+    judge,
+    lines_of,
+)
 from vla_deploy.supervisor.budgets.ladder import EMERGENCY, LadderMove, LadderState, Pressure, climb
-from vla_deploy.supervisor.budgets.lines import Line, lines_of
-from vla_deploy.supervisor.budgets.measure import OUTSIDE_THE_TOTAL, Measurements, Measurer
-from vla_deploy.supervisor.budgets.sampler import SnapshotFeed, UsageSnapshot
+from vla_deploy.supervisor.budgets.sampler import (
+    OUTSIDE_THE_TOTAL,
+    BackgroundSampler,
+    Measurements,
+    Measurer,
+    UsageSnapshot,
+)
 
-TELL_PERIOD_NS: Final = NS_PER_S // 2
+PUBLISH_PERIOD_NS: Final = NS_PER_S // 2
 STALE_AFTER_NS: Final = 5 * NS_PER_S
 KEPT_CHANGES: Final = 20
 _REASON_CHARACTERS: Final = 500
@@ -38,18 +53,10 @@ _SUPERVISOR: Final = "supervisor"
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Orders:
-    """Say which processes shall not run, and which shall be started anew, each with the reason."""
-
-    suspended: Mapping[str, str] = field(default_factory=dict)
-    restart: Mapping[str, str] = field(default_factory=dict)
-
-
 class BudgetKeeper:
     """Hold the run to its profile's budgets.
 
-    `step` belongs into the supervisor's loop: it measures nothing itself and never waits.
+    `step` runs in the supervisor's loop: it measures nothing itself and never waits.
     """
 
     def __init__(
@@ -57,7 +64,7 @@ class BudgetKeeper:
         profile: Callable[[], Profile],
         space: SharedSpace,
         clock: Clock,
-        feed: SnapshotFeed,
+        feed: BackgroundSampler,
         emergencies: Emergencies,
         enforcer: Enforcer,
         claims: ClaimBook,
@@ -80,12 +87,12 @@ class BudgetKeeper:
         self._emergency = ""
         self._seen_ns = clock.now_ns()
         self._stale = False
-        self._told_ns = 0
+        self._published_ns = 0
         self._profile = profile()
         self._take_over(self._profile)
 
     def adopt(self, profile: Profile) -> None:
-        """Go on with the budgets of another profile; steps that it does not declare are undone."""
+        """Take over the budgets of another profile; steps that it does not declare are undone."""
         if profile is self._profile:
             return
         known, now_ns = (*profile.ladder, EMERGENCY), self._clock.now_ns()
@@ -109,14 +116,26 @@ class BudgetKeeper:
         """Return what was measured last, or None before the first time."""
         return self._feed.latest()
 
-    def step(self, pids: Mapping[str, int]) -> Orders:
-        """Judge the newest measurement, if there is a new one, and return what is to be done."""
+    @property
+    def suspended(self) -> frozenset[str]:
+        """Return the processes that must not run."""
+        return frozenset(directives(self._ladder.taken)["suspended"])
+
+    @property
+    def rate_ratios(self) -> Mapping[str, float]:
+        """Return the share of its rate at which a process must work; one not named, at all."""
+        ratios: Mapping[str, float] = directives(self._ladder.taken)["rate_ratio"]
+        return ratios
+
+    def step(self, pids: Mapping[str, int]) -> dict[str, str]:
+        """Judge new measurements; return the processes to start again, each with the reason."""
         now_ns = self._clock.now_ns()
         self.adopt(self._profile_now())
         everyone = {_SUPERVISOR: os.getpid(), **pids}
         self._feed.watch(everyone)
         restart: dict[str, str] = {}
-        self._note_failures()
+        if self._feed.failures:
+            self.counts["measuring_failed"] = self._feed.failures
         fresh = self._feed.since(self._seen_ns)
         if fresh:
             self._seen_ns, self._stale = fresh[-1].stamp_ns, False
@@ -125,31 +144,22 @@ class BudgetKeeper:
         elif now_ns - self._seen_ns > STALE_AFTER_NS and not self._stale:
             self._stale = True
             self._judge(self._unknown(), now_ns)
-        if restart or now_ns - self._told_ns >= TELL_PERIOD_NS:
-            self._tell(now_ns)
-        return Orders(suspended=self._suspended(), restart=restart)
-
-    def _tell_board(self, snapshot: UsageSnapshot | None) -> None:
-        """Publish what was read last; old readings are left out, so that they grow stale."""
-        if snapshot is not None and not self._stale:
-            self._board.put_document(board(snapshot.readings.values()))
+        if restart or now_ns - self._published_ns >= PUBLISH_PERIOD_NS:
+            self._publish(now_ns)
+        return restart
 
     def close(self) -> None:
-        """Measure no more and give back what enforcement has made."""
+        """End the measuring, and remove what enforcement has made."""
         self._feed.close()
         self._enforcer.close()
 
     def _measure(self, fresh: Sequence[UsageSnapshot]) -> Measurements:
-        """Return the newest numbers; an emergency counts also when this comes late to see it."""
+        """Return the newest numbers; an emergency in any of the fresh snapshots counts."""
         reasons = [self._emergencies.judge(one.readings) for one in fresh]
         self._emergency = next(filter(None, reversed(reasons)), "")
         for snapshot in fresh:
             measured = self._measurer.measure(snapshot, frozenset(self._profile.budgets))
         return measured
-
-    def _note_failures(self) -> None:
-        if self._feed.failures:
-            self.counts["measuring_failed"] = self._feed.failures
 
     def _unknown(self) -> Measurements:
         reason = (
@@ -170,7 +180,7 @@ class BudgetKeeper:
         if change is None:
             return {}
         self._record(change)
-        self._tell(now_ns)
+        self._publish(now_ns)
         restarts = change.taken and change.step.action is LadderAction.RESTART
         return {change.step.process: f"over budget: {change.why}"} if restarts else {}
 
@@ -180,16 +190,11 @@ class BudgetKeeper:
         self.counts[change.step.action.value] += change.taken
         _log.log(logging.WARNING if change.taken else logging.INFO, "budgets: %s", change)
 
-    def _suspended(self) -> dict[str, str]:
-        return {
-            one.step.process: f"suspended: {one.why}"
-            for one in self._ladder.taken
-            if one.step.action is LadderAction.SUSPEND
-        }
-
-    def _tell(self, now_ns: int) -> None:
-        self._told_ns = now_ns
-        self._tell_board(self._feed.latest())
+    def _publish(self, now_ns: int) -> None:
+        self._published_ns = now_ns
+        snapshot = self._feed.latest()
+        if snapshot is not None and not self._stale:  # old readings are left to grow stale
+            self._board.put_document(board(snapshot.readings.values()))
         taken = self._ladder.taken
         stop = stop_reason(taken)
         self._stop_cell.put_document({"stop": bool(stop), "reason": stop[:_REASON_CHARACTERS]})
@@ -230,3 +235,33 @@ def _log_excesses(before: Findings, after: Findings) -> None:
             _log.warning("budgets: %s", finding)
         elif was_over and not finding.over:
             _log.info("budgets: %s keeps its budget again", " ".join(filter(None, reversed(key))))
+
+
+def open_keeper(
+    profile: Callable[[], Profile],
+    space: SharedSpace,
+    clock: Clock,
+    state_dir: Path,
+    probe_root: Path,
+) -> BudgetKeeper:
+    """Begin to measure, and return the keeper of a run's budgets.
+
+    The disk is the one of `state_dir`, which holds logs, crash reports and recordings.
+    """
+
+    def probes() -> ProbeSet:
+        return open_probes(probe_root, disk_folders=[_existing(state_dir)])
+
+    return BudgetKeeper(
+        profile,
+        space,
+        clock,
+        BackgroundSampler(probes, clock, MonotonicClock()),
+        Emergencies(partial(critical_trips_c, probe_root)),
+        Enforcer(CgroupTree(realtime=profile().realtime_priority > 0)),
+        ClaimBook(space, clock),
+    )
+
+
+def _existing(folder: Path) -> Path:
+    return next(one for one in (folder, *folder.parents) if one.exists())

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from platforms import LadderAction, LadderStep, LadderTiming
-from vla_deploy.supervisor.budgets.judge import BudgetFinding, lasts
-from vla_deploy.supervisor.budgets.lines import TOTAL
+from vla_deploy.supervisor.budgets.judge import TOTAL, BudgetFinding, lasts
 
 # A step that is needed again soon after it was undone stays twice as long, up to 2^5 times.
 _MOST_RELAPSES = 5
@@ -15,7 +14,7 @@ EMERGENCY = LadderStep(action=LadderAction.PROTECTIVE_STOP)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taken:
-    """Remember one step in force: which, since when, and why."""
+    """Hold one step in force: which, since when, and why."""
 
     step: LadderStep
     since_ns: int
@@ -49,7 +48,7 @@ class LadderState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pressure:
-    """Gather what the ladder answers to; `emergency` says why, or is empty."""
+    """Hold what the ladder responds to; `emergency` is the reason, or ""."""
 
     findings: tuple[BudgetFinding, ...]
     emergency: str = ""
@@ -95,7 +94,7 @@ def _next_step(
         return own[0]
     if not any(one.line.process == TOTAL for one in pressing):
         return None
-    # Restarting one that keeps its budget would help nobody.
+    # Restarting a process that keeps its budget helps nothing.
     return next((step for step in free if step.action is not LadderAction.RESTART), None)
 
 

@@ -1,4 +1,4 @@
-"""Write down how a process ended that should not have: one bounded JSON file for each."""
+"""Write a crash report for each process that ended unexpectedly: one bounded JSON file each."""
 
 import json
 import logging
@@ -12,13 +12,12 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import TOPICS, SharedSpace, TopicKind
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.supervisor.processes.lifecycle import RUNNING, ProcessRecord, ProcessState
-from vla_deploy.supervisor.runs.log_files import as_line, last_output, read_log
+from vla_deploy.supervisor.runs.log_files import BoundedFolder, as_line, last_output, read_log
 from vla_deploy.supervisor.runs.options import RunOptions
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
 
 KEEP = 50
 LAST_LINES = 40
-_TRACEBACK_LINES = 400  # the interpreter tells up to 100 frames of each thread
+_TRACEBACK_LINES = 400  # the interpreter writes up to 100 frames of each thread
 _TRACEBACK_STARTS = ("Fatal Python error", "Traceback (most recent call last)", "Current thread")
 _ENDED = frozenset({ProcessState.BACKOFF, ProcessState.GIVEN_UP})
 _log = logging.getLogger(__name__)
@@ -30,7 +29,7 @@ def crash_folder(state_dir: Path) -> BoundedFolder:
 
 
 class CrashReports:
-    """Report every process that ended unasked, with its last words and the age of all topics."""
+    """Report every process that failed, with its last log lines and the age of all topics."""
 
     def __init__(
         self,
@@ -61,7 +60,7 @@ class CrashReports:
         """Write a report for each process that has just failed.
 
         `started` holds the pid of each process and when it was started; one that could not be
-        started has no last words.
+        started has no log lines.
         """
         for name, record in after.items():
             failed = before[name].state in RUNNING and record.state in _ENDED

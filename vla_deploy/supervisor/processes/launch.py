@@ -1,8 +1,7 @@
 """Become another Python program that gets SIGTERM when the supervisor ends, however it ends.
 
-Run as a script, `launch.py SUPERVISOR_PID NICE PYTHON COMMAND...`, before the program: so it holds
-for programs that know nothing of it, and no Python code runs between fork and exec of a threaded
-process.
+Run as a script, `launch.py SUPERVISOR_PID NICE PYTHON COMMAND...`: so it works for every program,
+and no Python code runs between fork and exec of a threaded process.
 """
 
 import ctypes
@@ -20,10 +19,10 @@ def main() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != supervisor_pid:  # it died before the request was in place
         sys.exit(f"the supervisor, pid {supervisor_pid}, has already ended")
-    # What an aborted process tells is its traceback; cores of this size would fill the disk.
+    # An aborted process writes its traceback; core files of this size would fill the disk.
     resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
-    # To load a large program takes seconds, in which it is in the way of what matters more. Less
-    # than the supervisor's own may be forbidden: the program asks for that itself, and tells if so.
+    # A large program loads for seconds and must not delay the others. A lower nice than the
+    # supervisor's may be forbidden: the program asks for that itself, and logs a refusal.
     os.setpriority(os.PRIO_PROCESS, 0, max(nice, os.getpriority(os.PRIO_PROCESS, 0)))
     os.execv(program[0], program)
 

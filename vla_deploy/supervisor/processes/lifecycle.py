@@ -10,7 +10,7 @@ from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.supervisor.table import GivingUp, ProcessSpec, RestartPolicy
 
 ABORT_GRACE_NS = NS_PER_S
-"""How long a process that hangs may take to write down where it hung, before it is killed."""
+"""How long a process that hangs may take to write its traceback before it is killed."""
 
 
 class ProcessState(Enum):
@@ -27,16 +27,18 @@ class ProcessState(Enum):
     STOPPED = "stopped"
 
 
-_SETTLED = (ProcessState.READY.value, ProcessState.OFF.value)
+SETTLED = frozenset({ProcessState.READY, ProcessState.OFF})
+TROUBLED = frozenset({ProcessState.ABORTING, ProcessState.BACKOFF, ProcessState.GIVEN_UP})
 
 
 def is_settled(table: Mapping[str, Any]) -> bool:
     """Return whether a published process table shows every process ready that should run."""
-    return bool(table["processes"]) and all(row["state"] in _SETTLED for row in table["processes"])
+    states = [ProcessState(row["state"]) for row in table["processes"]]
+    return bool(states) and SETTLED.issuperset(states)
 
 
 class ProcessAct(Enum):
-    """Name what is to be done to a process; ABORT lets it tell where it hangs, then it ends."""
+    """Name what is done to a process; ABORT ends it with a traceback of where it hangs."""
 
     SPAWN = "spawn"
     TERMINATE = "terminate"
@@ -46,7 +48,7 @@ class ProcessAct(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessRecord:
-    """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop.
+    """Record one process; `until_ns` ends its back-off, its start, its abortion or its stop.
 
     `failures` counts since it last ran stably; `failed_ns` are the last failures' times, stable
     runs or not.
@@ -67,7 +69,7 @@ class ProcessRecord:
 class ProcessSeen:
     """Report what was observed of one process; `exit_code` is None while it runs.
 
-    `silence` tells which topic it has not written for longer than the table allows, `refused` why
+    `silence` names the topic it has not written for longer than the table allows, `refused` is why
     the computer could not start it.
     """
 
@@ -99,7 +101,7 @@ def reconcile(
 ) -> tuple[dict[str, ProcessRecord], tuple[Action, ...]]:
     """Return the new records and what is to be done, in order.
 
-    `unwanted` tells why a process shall not run; the last of them in the table stops first.
+    `unwanted` maps each process that must not run to the reason; the last in the table stops first.
     """
     stopped, stops = _end(table, records, seen, unwanted, ProcessState.OFF, now_ns)
     after = dict(stopped)
@@ -115,7 +117,7 @@ def reconcile(
         after[spec.name] = record
         if act is not None:
             actions.append((act, spec.name))
-        all_before_work &= _lets_others_go(spec, record)
+        all_before_work &= _permits_next(spec, record)
     return after, tuple(actions)
 
 
@@ -162,9 +164,8 @@ def _end(
     return after, tuple(actions)
 
 
-def _lets_others_go(spec: ProcessSpec, record: ProcessRecord) -> bool:
-    """Return whether those after it may start: not when it never worked at all, unless they can do
-    without it."""
+def _permits_next(spec: ProcessSpec, record: ProcessRecord) -> bool:
+    """Return whether the rows after it may start: it is ready, or given up and dispensable."""
     dispensable = record.was_ready or spec.giving_up is GivingUp.CARRY_ON
     return record.state is ProcessState.READY or (
         record.state is ProcessState.GIVEN_UP and dispensable
@@ -174,9 +175,7 @@ def _lets_others_go(spec: ProcessSpec, record: ProcessRecord) -> bool:
 def _run_step(
     spec: ProcessSpec, record: ProcessRecord, seen: ProcessSeen, *, may_go: bool, now_ns: int
 ) -> Step:
-    if (
-        record.state is ProcessState.STOPPING
-    ):  # wanted again while it stops: it ends, then starts anew
+    if record.state is ProcessState.STOPPING:  # wanted again: it ends, then starts
         return _stop_step(spec, record, seen, may_go=True, now_ns=now_ns)
     if record.state in RUNNING:
         return _watch(spec, record, seen, now_ns)
@@ -234,7 +233,7 @@ def _failed(
     failed = replace(
         record, failures=failures, failed_ns=failed_ns, exit_code=seen.exit_code, reason=why
     )
-    # What the file or the wiring says will not change by trying again before it ever worked.
+    # A wrong file stays wrong: trying again cannot help what never worked.
     if seen.exit_code == EXIT_CONFIGURATION and not record.was_ready:
         return replace(failed, state=ProcessState.GIVEN_UP)
     if failures > policy.max_restarts:
@@ -251,14 +250,6 @@ def _failed(
 def delay_s(policy: RestartPolicy, failures: int) -> float:
     """Return how long a process that has failed so often in a row waits for its next start."""
     return min(policy.initial_s * policy.factor ** (failures - 1), policy.cap_s)
-
-
-def give_up_s(spec: ProcessSpec) -> float:
-    """Return how long a process that never gets ready is tried at most before it is given up."""
-    policy = spec.restart
-    once_s = spec.ready_timeout_s + ABORT_GRACE_NS / NS_PER_S
-    pauses_s = sum(delay_s(policy, failures) for failures in range(1, policy.max_restarts + 1))
-    return (policy.max_restarts + 1) * once_s + pauses_s
 
 
 def _end_in_words(seen: ProcessSeen) -> str:
@@ -286,7 +277,7 @@ def _stop_step(
 
 
 def describe_exit(exit_code: int) -> str:
-    """Say in words how a process ended; a negative code is the signal that killed it."""
+    """Return in words how a process ended; a negative code is the signal that killed it."""
     if exit_code == EXIT_DEVICE_ABSENT:
         return f"a device is absent: exit code {exit_code}"
     return f"killed by signal {-exit_code}" if exit_code < 0 else f"exit code {exit_code}"

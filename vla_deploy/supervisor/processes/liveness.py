@@ -1,8 +1,9 @@
-"""Judge by its data whether a process is alive: age, rate and validity of what it writes."""
+"""Judge by its data and its files whether a process is ready, and whether it stays alive."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +12,35 @@ from platforms import Profile
 from vla_deploy.ipc import BY_NAME, Sample, SharedSpace
 from vla_deploy.supervisor.table import ProcessSpec, Watched
 
+
+class Readiness:
+    """Judge one process of the table by the topic and the files that it promises."""
+
+    def __init__(self, spec: ProcessSpec, run_dir: Path, space: SharedSpace, clock: Clock) -> None:
+        self._files = tuple(run_dir / name for name in spec.ready_files)
+        self._clock = clock
+        self._deadline_s = BY_NAME[spec.ready_topic].deadline_s if spec.ready_topic else 0.0
+        self._reader = space.cell_reader(spec.ready_topic) if spec.ready_topic else None
+
+    def forget(self) -> None:
+        """Remove what an earlier instance has left, before the next one starts."""
+        for path in self._files:
+            path.unlink(missing_ok=True)
+
+    def is_ready(self, pid: int) -> bool:
+        """Return whether the instance `pid` has done all it promises."""
+        return all(path.exists() for path in self._files) and self.is_fresh(pid)
+
+    def is_fresh(self, pid: int) -> bool:
+        """Return whether its topic, if it has one, is young and written by `pid`."""
+        if self._reader is None:
+            return True
+        sample = self._reader.latest()
+        if sample is None or sample.writer_pid != pid:
+            return False
+        return sample.age_s(self._clock.now_ns()) <= self._deadline_s
+
+
 WINDOW_S = 5.0
 
 
@@ -18,7 +48,7 @@ WINDOW_S = 5.0
 class Vital:
     """Report one watched topic; `rate_hz` is None until a window is full, `least_hz` is its limit.
 
-    `faults` are what is in it and cannot be; `alarms` say all that is wrong, for people.
+    `faults` are its invalid contents; `alarms` say all that is wrong, for people.
     """
 
     topic: str
@@ -43,7 +73,7 @@ class Liveness:
         self._pulses = [_Pulse(spec.name, row, space, profile) for row in spec.watched]
 
     def begin(self) -> None:
-        """Start over with an instance that is ready now: what it does not write counts from now."""
+        """Start over with an instance that is ready now: its silence counts from now on."""
         now_ns = self._clock.now_ns()
         for pulse in self._pulses:
             pulse.begin(now_ns)
@@ -57,7 +87,7 @@ class Liveness:
     def examine(self, pid: int, rate_ratio: float = 1.0) -> tuple[Vital, ...]:
         """Return age, rate and alarms of every topic; call it at a steady pace.
 
-        `rate_ratio` is the share of its rate at which the process is told to work.
+        `rate_ratio` is the share of its rate at which the process must work.
         """
         now_ns = self._clock.now_ns()
         return tuple(pulse.examine(pid, now_ns, rate_ratio) for pulse in self._pulses)
@@ -143,7 +173,7 @@ class _Pulse:
 
 
 def faults_of(sample: Sample | None) -> tuple[str, ...]:
-    """Return what cannot be in a topic: numbers that are none, documents that are no JSON."""
+    """Return the invalid contents of a topic: numbers not finite, documents that are not JSON."""
     if sample is None:
         return ()
     if sample.dtype is None:
@@ -159,13 +189,3 @@ def faults_of(sample: Sample | None) -> tuple[str, ...]:
         for name in floats
         if not np.isfinite(record[name]).all()
     )
-
-
-def liveness_of(
-    table: tuple[ProcessSpec, ...],
-    space: SharedSpace,
-    clock: Clock,
-    profile: Callable[[], Profile],
-) -> Mapping[str, Liveness]:
-    """Return the judge of each process."""
-    return {spec.name: Liveness(spec, space, clock, profile) for spec in table}

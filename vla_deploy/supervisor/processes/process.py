@@ -15,8 +15,8 @@ _LAUNCH = str(Path(__file__).with_name("launch.py"))
 class ChildProcess:
     """Run one Python command in its own session, its output in a file.
 
-    It gets SIGTERM from the kernel when the supervisor ends, however that ends, and is as nice as
-    it shall be before it loads anything.
+    It gets SIGTERM from the kernel when the supervisor ends, however that ends, and has its nice
+    before it loads anything.
     """
 
     def __init__(
@@ -67,10 +67,10 @@ class ChildProcess:
             os.kill(self.pid, signal.SIGTERM)
 
     def abort(self) -> None:
-        """Let a child that hangs write down where, and end; one that is stopped goes on for that.
+        """End a child with a traceback; one that is stopped is continued for that.
 
-        It does nothing else on its way: the signal is waiting for its main thread when it goes on.
-        Any other thread could take a signal of the process, and would read frames that change.
+        The signal goes to its main thread, which handles it first. Any other thread could take a
+        signal of the process, and would read frames that change.
         """
         if self._is_unreaped():
             ctypes.CDLL(None).tgkill(self.pid, self.pid, int(signal.SIGABRT))

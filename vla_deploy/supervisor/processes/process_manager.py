@@ -1,35 +1,36 @@
-"""Start, watch and end the children that the decisions of `lifecycle` speak of."""
+"""Start, watch and end the child processes as `lifecycle` decides."""
 
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
-from platforms import load_profile
+from platforms import Profile
 from vla_deploy.gateways.ros.errors import RosGatewayError
 from vla_deploy.gateways.ros.launching import launch_environment
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.runtime.twin_members import MEMBERSHIPS
-from vla_deploy.supervisor.notify import hide_from_children
 from vla_deploy.supervisor.processes.lifecycle import Action, ProcessAct, ProcessSeen
-from vla_deploy.supervisor.processes.liveness import Liveness, Vital
+from vla_deploy.supervisor.processes.liveness import Liveness, Readiness, Vital
 from vla_deploy.supervisor.processes.process import ChildProcess
-from vla_deploy.supervisor.processes.readiness import Readiness
 from vla_deploy.supervisor.runs.log_files import OUTPUT_SUFFIX
 from vla_deploy.supervisor.runs.options import RunOptions
-from vla_deploy.supervisor.runs.orphans import PROCESS_VARIABLE, end_leftovers
-from vla_deploy.supervisor.runs.start_settings import nice_of, thread_limits
+from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE, end_leftovers
+from vla_deploy.supervisor.systemd import hide_from_children
 from vla_deploy.supervisor.table import ProcessSpec
 
+_THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _STDERR = 2
 _MOST_OUTPUT_BYTES = 4_000_000
 
 
-class Crew:
+class ProcessManager:
     """Hold the running children of one run."""
 
     def __init__(
@@ -37,23 +38,24 @@ class Crew:
         table: Sequence[ProcessSpec],
         options: RunOptions,
         run_dir: Path,
-        readiness: Mapping[str, Readiness],
-        liveness: Mapping[str, Liveness],
+        space: SharedSpace,
         clock: Clock,
+        profile: Callable[[], Profile],
         ros: RosSettings,
     ) -> None:
         self.started: dict[str, tuple[int, int]] = {}
         """The pid of each child that was started last, and when; none where that was refused."""
-        self.profile, self.in_force = options.profile, load_profile(options.profile)
-        """The name of the profile that a child is started with, and the profile."""
+        self.profile = options.profile
+        """The name of the profile that a child is started with."""
         self.started_under: dict[str, str] = {}
         """The profile that each child was started with."""
         self._specs = {spec.name: spec for spec in table}
         self._options = options
         self._run_dir = run_dir
-        self._readiness = readiness
-        self._liveness = liveness
+        self._readiness = {row.name: Readiness(row, run_dir, space, clock) for row in table}
+        self._liveness = {row.name: Liveness(row, space, clock, profile) for row in table}
         self._clock = clock
+        self._profile_in_force = profile
         self._ros = ros
         self._children: dict[str, ChildProcess] = {}
         self._ready: set[str] = set()
@@ -62,7 +64,7 @@ class Crew:
         self._environment = {
             **os.environ,
             RUN_ID_VARIABLE: run_dir.name,
-            "PYTHONFAULTHANDLER": "1",  # a process that hangs is aborted, and tells where it hung
+            "PYTHONFAULTHANDLER": "1",  # a process that hangs is aborted, and writes its traceback
         }
         hide_from_children(self._environment)
         if not journal_stream(os.environ, _STDERR):
@@ -103,7 +105,7 @@ class Crew:
         }
 
     def forgive_silence(self) -> None:
-        """Let silence count from now, as after nobody has looked for a while."""
+        """Count silence from now on, as after a time in which it was not measured."""
         for name in self._ready:
             self._liveness[name].begin()
 
@@ -113,7 +115,7 @@ class Crew:
             _bound(self._output_path(name))
 
     def kill_all(self) -> None:
-        """End every child at once, and what any of them has left behind."""
+        """Kill every child, and what any of them has started."""
         for child in self._children.values():
             child.kill()
         end_leftovers(self._run_dir.name)
@@ -138,12 +140,12 @@ class Crew:
             end_leftovers(self._run_dir.name, name)
 
     def _signal(self, name: str, send: Callable[[ChildProcess], None]) -> None:
-        """Signal a child, unless the computer could not start it: then nobody is there."""
+        """Signal a child, unless the computer could not start it."""
         if name in self._children:
             send(self._children[name])
 
     def _spawn(self, name: str) -> None:
-        """Start a child; where the computer has no room for it, remember why."""
+        """Start a child; where the computer cannot, note why."""
         self._refused.pop(name, None)
         try:
             child = self._new_child(name)
@@ -168,17 +170,19 @@ class Crew:
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
         python, variables = self._interpreter(spec)
+        settings = self._profile_in_force().processes.get(name)
+        threads = dict.fromkeys(_THREAD_VARIABLES, str(settings.threads)) if settings else {}
         return ChildProcess(
             replace(self._options, profile=self.profile).fill(command, self._run_dir),
             {
                 **self._environment,
-                **thread_limits(self.in_force, name),
+                **threads,
                 **variables,
                 **self._options.variables.get(name, {}),
                 PROCESS_VARIABLE: name,
             },
             self._output_path(name),
-            nice_of(self.in_force, name),
+            settings.nice if settings else 0,
             python,
         )
 
@@ -197,4 +201,4 @@ def _bound(path: Path) -> None:
         if path.stat().st_size > _MOST_OUTPUT_BYTES:
             os.truncate(path, 0)
     except FileNotFoundError:
-        return  # somebody has tidied up: what has no name any more, nobody can shorten
+        return  # removed from outside: without a name it cannot be shortened

@@ -1,16 +1,83 @@
-"""Measure the memory and CPU of the run's processes."""
+"""Measure the memory and CPU of the run's processes; see proc_pid_stat(5)."""
 
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from drivers.clock import NS_PER_S
-from vla_deploy.supervisor.processes.proc_files import (
-    ProcessStat,
-    read_all_stats,
-    read_pss_bytes,
-    read_stat,
-)
+
+_PROC = Path("/proc")
+_ENDED_STATES = ("Z", "X")
+# Counted after the name and the bracket that closes it, which may itself hold brackets.
+_STATE, _PARENT, _USER, _SYSTEM, _START, _RSS = 0, 1, 11, 12, 19, 21
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+_GONE = (FileNotFoundError, ProcessLookupError)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcessStat:
+    """Describe a process; its start, in clock ticks since boot, tells pids used again apart."""
+
+    pid: int
+    parent: int
+    ended: bool
+    start_ticks: int
+    cpu_s: float
+    rss_bytes: int
+
+
+def read_stat(pid: int) -> ProcessStat | None:
+    """Return the state and the use of a process, or None when there is none.
+
+    Raises:
+        PermissionError: it may not be known.
+    """
+    try:
+        text = (_PROC / str(pid) / "stat").read_text()
+    except _GONE:
+        return None
+    fields = text.rpartition(")")[2].split()
+    return ProcessStat(
+        pid=pid,
+        parent=int(fields[_PARENT]),
+        ended=fields[_STATE] in _ENDED_STATES,
+        start_ticks=int(fields[_START]),
+        cpu_s=(int(fields[_USER]) + int(fields[_SYSTEM])) / _TICKS_PER_S,
+        rss_bytes=int(fields[_RSS]) * _PAGE_BYTES,
+    )
+
+
+def read_all_stats() -> dict[int, ProcessStat]:
+    """Return every process of the computer that may be known, by its pid."""
+    pids = (int(path.name) for path in _PROC.iterdir() if path.name.isdecimal())
+    return {pid: stat for pid in pids if (stat := _read_if_known(pid)) is not None}
+
+
+def _read_if_known(pid: int) -> ProcessStat | None:
+    # Mounted with hidepid=1, /proc lists other users' processes and opens none of their files.
+    try:
+        return read_stat(pid)
+    except PermissionError:
+        return None
+
+
+def read_pss_bytes(pid: int) -> int | None:
+    """Return a process' memory with shared pages counted once, or None when there is none.
+
+    The kernel walks all its pages for this: read it rarely.
+
+    Raises:
+        PermissionError: it may not be known.
+    """
+    try:
+        lines = (_PROC / str(pid) / "smaps_rollup").read_text().splitlines()
+    except _GONE:
+        return None
+    kilobytes = next((line.split()[1] for line in lines if line.startswith("Pss:")), None)
+    return None if kilobytes is None else 1024 * int(kilobytes)
+
 
 _MB = 1_000_000
 _FAMILY_PERIOD_NS = 2 * NS_PER_S
@@ -33,9 +100,8 @@ class Usage:
 class UsageMeter:
     """Keep the CPU time of every process and the peak memory of all together.
 
-    What a process has started itself counts as its own; who that is, is looked up every 2 s.
-    Memory is PSS, which counts shared pages once; RSS stands in where PSS cannot be read, and
-    `memory_kind` says so.
+    The descendants of a process count as its own; they are looked up every 2 s. Memory is PSS,
+    which counts shared pages once, or RSS where PSS cannot be read; `memory_kind` says which.
     """
 
     def __init__(self, start_ns: int) -> None:
@@ -79,9 +145,9 @@ class UsageMeter:
 
 
 class _Memory:
-    """Know the PSS of processes without asking for it often: it is dear, and RSS is cheap.
+    """Keep the PSS of processes, which is expensive to read, up to date by their RSS.
 
-    Who has grown or shrunk is measured anew at once, the others one at a time, in turn.
+    A process whose RSS has changed is measured at once, the others one at a time, in turn.
     """
 
     def __init__(self) -> None:
@@ -89,7 +155,7 @@ class _Memory:
         self._measured: dict[Instance, tuple[int, int]] = {}
 
     def refresh(self, stats: list[ProcessStat]) -> None:
-        """Measure who needs it, and forget who has ended."""
+        """Measure the processes that need it, and forget those that have ended."""
         present = {_instance(stat): stat for stat in stats}
         self._measured = {key: each for key, each in self._measured.items() if key in present}
         longest_ago = next(iter(self._measured), None)
@@ -99,7 +165,7 @@ class _Memory:
                 self._measured[key] = self._measure(stat), stat.rss_bytes
 
     def bytes_of(self, stat: ProcessStat) -> int:
-        """Return what was measured last, with what RSS has changed by since."""
+        """Return the last measurement plus the change of RSS since."""
         pss_bytes, rss_bytes = self._measured[_instance(stat)]
         return max(pss_bytes + stat.rss_bytes - rss_bytes, 0)
 
@@ -123,7 +189,7 @@ def _instance(stat: ProcessStat) -> Instance:
 
 
 def _running(family: list[Instance]) -> list[ProcessStat]:
-    """Return those that still are; the CPU time of one that ended meanwhile stays counted."""
+    """Return those that still run; the CPU time of one that has ended stays counted."""
     stats = (read_stat(pid) for pid, _ in family)
     return [
         stat for stat in stats if stat is not None and not stat.ended and _instance(stat) in family
@@ -131,7 +197,7 @@ def _running(family: list[Instance]) -> list[ProcessStat]:
 
 
 def _families(pids: Mapping[str, int]) -> dict[str, list[Instance]]:
-    """Group the named processes with their descendants, by one look at the process list."""
+    """Group the named processes with their descendants, by one read of the process list."""
     names = {pid: name for name, pid in pids.items()}
     known = read_all_stats()
     families: dict[str, list[Instance]] = {

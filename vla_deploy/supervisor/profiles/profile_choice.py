@@ -1,4 +1,4 @@
-"""Remember which profile a person has chosen, for the next start."""
+"""Keep which profile a person has chosen, for the next start."""
 
 import json
 import os
@@ -19,7 +19,7 @@ _MOST_CHARACTERS: Final = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartProfile:
-    """Name the profile that a start takes, and why; `fault` tells why it is not the chosen one."""
+    """Name the profile that a start takes, and why; `fault` is why it is not the chosen one."""
 
     name: str
     why: str
@@ -62,8 +62,8 @@ def choice_of(runtime_base: Path | None) -> ProfileChoice:
 def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> StartProfile:
     """Return the profile to start with when none is given.
 
-    A chosen one that does not load any more, as after its file or its release has gone, keeps no
-    robot down: the detected one is taken, and the fault told. The choice stays as it is.
+    A chosen one that no longer loads, as after its file or its release was removed, does not keep
+    the robot down: the detected one is taken, with the fault. The choice stays as it is.
     """
     name, why = detect(root)
     chosen = choice_of(runtime_base).load()

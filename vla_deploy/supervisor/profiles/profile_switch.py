@@ -1,6 +1,7 @@
 """Take the running robot to another profile: prepare, commit, watch, keep - or go back."""
 
 import itertools
+import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from typing import Final
@@ -13,28 +14,30 @@ from platforms.power_switch import PowerSwitch
 from platforms.profile import profile_from
 from platforms.profile_source import read_source
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profiles import profile_change
 from vla_deploy.supervisor.profiles.profile_change import (
+    LIMITS_S,
+    RESTART_S,
     ChangeOutcome,
     ChangePhase,
     Member,
     ProfileChange,
+    ProfileReport,
     ProfileRequest,
 )
 from vla_deploy.supervisor.profiles.profile_choice import ProfileChoice
-from vla_deploy.supervisor.profiles.profile_members import CONTROL, Allegiance
-from vla_deploy.supervisor.profiles.profile_report import ProfileReport
 from vla_deploy.supervisor.profiles.profile_trial import ProfileTrial
 
+CONTROL: Final = "control"
 _MB: Final = 1_000_000
 _DISARMED: Final = "disarmed"
+_log = logging.getLogger(__name__)
 
 
 class ProfileSwitch:
     """Own the profile that is in force; `profile` names what a process that starts now gets.
 
-    All or none of the processes change. Until a change is kept nothing is written down, so that a
-    supervisor that ends meanwhile leaves the old profile.
+    All or none of the processes change. Until a change is kept nothing is written to disk, so that
+    a supervisor that ends in between leaves the old profile.
     """
 
     def __init__(
@@ -46,14 +49,14 @@ class ProfileSwitch:
         choice: ProfileChoice,
         power: PowerSwitch,
         executor: Executor,
-        watch_s: float = profile_change.WATCH_S,
+        watch_s: float = LIMITS_S[ChangePhase.WATCH],
         on_change: Callable[[Profile], None] | None = None,
         fault: str = "",
     ) -> None:
         """Listen from now on; after a commit everything is watched for `watch_s`.
 
-        `on_change` hears which profile is in force before the processes do; `fault` tells why the
-        profile is not the chosen one, until another one is kept.
+        `on_change` gets the profile in force before the processes do; `fault` is why the profile
+        is not the chosen one, until another one is kept.
         """
         self.fault = fault
         self.profile = self._kept = name
@@ -62,7 +65,7 @@ class ProfileSwitch:
         self._choice = choice
         self._power = power
         self._executor = executor
-        self._watch_ns = _ns(watch_s)
+        self._limits_s = {**LIMITS_S, ChangePhase.WATCH: watch_s}
         self._on_change = on_change
         self._power_set: Future[str] | None = None
         self._requests = space.ring_reader("profile_request", from_start=False)
@@ -72,10 +75,10 @@ class ProfileSwitch:
         self._trial = ProfileTrial(space, clock)
         self._ids = itertools.count(1)
         self._change: ProfileChange | None = None
-        self._allegiance = Allegiance()
-        self._phases: Mapping[
-            ChangePhase, Callable[[ProfileChange, Mapping[str, Member]], None]
-        ] = {
+        self._members: Mapping[str, Member] = {}
+        self._runs_under: dict[tuple[str, int], str] = {}
+        """The profile that a process, by name and pid, took over while it ran; "" where unknown."""
+        self._phases: Mapping[ChangePhase, Callable[[ProfileChange], None]] = {
             ChangePhase.PREPARE: self._preparing,
             ChangePhase.SET_POWER: self._setting_power,
             ChangePhase.COMMIT: self._committing,
@@ -87,23 +90,20 @@ class ProfileSwitch:
     def step(self, members: Mapping[str, Member], absent: Mapping[str, str]) -> tuple[str, ...]:
         """Go on; return which processes are to be started again.
 
-        `members` are ready and follow profiles, `absent` are on their way up, with their state.
+        `members` are ready and follow profiles, `absent` are starting, with their state.
         """
+        self._members = members
         for event in self._requests.drain():
-            self._take(ProfileRequest.of(event.payload), members, absent)
+            self._take(ProfileRequest.of(event.payload), absent)
         answers = [event.payload for event in self._answers.drain()]
         change = self._change
-        if change is None:
-            self._report.tell(self._kept, self._change, self.fault)
-            return self._allegiance.strangers(
-                members, self.profile, may_restart_control=self._trial.control_state == _DISARMED
-            )
-        for answer in answers:
-            change.note(answer)
-        self._look_for_dead(change, members)
-        self._phases[change.phase](change, members)
-        self._report.tell(self._kept, self._change, self.fault)
-        return self._to_restart(change, members)
+        if change is not None:
+            for answer in answers:
+                change.note(answer)
+            self._look_for_dead(change)
+            self._phases[change.phase](change)
+        self._report.publish(self._kept, self._change, self.fault)
+        return self._strangers() if change is None else self._to_restart(change)
 
     def close(self) -> None:
         """Give up what the executor runs."""
@@ -111,9 +111,7 @@ class ProfileSwitch:
 
     # --- a request ----------------------------------------------------------------------------
 
-    def _take(
-        self, request: ProfileRequest, members: Mapping[str, Member], absent: Mapping[str, str]
-    ) -> None:
+    def _take(self, request: ProfileRequest, absent: Mapping[str, str]) -> None:
         try:
             source = read_source(request.profile)
             target = profile_from(source)
@@ -123,19 +121,15 @@ class ProfileSwitch:
         except ProfileError as error:
             self._report.conclude(request, ChangeOutcome.REFUSED, "; ".join(error.faults), 0.0)
             return
-        now_ns = self._clock.now_ns()
         self._trial.begin()
-        change = ProfileChange(
+        self._change = ProfileChange(
             change_id=next(self._ids),
             request=request,
             target=target,
-            values=source.values,
-            pids={name: member.pid for name, member in members.items()},
-            began_ns=now_ns,
-            deadline_ns=now_ns + _ns(profile_change.PREPARE_S),
+            pids={name: member.pid for name, member in self._members.items()},
+            began_ns=self._clock.now_ns(),
         )
-        self._change = change
-        self._publish(change, "prepare", values=change.values)
+        self._enter(self._change, ChangePhase.PREPARE, values=source.values)
 
     def _refuse_if_busy(self, absent: Mapping[str, str]) -> None:
         if self._change is not None:
@@ -147,91 +141,70 @@ class ProfileSwitch:
 
     # --- phases -------------------------------------------------------------------------------
 
-    def _preparing(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
+    def _preparing(self, change: ProfileChange) -> None:
         if self._is_waiting(change):
             return
         refusals = self._settle_restarts(change)
-        if refusals:
+        if refusals or change.request.dry_run:
             self._go_back(change, _listed(refusals))
-        elif change.request.dry_run:
-            self._go_back(change, "")
-        else:
-            self._set_power(change)
+            return
+        change.power_before = self._power.current() if change.target.power_mode else ""
+        self._enter(change, ChangePhase.SET_POWER)
+        self._power_set = self._executor.submit(self._power.set, change.target.power_mode)
 
     def _settle_restarts(self, change: ProfileChange) -> dict[str, str]:
-        """Set aside who may be restarted, and return the refusals that remain."""
+        """Set aside the processes that may be restarted; return the refusals that remain."""
         refusals = dict(change.refusals)
         for name, reason in change.refusals.items():
             if not change.answers[name]["restart"]:
                 continue
             if not change.request.allow_restart:
                 refusals[name] = f"needs a restart: {reason}; permit it with --allow-restart"
-            elif name == CONTROL and self._trial.control_state != _DISARMED:
+            elif name == CONTROL and not self._is_disarmed:
                 refusals[name] = f"needs a restart: {reason}; disarm first"
             else:
                 change.restarts[name] = change.answers[name]["pace_ratio"]
                 del refusals[name]
         return refusals
 
-    def _set_power(self, change: ProfileChange) -> None:
-        change.enter(ChangePhase.SET_POWER, self._clock.now_ns(), _ns(profile_change.SET_POWER_S))
-        change.power_before = self._power.current() if change.target.power_mode else ""
-        self._power_set = self._executor.submit(self._power.set, change.target.power_mode)
-
-    def _setting_power(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
+    def _setting_power(self, change: ProfileChange) -> None:
         assert self._power_set is not None
         if not self._power_set.done():
-            if self._clock.now_ns() >= change.deadline_ns:
+            if self._is_late(change):
                 self._go_back(change, f"power mode {change.target.power_mode}: not set in time")
             return
-        failure = self._power_set.result()
-        if failure:
+        if failure := self._power_set.result():
             self._go_back(change, failure)
             return
-        self._commit(change)
-
-    def _commit(self, change: ProfileChange) -> None:
         change.committed = True
         self._put_in_force(change.request.profile, change.target)
-        limit_s = profile_change.RESTART_S if change.restarts else profile_change.COMMIT_S
-        change.enter(ChangePhase.COMMIT, self._clock.now_ns(), _ns(limit_s))
-        self._publish(change, "commit")
+        self._enter(change, ChangePhase.COMMIT, RESTART_S if change.restarts else None)
 
-    def _committing(self, change: ProfileChange, members: Mapping[str, Member]) -> None:
-        back = {
-            name
-            for name in change.restarts
-            if name in members and members[name].pid != change.pids[name]
-        }
-        if self._is_waiting(change, tuple(change.restarts.keys() - back)):
+    def _committing(self, change: ProfileChange) -> None:
+        pids = {name: member.pid for name, member in self._members.items()}
+        restarting = tuple(
+            name for name in change.restarts if name not in pids or pids[name] == change.pids[name]
+        )
+        if self._is_waiting(change, restarting):
             return
         if change.refusals:
             self._go_back(change, _listed(change.refusals))
             return
-        restarted = change.settle({name: member.pid for name, member in members.items()})
+        restarted = change.settle(pids)
         self._trial.begin()
-        self._watch(change, restarted, again=[])
+        self._enter(change, ChangePhase.WATCH, restarted=restarted, again=[])
 
-    def _watch(
-        self, change: ProfileChange, restarted: Mapping[str, float], again: list[str]
-    ) -> None:
-        change.enter(ChangePhase.WATCH, self._clock.now_ns(), self._watch_ns)
-        self._publish(change, "watch", restarted=restarted, again=again)
+    def _watching(self, change: ProfileChange) -> None:
+        if self._is_late(change):
+            self._enter(change, ChangePhase.VALIDATE)
 
-    def _watching(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
-        if self._clock.now_ns() >= change.deadline_ns:
-            limit_ns = _ns(profile_change.VALIDATE_S)
-            change.enter(ChangePhase.VALIDATE, self._clock.now_ns(), limit_ns)
-            self._publish(change, "validate")
-
-    def _validating(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
+    def _validating(self, change: ProfileChange) -> None:
         if self._is_waiting(change):
             return
-        faults = [*self._trial.faults(change.target)]
-        slow = change.refusals
+        faults, slow = [*self._trial.faults(change.target)], change.refusals
         if slow and not (faults or change.was_slow or CONTROL in slow):
             change.was_slow = True
-            self._watch(change, {}, again=[*slow])
+            self._enter(change, ChangePhase.WATCH, restarted={}, again=[*slow])
             return
         faults += [_listed(slow)] if slow else []
         if faults:
@@ -248,20 +221,20 @@ class ProfileSwitch:
         self._publish(change, "keep")
         self._kept, self._kept_profile = self.profile, self.in_force
         self.fault = ""
-        self._allegiance.adopt(change.pids)
+        self._runs_under = dict.fromkeys(change.pids.items(), self.profile)
         self._end(change, ChangeOutcome.KEPT, "")
 
-    def _rolling_back(self, change: ProfileChange, _: Mapping[str, Member]) -> None:
-        power_due = self._power_set is not None and not self._power_set.done()
-        late = self._clock.now_ns() >= change.deadline_ns
-        if (change.silent or power_due) and not late:
+    def _rolling_back(self, change: ProfileChange) -> None:
+        power = self._power_set
+        is_waiting = change.silent or (power is not None and not power.done())
+        if is_waiting and not self._is_late(change):
             return
         reason = change.failure
         if change.silent:
             reason += f"; {', '.join(change.silent)} did not go back and is started again"
-            self._allegiance.doubt({name: change.pids[name] for name in change.silent})
-        if self._power_set is not None and self._power_set.done() and self._power_set.result():
-            reason += f"; {self._power_set.result()}"
+            self._runs_under |= {(name, change.pids[name]): "" for name in change.silent}
+        if power is not None and power.done() and power.result():
+            reason += f"; {power.result()}"
         self._power_set = None
         if change.request.dry_run and not reason:
             self._end(change, ChangeOutcome.WOULD_WORK, _restart_note(change))
@@ -277,49 +250,72 @@ class ProfileSwitch:
             if change.power_before
             else None
         )
-        change.enter(ChangePhase.ROLLBACK, self._clock.now_ns(), _ns(profile_change.ROLLBACK_S))
-        self._publish(change, "rollback")
+        self._enter(change, ChangePhase.ROLLBACK)
 
     def _put_in_force(self, name: str, profile: Profile) -> None:
         self.profile, self.in_force = name, profile
         if self._on_change is not None:
             self._on_change(profile)
 
+    def _is_late(self, change: ProfileChange) -> bool:
+        return self._clock.now_ns() >= change.deadline_ns
+
     def _is_waiting(self, change: ProfileChange, restarting: tuple[str, ...] = ()) -> bool:
         """Return whether answers may still come; when it is too late for them, go back."""
         missing = (*change.silent, *restarting)
-        if not missing:
-            return False
-        if self._clock.now_ns() >= change.deadline_ns:
+        if missing and self._is_late(change):
             self._go_back(change, f"{', '.join(missing)}: no answer to {change.phase} in time")
-        return True
+        return bool(missing)
 
-    # --- processes that come and go -----------------------------------------------------------
+    # --- processes that end, and those to start again -----------------------------------------
 
-    def _look_for_dead(self, change: ProfileChange, members: Mapping[str, Member]) -> None:
+    def _look_for_dead(self, change: ProfileChange) -> None:
         ended_for_it = change.restarts.keys() if change.committed else frozenset()
         dead = [
             name
             for name, pid in change.pids.items()
-            if name not in ended_for_it and (name not in members or members[name].pid != pid)
+            if name not in ended_for_it and not self._is_running(name, pid)
         ]
-        if not dead:
-            return
         for name in dead:
             del change.pids[name]
-        if change.phase is not ChangePhase.ROLLBACK:
+        if dead and change.phase is not ChangePhase.ROLLBACK:
             self._go_back(change, f"{', '.join(dead)} ended meanwhile")
 
-    def _to_restart(self, change: ProfileChange, members: Mapping[str, Member]) -> tuple[str, ...]:
+    def _is_running(self, name: str, pid: int) -> bool:
+        return name in self._members and self._members[name].pid == pid
+
+    def _to_restart(self, change: ProfileChange) -> tuple[str, ...]:
         if change.phase is not ChangePhase.COMMIT:
             return ()
+        return tuple(name for name in change.restarts if self._is_running(name, change.pids[name]))
+
+    def _strangers(self) -> tuple[str, ...]:
+        """Return the processes that may run under another profile, control only when disarmed."""
         return tuple(
             name
-            for name in change.restarts
-            if name in members and members[name].pid == change.pids[name]
+            for name, member in self._members.items()
+            if self._runs_under.get((name, member.pid), member.started_under) != self.profile
+            and (name != CONTROL or self._is_disarmed)
         )
 
-    # --- tell ---------------------------------------------------------------------------------
+    @property
+    def _is_disarmed(self) -> bool:
+        return self._trial.control_state == _DISARMED
+
+    # --- publishing ---------------------------------------------------------------------------
+
+    def _enter(
+        self,
+        change: ProfileChange,
+        phase: ChangePhase,
+        limit_s: float | None = None,
+        **more: object,
+    ) -> None:
+        """Begin a phase, and publish it where the processes take part."""
+        limit_s = self._limits_s[phase] if limit_s is None else limit_s
+        change.enter(phase, self._clock.now_ns() + round(limit_s * NS_PER_S))
+        if phase is not ChangePhase.SET_POWER:
+            self._publish(change, phase.value, **more)
 
     def _publish(self, change: ProfileChange, phase: str, **more: object) -> None:
         profile = change.request.profile
@@ -340,13 +336,25 @@ def _refuse_small_computer(profile: Profile) -> None:
         raise ProfileError((f"budgets.total.memory_mb: {text}",))
 
 
-def _ns(duration_s: float) -> int:
-    return round(duration_s * NS_PER_S)
-
-
 def _listed(refusals: Mapping[str, str]) -> str:
     return "; ".join(f"{name}: {reason}" for name, reason in refusals.items())
 
 
 def _restart_note(change: ProfileChange) -> str:
     return f"with a restart of {', '.join(sorted(change.restarts))}" if change.restarts else ""
+
+
+def set_at_start(power: PowerSwitch, mode: str) -> None:
+    """Set the power mode of the profile that a run starts under, which may take seconds.
+
+    After a failure the robot runs in the mode that there is.
+    """
+    try:
+        power.check(mode)
+        failure = power.set(mode)
+    except ProfileError as error:
+        failure = "; ".join(error.faults)
+    if failure:
+        _log.warning("degraded: %s", failure)
+    elif mode:
+        _log.info("power mode %s", mode)

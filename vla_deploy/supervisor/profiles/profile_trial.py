@@ -5,14 +5,14 @@ from typing import Any, Final
 
 from drivers.clock import Clock
 from platforms import Profile
-from vla_deploy.ipc import CellReader, SharedSpace
+from vla_deploy.ipc import SharedSpace
 
 _MAX_LATE_RATIO: Final = 0.05
 _OLD_STATUS_S: Final = 1.0
 
 
 class ProfileTrial:
-    """Compare what control and the processes tell with what they told before the change."""
+    """Compare what control and the processes publish with what they published before the change."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
         self._control = space.cell_reader("control_status")
@@ -27,7 +27,7 @@ class ProfileTrial:
         return str(self._status().get("state", ""))
 
     def begin(self) -> None:
-        """Remember the ticks so far: a computer that was late before is not blamed for more."""
+        """Note the ticks so far: a computer that was late before may be as late after."""
         self._before = self._status()
         ticks = max(self._before.get("tick", 1), 1)
         share = self._before.get("late_ticks", 0) / ticks
@@ -57,11 +57,7 @@ class ProfileTrial:
                 yield f"{row['name']}: {used_mb:.0f} MB, expected {budget.memory_mb:g} MB at most"
 
     def _status(self) -> dict[str, Any]:
-        return _young(self._control, self._clock)
-
-
-def _young(reader: CellReader, clock: Clock) -> dict[str, Any]:
-    sample = reader.latest()
-    if sample is None or sample.age_s(clock.now_ns()) > _OLD_STATUS_S:
-        return {}
-    return sample.document()
+        sample = self._control.latest()
+        if sample is None or sample.age_s(self._clock.now_ns()) > _OLD_STATUS_S:
+            return {}
+        return sample.document()

@@ -1,12 +1,15 @@
-"""Read the log files of a run, while it goes on or after its end."""
+"""Read the log files of a run, and keep logs and crash reports in bounded folders."""
 
 import json
 import logging
 import os
+import shutil
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from vla_deploy.runtime.logs import LOGS_DIR
 
 OUTPUT_SUFFIX = ".out"
 """What a process and its libraries write past the log: crashes of the interpreter, warnings."""
@@ -78,12 +81,12 @@ def last_output(folder: Path, process: str, count: int) -> list[str]:
 
 def as_line(line: LogLine) -> str:
     """Return a line of the log for a person."""
-    told = f"{line['time']} {line['process']}: {line['level']}: {line['message']}"
-    return f"{told}\n{line['traceback']}" if "traceback" in line else told
+    text = f"{line['time']} {line['process']}: {line['level']}: {line['message']}"
+    return f"{text}\n{line['traceback']}" if "traceback" in line else text
 
 
 class LogTail:
-    """Return what one process has logged since the last look, across rotations."""
+    """Follow the log of one process, across rotations."""
 
     def __init__(self, folder: Path, process: str) -> None:
         self._path = folder / f"{process}{LOG_SUFFIX}"
@@ -112,3 +115,69 @@ def _parsed(lines: list[str]) -> Iterator[LogLine]:
             continue  # cut off by the end of its writer, or by a full disk
         if isinstance(parsed, dict) and "message" in parsed:
             yield parsed
+
+
+LAST_LINES = 12
+
+
+def last_words(run_dir: Path, process: str) -> list[str]:
+    """Return the last lines of a process' log, then what it has written past it."""
+    folder = run_dir / LOGS_DIR
+    logged = [as_line(line) for line in read_log(folder, process)[-LAST_LINES:]]
+    return [*logged, *last_output(folder, process, LAST_LINES)]
+
+
+def complaint(run_dir: Path, process: str) -> str:
+    """Return the last error of a process in one line, without its name; "" when there is none."""
+    folder = run_dir / LOGS_DIR
+    errors = [line["message"] for line in read_log(folder, process) if line["level"] == "ERROR"]
+    if errors:
+        return str(errors[-1])
+    output = last_output(folder, process, 1)
+    return output[-1].removeprefix(f"{process}: ") if output else ""
+
+
+_DIGITS = 6
+
+
+class BoundedFolder:
+    """Number what it keeps, newest last, and remove the oldest beyond `keep`.
+
+    Numbers, not times, say what is newer: a computer without a battery clock starts in the past.
+    """
+
+    def __init__(self, path: Path, keep: int) -> None:
+        self.path = path
+        self._keep = keep
+
+    def entries(self) -> list[Path]:
+        """Return what is kept, the oldest first."""
+        return [path for _, path in sorted(self._numbered())]
+
+    def claim(self, name: str) -> Path:
+        """Return the path for the next entry, and make room for it.
+
+        Raises:
+            OSError: the folder cannot be written.
+        """
+        self.path.mkdir(mode=0o755, parents=True, exist_ok=True)
+        numbered = sorted(self._numbered())
+        for _, path in numbered[: max(0, len(numbered) - self._keep + 1)]:
+            _remove(path)
+        number = numbered[-1][0] + 1 if numbered else 1
+        return self.path / f"{number:0{_DIGITS}d}-{name}"
+
+    def _numbered(self) -> Iterator[tuple[int, Path]]:
+        if not self.path.is_dir():
+            return
+        for path in self.path.iterdir():
+            number = path.name.partition("-")[0]
+            if number.isdecimal():
+                yield int(number), path
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

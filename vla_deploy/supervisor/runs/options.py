@@ -1,4 +1,4 @@
-"""Say what one run of the robot is made of."""
+"""Declare the options of one run of the robot."""
 
 import os
 from collections.abc import Mapping
@@ -12,10 +12,9 @@ from drivers.twin_page import TwinPace
 class RunOptions:
     """Choose robot, profile and world; `arm` arms the robot once everything is ready.
 
-    `profile_fault` tells why the profile is not the one that was chosen.
-
-    `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes;
-    `pace` says how its time goes.
+    `profile_fault` is why the profile is not the one that was chosen.
+    `viewer` shows the twin in a window; `paced` gives the bytes on its buses their time; `pace`
+    chooses its time.
     `ros` puts the robot into a ROS 2 graph, whatever its file and the profile say.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
     `variables` are added to the environment of single processes, and may hold keys; the run's log

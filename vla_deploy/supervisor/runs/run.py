@@ -3,7 +3,8 @@
 import logging
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +20,16 @@ from vla_deploy.runtime.journal import JOURNAL_SOCKET
 from vla_deploy.runtime.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
 from vla_deploy.runtime.twin_members import SUPERVISOR
 from vla_deploy.supervisor.budgets import open_keeper
-from vla_deploy.supervisor.directives import Directives
 from vla_deploy.supervisor.health import Health
-from vla_deploy.supervisor.notify import Notifier, NotifyTarget
 from vla_deploy.supervisor.processes.crash_reports import CrashReports, crash_folder
-from vla_deploy.supervisor.processes.liveness import liveness_of
-from vla_deploy.supervisor.processes.process_manager import Crew
-from vla_deploy.supervisor.processes.readiness import readiness_of
-from vla_deploy.supervisor.profiles.power_at_start import set_at_start
+from vla_deploy.supervisor.processes.process_manager import ProcessManager
 from vla_deploy.supervisor.profiles.profile_choice import choice_of
-from vla_deploy.supervisor.profiles.profile_switch import ProfileSwitch
+from vla_deploy.supervisor.profiles.profile_switch import ProfileSwitch, set_at_start
 from vla_deploy.supervisor.report import ProcessTableWriter
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import Runtime, default_base
 from vla_deploy.supervisor.runs.serial_workers import SerialWorkers
+from vla_deploy.supervisor.systemd import Notifier, NotifyTarget
 from vla_deploy.supervisor.table import ProcessSpec
 
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -41,7 +38,7 @@ _log = logging.getLogger(__name__)
 
 
 class Run:
-    """Own the run's directory, its shared memory, its children and who reports on them."""
+    """Own the run's directory, its shared memory, its children and what reports on them."""
 
     def __init__(
         self,
@@ -53,96 +50,66 @@ class Run:
         on_stop_signal: Callable[[], None],
         ros: RosSettings,
     ) -> None:
-        self._handlers = _handle_stop_signals(on_stop_signal)
-        try:
+        with ExitStack() as opened:
+            opened.callback(_restore_signals, _handle_stop_signals(on_stop_signal))
             self.runtime = Runtime(options.runtime_base or default_base())
-        except BaseException:
-            self._give_signals_back()
-            raise
-        try:
-            self.clock = clock or _clock_of_run(options, self.runtime.run_dir)
+            opened.callback(self.runtime.close)
+            run_dir = self.runtime.run_dir
+            self.clock = clock = clock or _clock_of_run(options, run_dir)
             """The clock of the run, by which its processes live."""
-            self._open(options, table, self.clock, profile, notify, ros)
-        except BaseException:
-            self.runtime.close()
-            self._give_signals_back()
-            raise
+            origin = LogOrigin(process="supervisor", robot=options.robot, run_id=run_dir.name)
+            journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
+            opened.enter_context(RunLog(origin, run_dir / LOGS_DIR, journal, clock))
+            self.space = SharedSpace(run_dir / "ipc", clock)
+            opened.callback(self.space.close)
+            # The kernel's workers and systemd go by the wall clock, whatever time the robot has.
+            self.notifier = Notifier(notify, MonotonicClock())
+            opened.callback(self.notifier.close)
+            self.serial_workers = SerialWorkers(MonotonicClock())
+            opened.callback(self.serial_workers.close)
+            self.budgets = open_keeper(
+                profile, self.space, clock, self.runtime.state_dir, options.probe_root
+            )
+            opened.callback(self.budgets.close)
+            self.switch = self._open_switch(options, profile())
+            opened.callback(self.switch.close)
+            self.processes = ProcessManager(
+                table, options, run_dir, self.space, clock, profile, ros
+            )
+            opened.callback(self.processes.kill_all)
+            self.report = ProcessTableWriter(run_dir.name, options, self.space, clock)
+            self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
+            crashes = crash_folder(self.runtime.state_dir)
+            self.crashes = CrashReports(crashes, run_dir, options, self.space, clock)
+            self._log_start(options)
+            self._opened = opened.pop_all()
 
-    def _open(
-        self,
-        options: RunOptions,
-        table: tuple[ProcessSpec, ...],
-        clock: Clock,
-        profile: Callable[[], Profile],
-        notify: NotifyTarget,
-        ros: RosSettings,
-    ) -> None:
-        run_dir = self.runtime.run_dir
-        self.space = SharedSpace(run_dir / "ipc", clock)
-        self.crew = Crew(
-            table,
-            options,
-            run_dir,
-            readiness_of(table, run_dir, self.space, clock),
-            liveness_of(table, self.space, clock, profile),
-            clock,
-            ros,
-        )
-        self.report = ProcessTableWriter(self.runtime.run_id, options, self.space, clock)
-        self.budgets = open_keeper(
+    def close(self) -> None:
+        """End the children that are left, keep the logs, remove the run, restore the signals."""
+        self._opened.close()
+
+    def _open_switch(self, options: RunOptions, profile: Profile) -> ProfileSwitch:
+        power, executor = PowerSwitch(), low_priority_thread(self.clock)
+        executor.submit(set_at_start, power, profile.power_mode)
+        return ProfileSwitch(
+            options.profile,
             profile,
             self.space,
-            clock,
-            state_dir=self.runtime.state_dir,
-            probe_root=options.probe_root,
-        )
-        self.directives = Directives(self.space)
-        power, executor = PowerSwitch(), low_priority_thread(clock)
-        self.switch = ProfileSwitch(
-            options.profile,
-            profile(),
-            self.space,
-            clock,
+            self.clock,
             choice_of(options.runtime_base),
             power,
             executor,
             on_change=self.budgets.adopt,
             fault=options.profile_fault,
         )
-        self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
-        # The kernel's workers and systemd go by the wall clock, whatever time the robot has.
-        self.serial_workers = SerialWorkers(MonotonicClock())
-        self.notifier = Notifier(notify, MonotonicClock())
-        self.crashes = CrashReports(
-            crash_folder(self.runtime.state_dir), run_dir, options, self.space, clock
-        )
-        origin = LogOrigin(process="supervisor", robot=options.robot, run_id=run_dir.name)
-        journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
-        self._log = RunLog(origin, run_dir / LOGS_DIR, journal, clock)
-        self._log.__enter__()
-        executor.submit(set_at_start, power, profile().power_mode)
+
+    def _log_start(self, options: RunOptions) -> None:
         if options.profile_fault:
             _log.error("%s; the run takes %s", options.profile_fault, options.profile)
         for note in options.notes:
             _log.warning("%s", note)
         if self.runtime.orphans:
             _log.warning("ended what a dead run had left: pids %s", self.runtime.orphans)
-
-    def close(self) -> None:
-        """End the children that are left, keep the logs, remove the run, restore the signals."""
-        self.crew.kill_all()
-        self.budgets.close()
-        self.switch.close()
-        self.serial_workers.close()
-        self.notifier.close()
-        self.space.close()
-        self._log.close()
-        self.runtime.close()
-        self._give_signals_back()
-
-    def _give_signals_back(self) -> None:
-        for number, handler in self._handlers.items():
-            signal.signal(number, handler)
 
 
 def _clock_of_run(options: RunOptions, run_dir: Path) -> Clock:
@@ -166,6 +133,11 @@ def _handle_stop_signals(on_stop_signal: Callable[[], None]) -> dict[signal.Sign
         for number in _STOP_SIGNALS
         if not _is_ignored_hangup(number)
     }
+
+
+def _restore_signals(handlers: Mapping[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 def _is_ignored_hangup(number: int) -> bool:

@@ -7,16 +7,19 @@ import os
 import re
 import shutil
 import stat
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Final
 
+import psutil
+
+from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.runtime.state_dir import state_dir_of, user_base
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
-from vla_deploy.supervisor.processes.proc_files import read_stat
-from vla_deploy.supervisor.runs.orphans import end_orphans
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
+from vla_deploy.supervisor.processes.usage import read_stat
+from vla_deploy.supervisor.runs.log_files import BoundedFolder
 
 SHARED_MEMORY = Path("/dev/shm")
 KEEP_LOGS_OF_RUNS = 20
@@ -27,9 +30,8 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """Identify the supervisor of a run; the start time tells it from a later process of its pid.
-
-    That is counted since the computer's start: no jump of the wall clock makes it another.
+    """Identify the supervisor of a run; the start time distinguishes it from a later
+    process of its pid, and is counted since boot: no jump of the wall clock changes it.
     """
 
     pid: int
@@ -38,13 +40,13 @@ class Owner:
     run_dir: str
 
     def is_alive(self) -> bool:
-        """Return whether that very process still runs; one that nobody has reaped does not."""
+        """Return whether that very process still runs; a zombie does not."""
         found = read_stat(self.pid)
         return found is not None and not found.ended and found.start_ticks == self.start_ticks
 
 
 def default_base() -> Path:
-    """Return where runs live unless told otherwise."""
+    """Return the default runtime directory."""
     if os.getuid() == 0:
         return Path("/run/vla-deploy")
     return user_base()
@@ -61,7 +63,7 @@ def running(base: Path) -> Owner | None:
 
 
 def free_base(base: Path) -> None:
-    """Make the runtime directory where it is missing, for what a run is derived from.
+    """Make the runtime directory if it is missing, for files that a run is derived from.
 
     Raises:
         AlreadyRunning: a supervisor holds it.
@@ -104,7 +106,7 @@ class Runtime:
         _point_to(base / "current", self.run_id)
 
     def close(self) -> None:
-        """Keep the logs, remove everything else of this run and let the next supervisor in."""
+        """Keep the logs, remove everything else of this run and release the lock."""
         _keep_logs(self.run_dir, self._old_logs)
         (self._base / "current").unlink(missing_ok=True)
         shutil.rmtree(self.ipc_dir, ignore_errors=True)
@@ -121,7 +123,7 @@ class Runtime:
         unfinished = directory.with_name(f".{directory.name}")
         unfinished.mkdir(mode=0o700)
         _write_owner(unfinished / _OWNER_FILE, self._owner)
-        unfinished.rename(directory)  # a sweeper never sees it without its owner
+        unfinished.rename(directory)  # a sweep never sees it without its owner
         link.symlink_to(directory)
         return directory
 
@@ -208,7 +210,7 @@ def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
 
 
 def _is_run(path: Path) -> bool:
-    """Return whether a folder is a run's, and not of somebody who chose the wrong directory."""
+    """Return whether a folder is a run's, not another one in a directory chosen by mistake."""
     is_named_so = _RUN_ID.fullmatch(path.name) is not None
     return is_named_so and path.is_dir() and not path.is_symlink()
 
@@ -238,3 +240,54 @@ def _point_to(link: Path, target: str) -> None:
     fresh.unlink(missing_ok=True)
     fresh.symlink_to(target)
     fresh.replace(link)
+
+
+PROCESS_VARIABLE = "VLA_DEPLOY_PROCESS"
+_TERM_WAIT_S = 1.0
+_KILL_WAIT_S = 2.0
+
+
+def run_id_of(process: psutil.Process) -> str | None:
+    """Return the run that a living process belongs to, None where it belongs to none of ours."""
+    return _environment(process).get(RUN_ID_VARIABLE)
+
+
+def end_orphans(run_ids: Collection[str]) -> list[int]:
+    """End every process of these runs, SIGTERM first; return their pids."""
+    orphans = [process for process in psutil.process_iter() if run_id_of(process) in run_ids]
+    for process in orphans:
+        _signal(process, kill=False)
+    _, stubborn = psutil.wait_procs(orphans, timeout=_TERM_WAIT_S)
+    for process in stubborn:
+        _signal(process, kill=True)
+    psutil.wait_procs(stubborn, timeout=_KILL_WAIT_S)
+    return [process.pid for process in orphans]
+
+
+def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
+    """Kill what a run's ended processes have started, wherever it has moved; return the pids.
+
+    With a name, only what that process of the table has started.
+    """
+    leftovers = []
+    for process in psutil.process_iter():
+        environment = _environment(process)
+        named = process_name in (None, environment.get(PROCESS_VARIABLE))
+        if environment.get(RUN_ID_VARIABLE) == run_id and named:
+            _signal(process, kill=True)
+            leftovers.append(process.pid)
+    return leftovers
+
+
+def _environment(process: psutil.Process) -> Mapping[str, str]:
+    try:
+        return process.environ()
+    except (psutil.AccessDenied, psutil.NoSuchProcess, OSError):
+        return {}  # another user's, a kernel thread, ended or gone: not ours
+
+
+def _signal(process: psutil.Process, *, kill: bool) -> None:
+    try:
+        process.kill() if kill else process.terminate()
+    except psutil.NoSuchProcess:
+        return

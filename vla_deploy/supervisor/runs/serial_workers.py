@@ -1,4 +1,4 @@
-"""Let what servos answer get past ordinary processes inside the kernel.
+"""Raise the kernel's workers that carry servo answers above ordinary processes.
 
 A serial port's bytes reach their reader by an unbound worker of the kernel (tty_flip_buffer_push
 queues flush_to_ldisc), which waits for a processor as any ordinary process does, whatever the
@@ -22,10 +22,10 @@ _log = logging.getLogger(__name__)
 
 
 class SerialWorkers:
-    """Keep the kernel's unbound workers above ordinary processes; closing lets them sink again.
+    """Keep the kernel's unbound workers above ordinary processes until `close`.
 
-    The kernel makes and ends them as it needs them: whenever something new has begun to run, by the
-    newest pid that it tells, and at least once a second, it is looked again.
+    The kernel makes and ends them as it needs them: they are looked for again whenever it reports a
+    new pid, and at least once a second.
     """
 
     def __init__(self, clock: Clock, proc: Path = _PROC) -> None:
@@ -38,7 +38,7 @@ class SerialWorkers:
         self._refused = False
 
     def step(self, *, wanted: bool) -> None:
-        """Raise those that are new; not `wanted` lets all sink again."""
+        """Raise new workers; if not `wanted`, restore all of them."""
         if not wanted:
             self.close()
         elif not self._refused and self._is_due():
@@ -52,7 +52,7 @@ class SerialWorkers:
         return True
 
     def _newest_pid(self) -> str:
-        """Return what proc_loadavg(5) tells last: the pid most recently made, of a thread also."""
+        """Return the last field of proc_loadavg(5): the newest pid, of a thread also."""
         return (self._proc / "loadavg").read_text().rpartition(" ")[2]
 
     def _look(self) -> None:
@@ -64,7 +64,7 @@ class SerialWorkers:
         self._known = pids - {pid for pid, name in names.items() if name == _NOT_YET_NAMED}
 
     def close(self) -> None:
-        """Give every worker that was raised its ordinary priority back."""
+        """Restore the ordinary priority of every worker that was raised."""
         for pid, name in _names(sorted(self._raised), self._proc):
             if name.startswith(UNBOUND_WORKER):
                 _schedule(pid, os.SCHED_OTHER, 0)

@@ -7,23 +7,13 @@ import pytest
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming, Profile, load_profile
 from platforms.probes import Reading
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, UsageSnapshot
+from vla_deploy.supervisor.budgets import BudgetKeeper, UsageSnapshot
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
 from vla_deploy.supervisor.processes.usage import Usage
-
-
-class StepClock:
-    def __init__(self) -> None:
-        self.ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 class ScriptedFeed:
@@ -54,7 +44,7 @@ class World:
     def __init__(self, directory: Path, profile: Profile) -> None:
         # No kernel gives out pids like these.
         self.pids = {"control": 2**30, "perception": 2**30 + 1, "planner": 2**30 + 2}
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.feed = ScriptedFeed()
         self.space = SharedSpace(directory / "ipc", self.clock)
         self.readings: dict[str, float | None] = {}
@@ -76,16 +66,14 @@ class World:
             ClaimBook(self.space, self.clock),
         )
 
-    def go(self, seconds: float, *, measured: bool = True) -> Orders:
-        orders = Orders()
+    def go(self, seconds: float, *, measured: bool = True) -> None:
         for _ in range(round(2 * seconds)):
             self.clock.ns += NS_PER_S // 2
             if measured:
                 self.measure()
-            orders = self.keeper.step(self.running)
-            self.running = {k: v for k, v in self.pids.items() if k not in orders.suspended}
-            self.restarted += orders.restart
-        return orders
+            self.restarted += self.keeper.step(self.running)
+            suspended = self.keeper.suspended
+            self.running = {k: v for k, v in self.pids.items() if k not in suspended}
 
     def measure(self) -> None:
         self.feed.snapshots.append(self._snapshot())

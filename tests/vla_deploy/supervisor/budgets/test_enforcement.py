@@ -11,8 +11,7 @@ from platforms import ProcessBudget
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused
-from vla_deploy.supervisor.budgets.judge import BudgetFinding
-from vla_deploy.supervisor.budgets.lines import Line
+from vla_deploy.supervisor.budgets.judge import BudgetFinding, Line
 
 NAME = "planner"
 BUDGETS = {NAME: ProcessBudget(memory_mb=20.0, cpu_ratio=0.5)}

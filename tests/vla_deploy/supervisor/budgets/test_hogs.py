@@ -100,10 +100,14 @@ class Stage:
             time.sleep(0.05)
 
     def pid(self, name: str) -> int | None:
+        pid: int | None = self.row(name)["pid"]
+        return pid
+
+    def row(self, name: str) -> dict:
         sample = self.supervisor.space.cell_reader("process_table").latest()
         assert sample is not None
         rows = sample.document()["processes"]
-        return next(row["pid"] for row in rows if row["name"] == name)
+        return next(row for row in rows if row["name"] == name)
 
 
 @pytest.fixture
@@ -161,10 +165,14 @@ def test_a_cpu_hog_is_held_back_then_suspended_and_comes_back(stage: Stage):
     stage.wish(planner={"busy": 1})
     budget = stage.until(lambda one: one["ladder"]["step"] == 1)
     assert steps(budget, taken=True) == ["suspend"]
-    stage.until(lambda _: stage.pid("planner") is None)
+    stage.until(lambda _: stage.row("planner")["state"] == "off")
+    assert stage.row("planner")["reason"] == "suspended by the budgets"
+    assert stage.pid("planner") is None
     stage.wish()
     stage.until(calm)
-    stage.until(lambda _: stage.pid("planner") not in (None, pid))
+    stage.until(lambda _: stage.row("planner")["state"] == "ready")
+    assert stage.pid("planner") != pid
+    assert stage.row("planner")["restarts"] == 0
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may lower nice again")

@@ -4,8 +4,7 @@ from hypothesis import strategies as st
 
 from drivers.clock import NS_PER_S
 from platforms import LadderTiming, ProcessBudget, TotalBudget
-from vla_deploy.supervisor.budgets.judge import BudgetStanding, Measurement, judge
-from vla_deploy.supervisor.budgets.lines import Line, lines_of
+from vla_deploy.supervisor.budgets.judge import BudgetStanding, Line, Measurement, judge, lines_of
 
 TIMING = LadderTiming(rise_s=2.0, fall_s=4.0, release_ratio=0.8)
 MEMORY = Line(metric="memory_mb", process="planner", limit=100.0)

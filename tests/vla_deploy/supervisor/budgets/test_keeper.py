@@ -92,8 +92,8 @@ def test_a_thermal_ramp_goes_down_the_ladder_to_the_protective_stop_and_back(wor
     for degrees in range(50, 101, 5):
         world.readings = {"temperature_c": float(degrees), "temperature_c.tj-thermal": degrees}
         world.go(2)
-    orders = world.go(10)
-    assert orders.suspended.keys() == {"planner"}
+    world.go(10)
+    assert world.keeper.suspended == {"planner"}
     budget = world.cell("budget")
     assert actions(budget["ladder"]["taken"]) == [
         "slow",
@@ -106,7 +106,8 @@ def test_a_thermal_ramp_goes_down_the_ladder_to_the_protective_stop_and_back(wor
     assert "temperature_c" in budget["reason"]
     assert world.cell("budget_stop") == {"stop": True, "reason": budget["reason"]}
     world.readings = {"temperature_c": 40.0}
-    assert world.go(60).suspended == {}
+    world.go(60)
+    assert world.keeper.suspended == set()
     assert not world.cell("budget")["stop"]
     assert world.cell("budget_stop") == {"stop": False, "reason": ""}
 
@@ -196,6 +197,7 @@ def test_another_profile_undoes_the_steps_that_it_does_not_declare(world, profil
     world.profile = replace(profile, ladder=profile.ladder[1:])
     world.go(0.5)
     assert world.cell("resource_directives")["rate_ratio"] == {"perception": 0.25}
+    assert world.keeper.rate_ratios == {"perception": 0.25}
 
 
 def test_what_a_profile_change_undoes_is_logged_counted_and_shown(world, profile, caplog):

@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming
-from vla_deploy.supervisor.budgets.judge import Measurement, judge
+from vla_deploy.supervisor.budgets.judge import Line, Measurement, judge
 from vla_deploy.supervisor.budgets.ladder import EMERGENCY, LadderMove, LadderState, Pressure, climb
-from vla_deploy.supervisor.budgets.lines import Line
 
 TIMING = LadderTiming(rise_s=2.0, fall_s=5.0, release_ratio=0.8)
 SLOW = LadderStep(action=LadderAction.SLOW, process="perception", ratio=0.5)

@@ -8,8 +8,8 @@ import pytest
 from drivers.clock import MonotonicClock
 from platforms.probes import Reading
 from vla_deploy.supervisor.budgets import BackgroundSampler
-from vla_deploy.supervisor.processes import proc_files
-from vla_deploy.supervisor.processes.proc_files import read_all_stats
+from vla_deploy.supervisor.processes import usage
+from vla_deploy.supervisor.processes.usage import read_all_stats
 
 HEAT = Reading(name="temperature_c", value=50.0, unit="degC", reason="")
 
@@ -69,12 +69,12 @@ def test_a_late_reader_gets_every_round(board):
 
 
 def test_processes_that_may_not_be_known_are_left_out(monkeypatch):
-    known = proc_files.read_stat
+    known = usage.read_stat
 
-    def guarded(pid: int) -> proc_files.ProcessStat | None:
+    def guarded(pid: int) -> usage.ProcessStat | None:
         if pid != os.getpid():
             raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
         return known(pid)
 
-    monkeypatch.setattr(proc_files, "read_stat", guarded)
+    monkeypatch.setattr(usage, "read_stat", guarded)
     assert read_all_stats().keys() == {os.getpid()}

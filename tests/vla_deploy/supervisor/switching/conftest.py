@@ -10,6 +10,7 @@ import pytest
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.harness.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
@@ -21,17 +22,6 @@ from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.supervisor.profiles.profile_change import Member
 from vla_deploy.supervisor.profiles.profile_choice import ProfileChoice
 from vla_deploy.supervisor.profiles.profile_switch import ProfileSwitch
-
-
-class StepClock:
-    def __init__(self) -> None:
-        self.ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 class Kernel:
@@ -105,7 +95,7 @@ class Supervision:
         self.switch.close()
 
 
-class Desk:
+class ProfileClient:
     """Ask for profiles as the command line does, and read what comes of it."""
 
     def __init__(self, space: SharedSpace, run_until: Callable[[Callable[[], bool], float], bool]):
@@ -137,7 +127,7 @@ class Desk:
         return last
 
 
-def adapting(
+def reconfigurable(
     name: str,
     node: Node,
     profile: Profile,
@@ -155,13 +145,13 @@ class Bench:
     """Hold four nodes without devices and the switch; every node steps every 50 ms."""
 
     def __init__(self, folder: Path, profile: str) -> None:
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.ipc = folder / "ipc"
         self.space = SharedSpace(self.ipc, self.clock)
         self.control_status = self.space.cell_writer("control_status")
         self.table = self.space.cell_writer("process_table")
         self.directives = self.space.cell_writer("resource_directives")
-        self.desk = Desk(self.space, self.run_until)
+        self.client = ProfileClient(self.space, self.run_until)
         self.choice = ProfileChoice(folder / "state" / "profile.json")
         self.root = folder / "root"
         self.late_ticks = 0
@@ -169,7 +159,7 @@ class Bench:
         self.dead: set[str] = set()
         self.workers = {name: Worker() for name in ("control", "perception", "planner", "executor")}
         self.kernels = {name: Kernel() for name in self.workers}
-        self.asides: dict[str, Executor] = {name: InlineExecutor() for name in self.workers}
+        self.executors: dict[str, Executor] = {name: InlineExecutor() for name in self.workers}
         self.nodes: dict[str, ReconfigurableNode] = {}
         for name in self.workers:
             self.start(name, profile)
@@ -180,14 +170,14 @@ class Bench:
 
     def start(self, name: str, profile: str) -> None:
         """Start a process, also anew."""
-        self.nodes[name] = adapting(
+        self.nodes[name] = reconfigurable(
             name,
             self.workers[name],
             load_profile(profile),
             self.ipc,
             self.clock,
             self.kernels[name],
-            self.asides[name],
+            self.executors[name],
         )
         self.nodes[name].start()
 
@@ -228,7 +218,7 @@ class Bench:
         return True
 
     def reach(self, phase: str) -> None:
-        assert self.run_until(lambda: self.desk.status.get("phase") == phase, 60.0)
+        assert self.run_until(lambda: self.client.status.get("phase") == phase, 60.0)
 
     def names(self) -> set[str]:
         """Return the profiles that the nodes run under."""
@@ -242,7 +232,7 @@ class TwinRig:
         self.lockstep = step = Lockstep(tmp_path=folder)
         ipc, declared = folder / "ipc", load_profile(profile)
         space = SharedSpace(ipc, step.clock)
-        self.desk = Desk(space, step.run_until)
+        self.client = ProfileClient(space, step.run_until)
         self.joints = space.cell_reader("joint_state")
         self._control_status = space.cell_reader("control_status")
         self._operator = space.ring_writer("operator")
@@ -254,7 +244,9 @@ class TwinRig:
             "executor": ExecutorNode(step.context, step.robot, declared.executor_rate_hz),
         }
         for name, node in nodes.items():
-            step.add(adapting(name, node, declared, ipc, step.clock, Kernel(), InlineExecutor()))
+            step.add(
+                reconfigurable(name, node, declared, ipc, step.clock, Kernel(), InlineExecutor())
+            )
         switch = ProfileSwitch(
             profile,
             declared,

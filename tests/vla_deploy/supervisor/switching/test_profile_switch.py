@@ -1,11 +1,17 @@
+""""""
+
+import logging
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivers.clock import NS_PER_S
+from platforms.power_switch import PowerSwitch
 from vla_deploy.runtime.node import NeedsRestart
 from vla_deploy.supervisor.profiles.profile_change import Member
+from vla_deploy.supervisor.profiles.profile_switch import set_at_start
 
 NAMES = ("control", "perception", "planner", "executor")
 
@@ -23,17 +29,17 @@ def keeps_swift(bench: Any) -> None:
     """Check that nothing is left of a change."""
     assert bench.names() == {"swift"}
     assert bench.choice.load() is None
-    assert bench.desk.status["phase"] == ""
+    assert bench.client.status["phase"] == ""
     for worker in bench.workers.values():
         assert worker.alive == {worker.content} == {"first"}
 
 
 def test_every_process_switches_and_the_choice_is_kept(bench, profiles):
-    last = bench.desk.use(profiles["calm"])
+    last = bench.client.use(profiles["calm"])
     assert (last["outcome"], last["reason"]) == ("kept", "")
     assert bench.names() == {"calm"}
-    assert bench.choice.load() == bench.desk.status["profile"] == profiles["calm"]
-    assert bench.desk.status["begun_with"] == profiles["swift"]
+    assert bench.choice.load() == bench.client.status["profile"] == profiles["calm"]
+    assert bench.client.status["begun_with"] == profiles["swift"]
     bench.tick()
     for worker in bench.workers.values():
         assert worker.alive == {worker.content} != {"first"}
@@ -45,17 +51,17 @@ def test_that_the_chosen_profile_does_not_load_is_told_until_another_is_kept(ben
     fault = "the chosen profile /home/me/mine.toml does not load: Permission denied"
     bench.supervision = bench.supervise(profiles["swift"], fault)
     bench.tick()
-    assert bench.desk.status["fault"] == fault
-    bench.desk.use(profiles["calm"], dry_run=True)
-    assert bench.desk.status["fault"] == fault
-    bench.desk.use(profiles["calm"])
-    assert bench.desk.status["fault"] == ""
+    assert bench.client.status["fault"] == fault
+    bench.client.use(profiles["calm"], dry_run=True)
+    assert bench.client.status["fault"] == fault
+    bench.client.use(profiles["calm"])
+    assert bench.client.status["fault"] == ""
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_profile_that_one_process_refuses_changes_nothing(bench, profiles, hinder, name):
     reason = hinder(bench, name)
-    last = bench.desk.use(profiles["calm"])
+    last = bench.client.use(profiles["calm"])
     assert (last["outcome"], last["reason"]) == ("refused", f"{name}: {reason}")
     keeps_swift(bench)
 
@@ -63,7 +69,7 @@ def test_a_profile_that_one_process_refuses_changes_nothing(bench, profiles, hin
 @pytest.mark.parametrize("name", NAMES)
 def test_a_process_that_is_too_slow_after_the_switch_takes_all_of_them_back(bench, profiles, name):
     bench.workers[name].is_slow = True
-    last = bench.desk.use(profiles["calm"])
+    last = bench.client.use(profiles["calm"])
     assert last["outcome"] == "rolled back"
     assert last["reason"].startswith(f"{name}: steps at 20.")
     assert "expected 800.0 Hz" in last["reason"]
@@ -72,53 +78,53 @@ def test_a_process_that_is_too_slow_after_the_switch_takes_all_of_them_back(benc
 
 
 def test_a_process_that_others_held_up_for_a_moment_takes_nothing_back(bench, profiles):
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     bench.dead.add("planner")
     began_ns = bench.clock.ns
     assert bench.run_until(lambda: bench.clock.ns > began_ns + NS_PER_S, 20.0)
     bench.dead.discard("planner")
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "kept"
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "kept"
 
 
 def test_late_ticks_take_all_of_them_back(bench, profiles):
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     bench.late_ticks = 60
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "rolled back"
-    assert "ticks late, expected 5% at most" in bench.desk.last["reason"]
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "rolled back"
+    assert "ticks late, expected 5% at most" in bench.client.last["reason"]
     keeps_swift(bench)
 
 
 def test_whoever_holds_processes_back_hears_of_a_profile_before_they_do(bench, profiles):
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     bench.late_ticks = 60
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.run_until(lambda: bench.client.last, 20.0)
     assert bench.adopted == [("calm", {"swift"}), ("swift", {"calm"})]
 
 
 def test_a_process_over_its_memory_takes_all_of_them_back(bench, profiles):
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     bench.table.put_document({"processes": [{"name": "planner", "memory_mb": 151.0}]})
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "rolled back"
-    assert bench.desk.last["reason"] == "planner: 151 MB, expected 150 MB at most"
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "rolled back"
+    assert bench.client.last["reason"] == "planner: 151 MB, expected 150 MB at most"
     keeps_swift(bench)
 
 
 def test_a_dry_run_prepares_and_changes_nothing(bench, profiles):
-    assert bench.desk.use(profiles["calm"], dry_run=True)["outcome"] == "would work"
+    assert bench.client.use(profiles["calm"], dry_run=True)["outcome"] == "would work"
     keeps_swift(bench)
 
 
 def test_a_preparation_that_hangs_is_given_up_in_time(bench, profiles):
-    bench.asides["planner"] = Never()
+    bench.executors["planner"] = Never()
     bench.start("planner", profiles["swift"])
-    last = bench.desk.use(profiles["calm"])
+    last = bench.client.use(profiles["calm"])
     assert (last["outcome"], last["reason"]) == (
         "refused",
         "planner: no answer to prepare in time",
@@ -131,9 +137,9 @@ def test_a_preparation_that_comes_too_late_is_discarded(bench, profiles):
     pool = ThreadPoolExecutor(1)
     gate: Future[None] = Future()
     waiting = pool.submit(gate.result)
-    bench.asides["planner"] = pool
+    bench.executors["planner"] = pool
     bench.start("planner", profiles["swift"])
-    assert bench.desk.use(profiles["calm"])["outcome"] == "refused"
+    assert bench.client.use(profiles["calm"])["outcome"] == "refused"
     gate.set_result(None)
     waiting.result()
     pool.shutdown(wait=True)
@@ -143,23 +149,23 @@ def test_a_preparation_that_comes_too_late_is_discarded(bench, profiles):
 @pytest.mark.parametrize("phase", ["prepare", "commit", "watch"])
 def test_a_process_that_dies_meanwhile_takes_all_of_them_back(bench, profiles, phase):
     if phase == "prepare":
-        bench.asides["executor"] = Never()
+        bench.executors["executor"] = Never()
         bench.start("executor", profiles["swift"])
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch" if phase == "watch" else "prepare")
     if phase == "commit":
         bench.dead.add("planner")
-        assert bench.run_until(lambda: bench.desk.status["phase"] in ("commit", "rollback"), 60.0)
+        assert bench.run_until(lambda: bench.client.status["phase"] in ("commit", "rollback"), 60.0)
     bench.dead.add("planner")
     del bench.supervision.members["planner"]
-    assert bench.run_until(lambda: bench.desk.last, 60.0)
-    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    assert bench.run_until(lambda: bench.client.last, 60.0)
+    assert bench.client.last["reason"].startswith("planner ended meanwhile")
     assert bench.supervision.switch.profile == profiles["swift"]
     assert {bench.nodes[name].profile.name for name in NAMES if name != "planner"} == {"swift"}
 
 
 def test_a_supervisor_that_ends_in_mid_switch_leaves_the_old_choice(bench, profiles):
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     assert bench.names() == {"calm"}
     assert bench.choice.load() is None
@@ -168,7 +174,7 @@ def test_a_supervisor_that_ends_in_mid_switch_leaves_the_old_choice(bench, profi
 def test_a_process_that_starts_after_the_switch_gets_the_new_profile(bench, profiles):
     switch = bench.supervision.switch
     assert switch.profile == profiles["swift"]
-    bench.desk.use(profiles["calm"])
+    bench.client.use(profiles["calm"])
     assert (switch.profile, switch.in_force.name) == (profiles["calm"], "calm")
 
 
@@ -179,6 +185,21 @@ def test_a_process_that_started_under_a_profile_that_was_rolled_back_is_started_
     bench.supervision.members["planner"] = stranger
     bench.tick()
     assert bench.supervision.restarts == ["planner"]
+
+
+@pytest.mark.parametrize("name", ["planner", "control"])
+def test_a_process_that_does_not_confirm_the_way_back_is_started_again(bench, profiles, name):
+    bench.client.request(profiles["calm"])
+    bench.reach("watch")
+    bench.dead.add(name)
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert f"{name} did not go back and is started again" in bench.client.last["reason"]
+    bench.tick()
+    assert set(bench.supervision.restarts) == {name} - {"control"}, "control is armed"
+    bench.state = "disarmed"
+    bench.tick()
+    bench.tick()
+    assert set(bench.supervision.restarts) == {name}
 
 
 def test_control_is_started_again_only_when_disarmed(bench, profiles):
@@ -202,14 +223,14 @@ def restart_on_request(bench: Any, name: str) -> None:
 
 def test_a_process_that_needs_it_is_restarted_when_that_is_allowed(bench, profiles):
     bench.workers["planner"].refusal = NeedsRestart("other threads")
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
 
     def ended() -> bool:
         restart_on_request(bench, "planner")
-        return bool(bench.desk.last)
+        return bool(bench.client.last)
 
     assert bench.run_until(ended, 60.0)
-    assert (bench.desk.last["outcome"], bench.names()) == ("kept", {"calm"})
+    assert (bench.client.last["outcome"], bench.names()) == ("kept", {"calm"})
 
 
 def reach_with_restart(bench: Any, name: str, phase: str) -> None:
@@ -218,22 +239,22 @@ def reach_with_restart(bench: Any, name: str, phase: str) -> None:
 
     def reached() -> bool:
         restart_on_request(bench, name)
-        return bench.desk.status.get("phase") == phase
+        return bench.client.status.get("phase") == phase
 
     assert bench.run_until(reached, 60.0)
 
 
 @pytest.mark.parametrize("phase", ["watch", "judging"])
 def test_a_restarted_process_that_dies_takes_all_of_them_back(bench, profiles, phase):
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
     reach_with_restart(bench, "planner", "watch")
     if phase == "judging":
         bench.dead.add("planner")
-        assert bench.run_until(lambda: bench.desk.status["phase"] == "validate", 20.0)
+        assert bench.run_until(lambda: bench.client.status["phase"] == "validate", 20.0)
     del bench.supervision.members["planner"]
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "rolled back"
-    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "rolled back"
+    assert bench.client.last["reason"].startswith("planner ended meanwhile")
     assert {bench.nodes[name].profile.name for name in NAMES if name != "planner"} == {"swift"}
     assert bench.choice.load() is None
 
@@ -241,30 +262,30 @@ def test_a_restarted_process_that_dies_takes_all_of_them_back(bench, profiles, p
 def test_a_process_that_dies_before_it_is_to_be_restarted_ends_the_change(bench, profiles):
     bench.supervision = bench.supervise(profiles["swift"], executor=Never())
     bench.workers["planner"].refusal = NeedsRestart("other threads")
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
     bench.reach("set power mode")
     bench.supervision.members["planner"] = Member(pid=2, started_under=profiles["swift"])
-    assert bench.run_until(lambda: bench.desk.last, 5.0)
-    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    assert bench.run_until(lambda: bench.client.last, 5.0)
+    assert bench.client.last["reason"].startswith("planner ended meanwhile")
     keeps_swift(bench)
 
 
 def test_a_restarted_process_that_hangs_is_not_kept(bench, profiles):
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
     reach_with_restart(bench, "planner", "watch")
     bench.dead.add("planner")
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "rolled back"
-    assert bench.desk.last["reason"].startswith("planner: no answer to validate in time")
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "rolled back"
+    assert bench.client.last["reason"].startswith("planner: no answer to validate in time")
 
 
 def test_a_restarted_process_that_is_too_slow_takes_all_of_them_back(bench, profiles):
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
     bench.workers["planner"].period_s = 0.001
     reach_with_restart(bench, "planner", "watch")
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "rolled back"
-    assert bench.desk.last["reason"].startswith("planner: steps at 20.")
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "rolled back"
+    assert bench.client.last["reason"].startswith("planner: steps at 20.")
     bench.tick()
     assert bench.supervision.restarts == ["planner"], "it runs under the profile that was refused"
 
@@ -272,26 +293,26 @@ def test_a_restarted_process_that_is_too_slow_takes_all_of_them_back(bench, prof
 def test_a_restarted_process_need_not_be_faster_than_it_was_before(bench, profiles):
     bench.workers["planner"].period_s = 0.03
     assert bench.run_until(lambda: bench.workers["planner"].steps > 1000, 60.0)
-    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.client.request(profiles["calm"], allow_restart=True)
     reach_with_restart(bench, "planner", "watch")
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "kept", "20 Hz of 33 Hz, as before"
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "kept", "20 Hz of 33 Hz, as before"
 
 
 def test_a_process_that_came_under_the_old_profile_meanwhile_is_started_again(bench, profiles):
     late = bench.supervision.members.pop("planner")
-    bench.desk.request(profiles["calm"])
+    bench.client.request(profiles["calm"])
     bench.reach("watch")
     bench.supervision.members["planner"] = late
-    assert bench.run_until(lambda: bench.desk.last, 20.0)
-    assert bench.desk.last["outcome"] == "kept"
+    assert bench.run_until(lambda: bench.client.last, 20.0)
+    assert bench.client.last["outcome"] == "kept"
     bench.tick()
     assert set(bench.supervision.restarts) == {"planner"}
 
 
 def test_control_is_not_restarted_while_it_is_armed(bench, profiles):
     bench.workers["control"].refusal = NeedsRestart("bus_watchdog_s")
-    last = bench.desk.use(profiles["calm"], allow_restart=True)
+    last = bench.client.use(profiles["calm"], allow_restart=True)
     assert (last["outcome"], last["reason"]) == (
         "refused",
         "control: needs a restart: bus_watchdog_s; disarm first",
@@ -302,7 +323,7 @@ def test_control_is_not_restarted_while_it_is_armed(bench, profiles):
 def test_a_faulty_profile_never_reaches_a_process(bench, profiles, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text('inherits = "desktop"\ncontrol_rate_hz = 5000\n')
-    last = bench.desk.use(str(path))
+    last = bench.client.use(str(path))
     assert last["outcome"] == "refused"
     assert f"{path}: control_rate_hz: expected a number from 50 to 1000 Hz" in last["reason"]
     keeps_swift(bench)
@@ -313,18 +334,61 @@ def test_a_profile_for_more_memory_than_there_is_never_reaches_a_process(bench, 
     path.write_text(
         'inherits = "desktop"\nboard.memory_mb = 250000\nbudgets.total.memory_mb = 240000000e-3\n'
     )
-    last = bench.desk.use(str(path))
+    last = bench.client.use(str(path))
     assert last["outcome"] == "refused"
     assert "that this computer has, got 240000" in last["reason"]
 
 
 def test_one_change_at_a_time_and_only_when_everyone_is_ready(bench, profiles):
-    first = bench.desk.request(profiles["calm"])
+    first = bench.client.request(profiles["calm"])
     bench.reach("watch")
-    second = bench.desk.use(profiles["swift"])
+    second = bench.client.use(profiles["swift"])
     assert second["outcome"] == "refused"
     assert "is under way: wait for its end" in second["reason"]
-    assert bench.run_until(lambda: bench.desk.last["request_id"] == first, 20.0)
+    assert bench.run_until(lambda: bench.client.last["request_id"] == first, 20.0)
     bench.supervision.absent = {"planner": "starting"}
-    last = bench.desk.use(profiles["swift"])
+    last = bench.client.use(profiles["swift"])
     assert last["reason"] == "planner is starting: wait until it is ready"
+
+
+SECTION = "< POWER_MODEL ID={} NAME={} >\nTPC_POWER_GATING TPC_PG_MASK {}\n"
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> PowerSwitch:
+    """Describe a board in mode 15W whose nvpmodel does what it is told."""
+    modes = ((0, "15W", 0), (1, "25W", 0), (3, "7W", 252))
+    (tmp_path / "etc").mkdir()
+    (tmp_path / "etc/nvpmodel.conf").write_text("".join(SECTION.format(*row) for row in modes))
+    status = tmp_path / "var/lib/nvpmodel/status"
+    status.parent.mkdir(parents=True)
+    status.write_text("pmode:0000\n")
+    command = tmp_path / "nvpmodel"
+    command.write_text(f'#!/bin/sh\nprintf "pmode:%04d" "$2" > {status}\n')
+    command.chmod(0o755)
+    return PowerSwitch(tmp_path, [str(command)])
+
+
+def test_a_run_starts_in_the_mode_of_its_profile(board: PowerSwitch) -> None:
+    set_at_start(board, "25W")
+    assert board.current() == "25W"
+
+
+@pytest.mark.parametrize(
+    ("mode", "said"), [("7W", "15W -> 7W needs a reboot"), ("40W", "expected one of this board")]
+)
+def test_a_mode_that_cannot_be_set_is_told_and_left(
+    board: PowerSwitch, caplog: pytest.LogCaptureFixture, mode: str, said: str
+) -> None:
+    set_at_start(board, mode)
+    assert said in caplog.text
+    assert caplog.text.startswith("WARNING")
+    assert board.current() == "15W"
+
+
+def test_a_profile_without_a_mode_says_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    set_at_start(PowerSwitch(tmp_path), "")
+    assert caplog.text == ""

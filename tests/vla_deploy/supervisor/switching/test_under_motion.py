@@ -82,7 +82,7 @@ def switch_under_motion(rig: Any, profiles: dict[str, str], count: int) -> Motio
     for number in range(count):
         if number % 8 == 0:
             rig.go(next(motions), head_pan=next(targets), left_wrist_roll=1.2 + next(targets))
-        last = rig.desk.use(profiles["calm" if number % 2 == 0 else "swift"])
+        last = rig.client.use(profiles["calm" if number % 2 == 0 else "swift"])
         assert last["outcome"] == "kept", last
         if number == count // 2:
             watch.remember_memory()

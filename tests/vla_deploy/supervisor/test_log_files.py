@@ -1,4 +1,4 @@
-from vla_deploy.supervisor.runs.state_folder import BoundedFolder
+from vla_deploy.supervisor.runs.log_files import BoundedFolder
 
 
 def fill(folder: BoundedFolder, *names: str) -> list[str]:

@@ -1,35 +1,77 @@
-"""The notify protocol against a real socket, with a clock that only the test moves."""
+"""What systemd gets to know: the status line, the notify protocol, the times of the unit."""
 
 import os
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.supervisor.notify import (
+from sim_twin.contracts.scripted import ManualClock
+from vla_deploy.supervisor.health import STATUS_AGE_S
+from vla_deploy.supervisor.processes.lifecycle import ProcessRecord, ProcessState
+from vla_deploy.supervisor.systemd import (
+    FEED_EVERY_NS,
+    RESTART_S,
+    START_BURST,
     Notifier,
     NotifySocket,
     NotifyTarget,
+    give_up_s,
     hide_from_children,
+    longest_start_s,
     notify_target,
+    start_limit_s,
+    status_line,
+    trouble_in,
+    watchdog_s,
+    with_late,
 )
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, Watched
+
+READY = ProcessRecord(state=ProcessState.READY)
+
+
+@pytest.mark.parametrize(
+    "state", [ProcessState.BACKOFF, ProcessState.GIVEN_UP, ProcessState.ABORTING]
+)
+def test_a_process_that_fails_is_trouble(state: ProcessState) -> None:
+    failing = ProcessRecord(state=state, reason="exit code 1")
+    status = status_line({"control": READY, "planner": failing}, stopping=False)
+    assert status == f"degraded: planner {state.value} (exit code 1)"
+    assert trouble_in(status) == status
+
+
+def test_what_is_late_is_trouble() -> None:
+    status = with_late("all 9 processes ready", ["bus arm: lost 3", "supervisor: held up"])
+    assert trouble_in(status) == status == "all 9 processes ready; not in time: bus arm: lost 3"
+
+
+@pytest.mark.parametrize(
+    ("state", "status"),
+    [
+        (ProcessState.READY, "all 2 processes ready"),
+        (ProcessState.STARTING, "starting planner: 1 of 2 ready"),
+        (ProcessState.OFF, "all 1 processes ready"),
+    ],
+)
+def test_what_starts_or_is_off_is_no_trouble_nor_is_another_profile(
+    state: ProcessState, status: str
+) -> None:
+    records = {"control": READY, "planner": ProcessRecord(state=state)}
+    told = status_line(records, stopping=False, fault="the chosen profile x does not load")
+    assert told == f"{status}; the chosen profile x does not load"
+    assert trouble_in(with_late(told, [])) == ""
+
 
 WATCHDOG_NS = 10 * NS_PER_S
 
 
-class StepClock:
-    time_ns = 100 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
+class StepClock(ManualClock):
     def pass_s(self, seconds: float) -> None:
-        self.time_ns += round(seconds * NS_PER_S)
+        self.ns += round(seconds * NS_PER_S)
 
 
 class Systemd:
@@ -63,7 +105,7 @@ def systemd(address: str) -> Iterator[Systemd]:
 
 @pytest.fixture
 def clock() -> StepClock:
-    return StepClock()
+    return StepClock(100 * NS_PER_S)
 
 
 @pytest.fixture
@@ -199,11 +241,11 @@ def test_the_watchdog_is_fed_every_second_or_at_half_its_interval(
     target = NotifyTarget(address=address, watchdog_ns=round(watchdog_s * NS_PER_S))
     notifier = Notifier(target, clock)
     fed_at_s = []
-    start_ns = clock.time_ns
+    start_ns = clock.ns
     for _ in range(80):  # 4 s in steps of 50 ms
         step(notifier)
         if "WATCHDOG=1" in systemd.heard():
-            fed_at_s.append((clock.time_ns - start_ns) / NS_PER_S)
+            fed_at_s.append((clock.ns - start_ns) / NS_PER_S)
         clock.pass_s(0.05)
     assert fed_at_s == pytest.approx([every_s * feed for feed in range(round(4.0 / every_s))])
     notifier.close()
@@ -235,10 +277,36 @@ def test_without_a_watchdog_nothing_is_fed(systemd, address, clock):
     notifier.close()
 
 
-def test_reloading_carries_the_time_and_ready_follows(systemd, notifier, clock):
-    step(notifier)
-    systemd.heard()
-    notifier.reloading()
-    assert systemd.heard() == [f"RELOADING=1\nMONOTONIC_USEC={clock.time_ns // 1000}"]
-    step(notifier)
-    assert "READY=1" in systemd.heard()
+CONTROL = next(row for row in TABLE if row.name == "control")
+
+
+def test_the_watchdog_waits_until_a_hanging_control_is_up_again():
+    assert watchdog_s() == 15  # 5 s silent, 1 s to tell where, 0.25 s, 8 s to start
+
+
+def test_feeding_costs_the_watchdog_no_more_than_an_ageing_status_gives_it():
+    assert STATUS_AGE_S >= FEED_EVERY_NS / 1e9
+
+
+@pytest.mark.parametrize("longer_s", [1.0, 20.0])
+def test_the_watchdog_follows_the_row(longer_s):
+    watched = (Watched(topic="control_status", silence_limit_s=5.0 + longer_s),)
+    assert watchdog_s([replace(CONTROL, watched=watched)]) == 15 + longer_s
+
+
+def test_the_longest_start_waits_for_the_rows_before_and_for_none_beside():
+    rows = (
+        ProcessSpec(name="a", command=(), ready_timeout_s=7.0),
+        ProcessSpec(name="b", command=(), ready_timeout_s=900.0, with_previous=True),
+        ProcessSpec(name="c", command=(), ready_timeout_s=20.0),
+        ProcessSpec(name="d", command=(), giving_up=GivingUp.CARRY_ON, ready_timeout_s=9999.0),
+    )
+    assert longest_start_s(rows[:1]) == give_up_s(rows[0])
+    assert longest_start_s((rows[0], rows[2])) == 7.0 + give_up_s(rows[2])
+    assert longest_start_s((rows[0], rows[3])) == give_up_s(rows[0])
+    assert longest_start_s(rows[:2]) == give_up_s(rows[1])
+
+
+def test_starts_that_fail_as_slowly_as_can_be_still_end_the_service():
+    once_s = longest_start_s() + sum(row.stop_timeout_s for row in TABLE) + RESTART_S
+    assert START_BURST * once_s <= start_limit_s() < START_BURST * once_s + 60

@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.cli.main import main
 from vla_deploy.install import InstallLayout
-from vla_deploy.install.tools import missing_tools
+from vla_deploy.install.commands import missing_tools
 
 
 class Here(InstallLayout):
