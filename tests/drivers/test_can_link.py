@@ -12,6 +12,7 @@ from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
+from sim_twin.contracts.scripted import ManualClock
 
 
 class QueueBus(can.BusABC):  # type: ignore[misc]
@@ -34,17 +35,6 @@ class QueueBus(can.BusABC):  # type: ignore[misc]
         if isinstance(item, Exception):
             raise item
         return item
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.time_ns = 0
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
 
 
 @pytest.fixture
@@ -70,7 +60,7 @@ def error_frame(classes: int, controller: int = 0) -> can.Message:
 def test_error_frames_tell_the_controllers_state(
     bus: QueueBus, frame: can.Message, state: ControllerState, words: str
 ) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     bus.incoming.append(frame)
     assert link.drain() == []
     assert link.controller is state
@@ -80,7 +70,7 @@ def test_error_frames_tell_the_controllers_state(
 
 
 def test_lost_arbitration_and_missing_acknowledgements_are_counted(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     bus.incoming.extend([error_frame(0x02), error_frame(0x20), error_frame(0x22)])
     link.drain()
     counters = link.counters
@@ -90,7 +80,7 @@ def test_lost_arbitration_and_missing_acknowledgements_are_counted(bus: QueueBus
 
 
 def test_bus_off_is_a_lost_link_with_a_remedy(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     bus.incoming.append(error_frame(0x40))
     with pytest.raises(BusOff, match="restart-ms 100"):
         link.drain()
@@ -100,7 +90,7 @@ def test_bus_off_is_a_lost_link_with_a_remedy(bus: QueueBus) -> None:
 
 
 def test_a_transmit_buffer_that_stays_full_is_named(bus: QueueBus) -> None:
-    clock = Clock()
+    clock = ManualClock()
     link = CanLink(bus, clock)
     bus.full = True
     link.send(0x123, b"a")
@@ -115,7 +105,7 @@ def test_a_transmit_buffer_that_stays_full_is_named(bus: QueueBus) -> None:
 
 
 def test_a_vanished_interface_is_a_lost_link(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     bus.incoming.append(can.CanOperationError("network is down", 100))
     with pytest.raises(LinkLost, match="network is down"):
         link.drain()
@@ -123,7 +113,7 @@ def test_a_vanished_interface_is_a_lost_link(bus: QueueBus) -> None:
 
 
 def test_noise_is_counted_and_what_follows_is_read(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     good = can.Message(arbitration_id=1, is_extended_id=False, data=b"x")
     bus.incoming.extend([ValueError("no hex"), IndexError("short"), good])
     assert [frame.arbitration_id for frame in link.drain()] == [1]
@@ -132,7 +122,7 @@ def test_noise_is_counted_and_what_follows_is_read(bus: QueueBus) -> None:
 
 
 def test_a_babbling_node_cannot_hold_the_caller_up(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     frame = can.Message(arbitration_id=1, is_extended_id=False)
     bus.incoming.extend([frame] * 1000)
     assert len(link.drain()) == 256
@@ -179,7 +169,7 @@ def test_a_frame_goes_out_with_its_own_data_whatever_went_before_it(
         sent.append((msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.dlc))
 
     monkeypatch.setattr(bus, "send", note)
-    link = CanLink(bus, Clock())
+    link = CanLink(bus, ManualClock())
     for data in (b"\x01", b"\x01", b"\x02\x03", b""):
         link.send(0x201, data)
     link.send(0x202, b"\x01")

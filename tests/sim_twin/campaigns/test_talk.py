@@ -7,25 +7,15 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.talk import CommandTalk
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
-
-
-class StepClock:
-    def __init__(self) -> None:
-        self.ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
 
 
 class Room:
     """Hold both ends of a talk."""
 
     def __init__(self, folder: Path) -> None:
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.space = SharedSpace(folder, self.clock)
         self._heard = self.space.ring_reader("utterance", from_start=False)
         self._events = self.space.ring_writer("task_event")
