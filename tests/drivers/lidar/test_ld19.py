@@ -3,8 +3,6 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.lidar.ld19 import PACKET_BYTES, Ld19, crc8
 from sim_twin.contracts.scripted import ManualClock, ScriptedLine
@@ -167,28 +165,3 @@ def test_stamps_tell_the_time_of_measurement_and_survive_the_wrap() -> None:
         assert scan.beam_stamp_ns[0] == scan.stamp_ns - 96 * 10**6
         assert scan.beam_stamp_ns[180] == scan.stamp_ns - 46 * 10**6
         assert scan.beam_stamp_ns[1] == scan.stamp_ns
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.binary(min_size=1, max_size=90), max_size=6), st.integers(1, 60))
-def test_garbage_between_packets_never_makes_a_wrong_range(garbage: list[bytes], cut: int) -> None:
-    lidar, line, _ = make()
-    packets = turn(1234) * 3 + turn(1234)[:1]
-    stream = bytearray()
-    for i, data in enumerate(packets):
-        stream += data + (garbage[i % len(garbage)] if garbage and i % 7 == 0 else b"")
-    while stream:
-        line.pending += stream[:cut]
-        del stream[:cut]
-        scan = lidar.poll()
-        if scan is not None:
-            assert set(np.unique(scan.range_m)) <= {np.float32(0.0), np.float32(1.234)}
-    assert lidar.counters.packets == 91
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.binary(max_size=500))
-def test_noise_alone_never_makes_a_scan(noise: bytes) -> None:
-    lidar, line, _ = make()
-    line.pending += noise
-    assert lidar.poll() is None
