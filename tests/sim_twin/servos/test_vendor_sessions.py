@@ -22,11 +22,12 @@ BAUD, OTHER_BAUD, OTHER_BAUD_VALUE = 1_000_000, 2_000_000, 4
 IDS = (1, 2, 3, 4)
 NUMBERS = {1: 1020, 2: 1120, 3: 1060, 4: 1070}
 BAUD_RATE, MODE, TEMPERATURE_LIMIT, TORQUE, ERRORS = (8, 1), (11, 1), (31, 1), (64, 1), (70, 1)
+P_GAIN, WATCHDOG = (84, 2), (98, 1)
 GOAL_PWM, GOAL_CURRENT, GOAL_VELOCITY, GOAL_POSITION = (100, 2), (102, 2), (104, 4), (116, 4)
 PWM, CURRENT, VELOCITY, POSITION = (124, 2), (126, 2), (128, 4), (132, 4)
 CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, PWM_MODE = 0, 1, 3, 16
 ALERT, OVERHEATING = 0x80, 0x04
-ACCESS_ERROR = 7
+RANGE_ERROR, LIMIT_ERROR, ACCESS_ERROR = 4, 6, 7
 
 Register = tuple[int, int]
 
@@ -196,6 +197,8 @@ def move_all(host: Host, goals: Sequence[int], *, fast: bool) -> None:
 def test_a_whole_session(host: Host) -> None:
     assert host.scan() == NUMBERS
     assert not host.pings(9)
+    assert host.write(1, P_GAIN, 850) == 0
+    assert host.read(1, P_GAIN) == (850, 0)
     drive_in_every_mode(host)
     for servo_id in IDS:
         change_mode(host, servo_id, POSITION_MODE)
@@ -204,6 +207,7 @@ def test_a_whole_session(host: Host) -> None:
     overheat(host, 2)
     bring_back(host, 2)
     move_all(host, [2048] * 4, fast=True)
+    trip_the_watchdog(host, 4)
 
 
 def drive_in_every_mode(host: Host) -> None:
@@ -218,6 +222,17 @@ def drive_in_every_mode(host: Host) -> None:
     change_mode(host, 3, PWM_MODE)
     assert host.write(3, GOAL_PWM, 300) == 0
     until(lambda: value(host, 3, VELOCITY) > 40 and value(host, 3, PWM) == 300)
+
+
+def trip_the_watchdog(host: Host, servo_id: int) -> None:
+    assert host.write(servo_id, GOAL_POSITION, 5_000) == LIMIT_ERROR
+    assert host.write(servo_id, TORQUE, 5) == RANGE_ERROR
+    assert host.write(servo_id, WATCHDOG, 5) == 0
+    time.sleep(0.3)  # any packet would feed it
+    assert host.read(servo_id, WATCHDOG) == (255, 0)
+    assert host.write(servo_id, GOAL_POSITION, 2_000) == RANGE_ERROR
+    assert host.write(servo_id, WATCHDOG, 0) == 0
+    assert host.write(servo_id, GOAL_POSITION, 2_000) == 0
 
 
 def overheat(host: Host, servo_id: int) -> None:
