@@ -4,6 +4,7 @@ from collections import Counter
 
 import pytest
 
+from sim_twin.campaigns.killing.failures import late, late_ready
 from sim_twin.campaigns.killing.rules import (
     COMMANDS,
     GRAVEST,
@@ -64,3 +65,9 @@ def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
 def test_what_the_robot_is_told_is_understood_by_patterns_alone(text, skill, held):
     world = world_of(load_robot("butler"), {"left": held, "right": held})
     assert skill in [action.skill for action in plan_command(text, world).actions]
+
+
+def test_only_what_comes_too_late_or_never_is_a_failure() -> None:
+    assert not list(late(1.5, 1.5, "")) + list(late(None, 9.0, "")) + list(late_ready(30.0, 30.0))
+    assert "inf" in next(late(1.5, float("inf"), "left_wheel"))
+    assert "inf" in next(late_ready(30.0, float("inf")))

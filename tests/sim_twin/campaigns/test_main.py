@@ -9,6 +9,7 @@ import pytest
 from sim_twin.campaigns import __main__ as campaigns
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.selection import NothingChosen, chosen
 
 REPORT = CampaignReport(
     campaign="faults", cases=(CampaignCase(name="servo_bus/off/idle", failures=("fell",)),)
@@ -86,3 +87,19 @@ def test_the_report_is_told_before_its_file_is_written(
     with pytest.raises(OSError, match="no space left"):
         campaigns.main(["faults", "--junit", str(tmp_path / "x.xml")])
     assert "1 cases, 1 failed" in capsys.readouterr().out
+
+
+def test_a_part_of_a_name_chooses_cases_and_one_that_chooses_none_is_refused() -> None:
+    assert chosen(["idle/off", "driving/off"], "idle", str) == ["idle/off"]
+    assert chosen(["idle/off", "driving/off"], "", str) == ["idle/off", "driving/off"]
+    assert chosen([], "", str) == []
+    with pytest.raises(NothingChosen, match="of which there are 2: idle/off, driving/off"):
+        chosen(["idle/off", "driving/off"], "typo", str)
+
+
+@pytest.mark.parametrize("campaign", ["faults", "kills", "pressure", "switches", "soak"])
+def test_every_campaign_refuses_such_a_name_before_anything_starts(
+    campaign: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert campaigns.main([campaign, "--only", "typo"]) == 2
+    assert f"validate {campaign}: --only typo" in capsys.readouterr().err

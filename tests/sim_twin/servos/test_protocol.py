@@ -3,8 +3,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.dynamixel.wire.codec import (
     ALERT,
@@ -259,37 +257,6 @@ def test_a_packet_may_arrive_in_pieces_but_not_with_a_pause(bench: Any) -> None:
     bench.bank.receive(packet[6:])
     assert bench.bank.transmit() == b""
     assert bench.send(1, Instruction.PING)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.binary(max_size=40) | st.just(b"\xff\xff\xfd\x00"), max_size=8))
-def test_noise_never_stops_the_bus_from_answering(noise: list[bytes]) -> None:
-    bank = ServoBank([EmulatedServoSpec(id=1, model_name="XM430-W350")])
-    for piece in noise:
-        bank.receive(piece)
-    bank.transmit()
-    bank.step(10_000_000)
-    bank.receive(encode_instruction(1, Instruction.PING))
-    parser = PacketParser()
-    parser.feed(bank.transmit())
-    assert ids(parser.packets()) == [1]
-
-
-@settings(max_examples=300, deadline=None)
-@given(
-    st.sampled_from([0, 1, 2, 252, BROADCAST_ID]),
-    st.integers(0, 255),
-    st.binary(max_size=24),
-)
-def test_no_well_framed_nonsense_breaks_a_servo(
-    servo_id: int, instruction: int, params: bytes
-) -> None:
-    bank = ServoBank([EmulatedServoSpec(id=n, model_name="XL430-W250") for n in (1, 2)])
-    bank.receive(encode_instruction(servo_id, instruction, params))
-    bank.transmit()
-    bank.step(10**9)
-    bank.receive(encode_instruction(BROADCAST_ID, Instruction.PING))
-    assert bank.transmit()  # two servos that were given one id answer with garbage
 
 
 @pytest.mark.parametrize("wrong", [[], [4, 4]])
