@@ -25,14 +25,14 @@ def test_a_single_value_is_told_exactly(value: int) -> None:
     assert histogram.percentile_ns(0.5) == histogram.max_ns == histogram.mean_ns == value
 
 
-@pytest.mark.parametrize("ratio", [0.01, 0.5, 0.9, 0.99, 0.999, 1.0])
 @pytest.mark.parametrize("span_ns", [20, 5_000, 3_000_000, 2 * 10**9])
-def test_percentiles_are_never_low_and_at_most_an_eighth_high(ratio: float, span_ns: int) -> None:
+def test_percentiles_are_never_low_and_at_most_an_eighth_high(span_ns: int) -> None:
     chance = random.Random(5)
-    values = [chance.randrange(span_ns) for _ in range(5000)]
-    exact = sorted(values)[max(0, -(-round(ratio * len(values) * 1000) // 1000) - 1)]
-    got = histogram_of(values).percentile_ns(ratio)
-    assert exact <= got <= exact * 9 / 8 + 1
+    values = sorted(chance.randrange(span_ns) for _ in range(5000))
+    histogram = histogram_of(values)
+    for ratio in (0.01, 0.5, 0.9, 0.99, 0.999, 1.0):
+        exact = values[max(0, -(-round(ratio * len(values) * 1000) // 1000) - 1)]
+        assert exact <= histogram.percentile_ns(ratio) <= exact * 9 / 8 + 1
 
 
 def test_what_is_beyond_the_last_bucket_or_before_the_first_is_counted() -> None:
