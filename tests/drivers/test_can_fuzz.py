@@ -20,7 +20,7 @@ from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.codec import MESSAGES, AxisState, OdriveCommand, decode, encode
 from sim_twin.contracts.scripted import ManualClock
 
-NORMAL = 20_000
+NORMAL = 5_000
 LONG = 1_000_000
 CASES = [
     pytest.param(NORMAL),

@@ -111,20 +111,6 @@ def test_a_stopped_camera_is_left_alone() -> None:
     assert not line.sent
 
 
-def test_device_time_is_mapped_by_the_least_latency_seen() -> None:
-    camera, line, clock = make()
-    latencies_ms = [30, 12, 45, 12, 80]
-    stamps = []
-    for i, latency_ms in enumerate(latencies_ms):
-        clock.ns = 10**9 + (100 * i + latency_ms) * MS
-        line.pending += frame(i, exposure_ns=77_000_000_000 + 100 * i * MS)
-        got = camera.poll()
-        assert got is not None
-        stamps.append(got.stamp_ns)
-    # From the second frame on, every stamp is the true exposure plus the least latency.
-    assert stamps[1:] == [10**9 + (100 * i + 12) * MS for i in range(1, 5)]
-
-
 def test_a_camera_that_restarts_its_clock_is_followed() -> None:
     camera, line, clock = make()
     line.pending += frame(1, exposure_ns=50_000_000_000)

@@ -65,9 +65,11 @@ def test_an_adapter_that_hears_itself_is_noticed_and_its_echo_left_out(
     assert counters.crc_errors == counters.stuffed == counters.discarded_bytes == 0
 
 
-def test_what_was_written_to_the_eeprom_is_reported(make_bench: MakeBench) -> None:
+def test_factory_settings_are_changed_once_and_reported(make_bench: MakeBench) -> None:
     bench = make_bench(2)
     setups = bench.bus.connect()
+    assert [bench.bank.register(n, "return_delay_time") for n in (1, 2)] == [0, 0]
+    assert bench.wire.count(Instruction.WRITE) == 2
     assert [setup.written for setup in setups] == [("return_delay_time 250 -> 0",)] * 2
     assert bench.bus.notices == (
         "servo 1 (joint_1, XM540-W270): set return_delay_time 250 -> 0",
@@ -76,6 +78,7 @@ def test_what_was_written_to_the_eeprom_is_reported(make_bench: MakeBench) -> No
     bus = bench.new_bus()
     assert [setup.written for setup in bus.connect()] == [(), ()]
     assert bus.notices == ()
+    assert bench.wire.count(Instruction.WRITE) == 2
 
 
 def test_a_servo_that_would_power_its_motor_by_itself_is_refused(make_bench: MakeBench) -> None:

@@ -7,22 +7,10 @@ import pytest
 
 from drivers.dynamixel import DynamixelBus, OperatingMode, ServoSpec, WatchdogState
 from drivers.dynamixel.errors import ServoSilent, WrongServo
-from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import DriverError, NoReply, WrongDevice
 from sim_twin.servos import EmulatedServoSpec
 
 MakeBench = Callable[..., Any]
-
-
-def test_factory_settings_are_changed_once_and_only_where_they_differ(
-    make_bench: MakeBench,
-) -> None:
-    bench = make_bench()
-    bench.bus.connect()
-    assert [bench.bank.register(n, "return_delay_time") for n in (1, 2, 3, 4)] == [0, 0, 0, 0]
-    assert bench.wire.count(Instruction.WRITE) == 4
-    bench.new_bus().connect()
-    assert bench.wire.count(Instruction.WRITE) == 4
 
 
 def test_the_operating_mode_asked_for_is_set(make_bench: MakeBench) -> None:

@@ -4,7 +4,7 @@ import pytest
 from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsics
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
-from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck
+from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Stuck
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
@@ -48,14 +48,6 @@ def host() -> Host:
     host = Host()
     assert len(host.samples(0.5)) == 50
     return host
-
-
-def test_a_silent_line_says_nothing_and_comes_back(host: Host) -> None:
-    silence = Silence()
-    host.line.add(silence)
-    assert host.samples(0.2) == []
-    host.line.remove(silence)
-    assert len(host.samples(0.2)) == 20
 
 
 def test_a_stuck_sensor_repeats_its_last_frame_byte_by_byte_and_none_is_believed(

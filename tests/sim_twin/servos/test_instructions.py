@@ -21,7 +21,7 @@ from sim_twin.servos import EmulatedServoSpec, ServoBank
 from sim_twin.servos.protocol.instructions import BrokenPacket, InstructionParser
 
 PING = encode_instruction(1, Instruction.PING)
-STREAMS, CAMPAIGN_STREAMS = 20_000, 1_000_000
+STREAMS, CAMPAIGN_STREAMS = 5_000, 1_000_000
 INSTRUCTIONS = [*Instruction, 0x00, 0x21, 0xFF]
 
 
