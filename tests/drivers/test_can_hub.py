@@ -132,7 +132,7 @@ def test_a_hub_that_stops_reading_never_blocks_a_sender(hub: CanHub, tmp_path: P
             bus.send(frame)
 
 
-def test_a_client_that_stops_reading_loses_its_frames_and_holds_up_nobody(
+def test_a_client_that_stops_reading_loses_its_frames_and_blocks_no_other(
     hub: CanHub, tmp_path: Path
 ) -> None:
     path = tmp_path / "can"

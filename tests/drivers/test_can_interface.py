@@ -54,7 +54,7 @@ class OpenBus(can.BusABC):  # type: ignore[misc]
         raise NotImplementedError
 
 
-def test_an_interface_that_is_down_is_told_without_netlink(
+def test_an_interface_that_is_down_is_detected_without_netlink(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(can, "Bus", lambda **options: OpenBus(options["channel"]))

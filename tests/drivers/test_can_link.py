@@ -57,7 +57,7 @@ def error_frame(classes: int, controller: int = 0) -> can.Message:
         (error_frame(0x104, 0x40), ControllerState.ACTIVE, "controller restarted"),
     ],
 )
-def test_error_frames_tell_the_controllers_state(
+def test_error_frames_show_the_controllers_state(
     bus: QueueBus, frame: can.Message, state: ControllerState, words: str
 ) -> None:
     link = CanLink(bus, ManualClock())
@@ -129,7 +129,7 @@ def test_a_babbling_node_cannot_hold_the_caller_up(bus: QueueBus) -> None:
     link.close()
 
 
-def test_after_bus_off_the_drives_are_connected_anew_and_disabled() -> None:
+def test_after_bus_off_the_drives_are_reconnected_and_disabled() -> None:
     world = FreeWheelWorld([FreeWheel(WheelDrive(1))])
     specs = [DriveSpec(node_id=1, joint="left")]
 

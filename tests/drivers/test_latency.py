@@ -20,7 +20,7 @@ def test_nothing_recorded_is_zero_everywhere() -> None:
 
 
 @pytest.mark.parametrize("value", [0, 1, 7, 8, 15, 16, 17, 1000, 123_456, 10**9, 6 * 10**10])
-def test_a_single_value_is_told_exactly(value: int) -> None:
+def test_a_single_value_is_exact(value: int) -> None:
     histogram = histogram_of([value])
     assert histogram.percentile_ns(0.5) == histogram.max_ns == histogram.mean_ns == value
 

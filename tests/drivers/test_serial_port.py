@@ -1,4 +1,4 @@
-"""A tty is opened, locked, read without spinning, and its loss is told at once."""
+"""A tty is opened, locked, read without spinning, and its loss is reported at once."""
 
 import os
 import time
@@ -81,7 +81,7 @@ def test_discarded_input_is_gone(pty: tuple[int, Path]) -> None:
     port.close()
 
 
-def test_a_second_opener_is_told_that_the_port_is_busy(pty: tuple[int, Path]) -> None:
+def test_a_second_opener_finds_the_port_busy(pty: tuple[int, Path]) -> None:
     _, path = pty
     port = SerialPort(path, 57_600, CLOCK)
     with pytest.raises(DeviceBusy, match="stop the process that holds it"):
@@ -104,7 +104,7 @@ def test_an_unknown_baud_rate_is_refused(tmp_path: Path) -> None:
         SerialPort(tmp_path / "any", 12_345, CLOCK)
 
 
-def test_unplugging_is_told_by_every_operation_at_once(pty: tuple[int, Path]) -> None:
+def test_every_operation_on_an_unplugged_port_fails_at_once(pty: tuple[int, Path]) -> None:
     master, path = pty
     port = SerialPort(path, 57_600, CLOCK)
     os.close(master)
@@ -130,7 +130,7 @@ def test_a_line_that_takes_no_bytes_is_given_up_instead_of_blocking(
 
 
 @pytest.mark.parametrize(("latency", "fault"), [("1", ""), ("16", "got 16 ms")])
-def test_an_adapter_that_holds_back_bytes_is_told_with_the_remedy(
+def test_an_adapter_that_holds_back_bytes_is_reported_with_the_remedy(
     pty: tuple[int, Path], tmp_path: Path, latency: str, fault: str
 ) -> None:
     _, path = pty
@@ -162,7 +162,7 @@ def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Pat
 
 
 class NapClock:
-    """Stand still until `idle`; whoever sleeps finds what the other end has sent meanwhile."""
+    """Stand still until `idle`; a sleep lets the other end send meanwhile."""
 
     def __init__(self, master: int) -> None:
         self.naps_until_ns: list[int] = []

@@ -53,7 +53,7 @@ def test_a_poll_takes_only_what_is_due_and_a_small_read_leaves_the_rest() -> Non
     assert [wire.read(1, 0) for _ in range(3)] == [b"p", b"o", b""]
 
 
-def test_a_reply_that_nobody_read_is_still_there_at_the_next_request() -> None:
+def test_an_unread_reply_is_still_there_at_the_next_request() -> None:
     clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(SESSION, clock)
     wire.write(b"ping")

@@ -76,7 +76,7 @@ def test_posing_an_unknown_joint_is_refused(engine: Engine) -> None:
         engine.pose({"knee": 1.0})
 
 
-def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
+def test_plain_numbers_give_the_same_motion_as_arrays(engine: Engine) -> None:
     engine.data.joint("arm").qpos[0] = 0.8
     engine.data.joint("arm").qvel[0] = 0.1
     engine.servos.slip(0, 0.05)

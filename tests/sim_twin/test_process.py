@@ -84,7 +84,7 @@ def children(pid: int) -> list[int]:
 
 
 def is_running(pid: int) -> bool:
-    """Return whether a process still runs; a zombie that nobody reaped does not."""
+    """Return whether a process still runs; a zombie that was not reaped does not."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
     except FileNotFoundError:
@@ -164,7 +164,7 @@ def test_paced_frames_take_the_time_of_their_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "header"), [("lidar", b"\x54\x2c"), ("imu", b"\xaa\xaa")])
-def test_sensors_talk_by_themselves(devices: PathOpener, name: str, header: bytes) -> None:
+def test_sensors_send_unasked(devices: PathOpener, name: str, header: bytes) -> None:
     line = devices.serial(name)
     line.discard_input()
     heard = b""
@@ -174,7 +174,7 @@ def test_sensors_talk_by_themselves(devices: PathOpener, name: str, header: byte
     assert header in heard
 
 
-def test_the_referee_tells_the_truth_and_the_pace(run_dir: Path) -> None:
+def test_the_referee_reports_the_truth_and_the_pace(run_dir: Path) -> None:
     first = ask(run_dir, "truth")
     second = ask(run_dir, "truth")
     assert second["sim_s"] >= first["sim_s"]
@@ -319,7 +319,7 @@ def test_the_button_and_the_room_are_served(devices: PathOpener) -> None:
     microphone.close()
 
 
-def test_somebody_speaks_into_the_room_and_the_robot_is_heard(run_dir: Path) -> None:
+def test_speech_reaches_the_microphone_and_the_speaker_is_recorded(run_dir: Path) -> None:
     clock = MonotonicClock()
     opener = PathOpener(device_links(load_robot("butler"), run_dir / "dev"), clock)
     format_ = AudioFormat(rate_hz=16_000)

@@ -84,7 +84,7 @@ def test_what_is_ready_is_sent_without_hearing_the_host(line: PtyLine, device: E
     os.close(host)
 
 
-def test_bytes_that_nobody_fetches_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
+def test_unread_bytes_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
     for _ in range(200):
         device.ready = EVERY_BYTE
         line.poll_once()
@@ -136,7 +136,7 @@ def test_a_stale_link_is_replaced(device: Echo, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("baud", [9_600, 57_600, 1_000_000, 4_000_000])
-def test_the_speed_that_the_host_has_set_is_told_before_its_bytes(
+def test_the_speed_set_by_the_host_is_reported_before_its_bytes(
     device: Echo, tmp_path: Path, baud: int
 ) -> None:
     told: list[tuple[int, bytes]] = []
@@ -152,7 +152,7 @@ def test_the_speed_that_the_host_has_set_is_told_before_its_bytes(
     line.close()
 
 
-def test_a_speed_without_a_constant_is_told_too(device: Echo, tmp_path: Path) -> None:
+def test_a_speed_without_a_constant_is_reported_too(device: Echo, tmp_path: Path) -> None:
     serial = pytest.importorskip("serial")
     told: list[int] = []
     line = PtyLine(device, tmp_path / "servos", on_baud=told.append)
@@ -165,7 +165,7 @@ def test_a_speed_without_a_constant_is_told_too(device: Echo, tmp_path: Path) ->
     line.close()
 
 
-def test_a_device_is_told_the_time_before_it_is_asked(tmp_path: Path) -> None:
+def test_a_device_is_stepped_before_it_is_read(tmp_path: Path) -> None:
     class Watch(Echo):
         def __init__(self) -> None:
             super().__init__()

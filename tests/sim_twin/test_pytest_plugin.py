@@ -79,7 +79,7 @@ def test_an_unknown_choice_is_refused_by_name(tmp_path: Path) -> None:
 
 @pytest.fixture
 def devices_dir(tmp_path: Path) -> Iterator[Path]:
-    """A twin's devices, which nobody can tell from real ones."""
+    """A twin's devices, which look like real ones."""
     run_dir = tmp_path / "run"
     run_dir.mkdir()
     clock = MonotonicClock()

@@ -1,4 +1,4 @@
-"""What can go wrong with the sound system is told with what to do."""
+"""Errors of the sound system say what to do."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def test_the_devices_are_listed() -> None:
         assert device.inputs + device.outputs > 0
 
 
-def test_an_unknown_device_is_told_with_those_there_are() -> None:
+def test_an_unknown_device_is_refused_with_the_known_ones() -> None:
     clock = ManualClock(NS_PER_S)
     with pytest.raises(DeviceMissing, match=r"'no such mic'.*devices with inputs"):
         open_audio_input("no such mic", clock, SPEECH)
@@ -37,7 +37,7 @@ def test_an_unknown_device_is_told_with_those_there_are() -> None:
         (OSError("PortAudio library not found"), "apt install libportaudio2"),
     ],
 )
-def test_a_missing_library_is_told_with_what_to_install(
+def test_a_missing_library_is_refused_with_what_to_install(
     monkeypatch: pytest.MonkeyPatch, error: Exception, remedy: str
 ) -> None:
     def missing(name: str) -> Any:

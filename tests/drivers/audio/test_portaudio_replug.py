@@ -1,4 +1,4 @@
-"""A sound device that is plugged in later is found: PortAudio's list is made anew for it."""
+"""A sound device that is plugged in later is found: PortAudio's list is read again for it."""
 
 import sys
 from types import ModuleType
@@ -22,7 +22,7 @@ def no_other_devices() -> None:
 
 
 class SoundSystem(ModuleType):
-    """Be sounddevice over a computer whose sockets the test plugs; it lists them when told to."""
+    """Stand in for sounddevice; the test plugs devices, which it lists when initialised."""
 
     class PortAudioError(Exception):
         """The library's own."""

@@ -88,7 +88,7 @@ def failure_of(camera: VideoCamera) -> DriverError:
     return error
 
 
-def test_a_file_gives_its_images_in_red_green_blue_and_tells_its_end(film: Path) -> None:
+def test_a_file_gives_its_images_in_red_green_blue_and_reports_its_end(film: Path) -> None:
     camera = VideoCamera(CaptureRequest(source=str(film)), CLOCK)
     frames: list[ColourFrame] = []
 
@@ -115,7 +115,7 @@ def test_a_file_gives_its_images_in_red_green_blue_and_tells_its_end(film: Path)
     camera.close()
 
 
-def test_what_is_got_is_told(film: Path) -> None:
+def test_the_granted_format_is_reported(film: Path) -> None:
     request = CaptureRequest(
         source=str(film), width=WIDTH, height=HEIGHT, rate_hz=RATE_HZ, fourcc="MJPG"
     )

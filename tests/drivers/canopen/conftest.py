@@ -51,7 +51,7 @@ class Bench(FreeWheelWorld[WheelDrive]):
         return state
 
     def inject(self, can_id: int, data: bytes) -> None:
-        """Send a frame from a node that nobody expects."""
+        """Send a frame from an unknown node."""
         with MemoryBus(self.wire) as outsider:
             outsider.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
 

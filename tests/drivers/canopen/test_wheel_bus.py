@@ -145,7 +145,7 @@ def test_when_the_host_falls_silent_the_drives_stop_and_stay_in_fault(enabled: A
     assert "heartbeat" in state.fault[0].text
 
 
-def test_a_drive_that_reboots_is_lost_until_connected_anew(enabled: Any) -> None:
+def test_a_drive_that_reboots_is_lost_until_reconnected(enabled: Any) -> None:
     enabled.drives[0].set_supply(on=False)
     enabled.drives[0].set_supply(on=True)
     assert enabled.run(0.5).lost == (True, False)

@@ -72,7 +72,7 @@ def test_no_step_of_connecting_waits(drives: Any) -> None:
     assert drives.run(0.1).healthy
 
 
-def test_connecting_again_begins_anew(enabled: Any) -> None:
+def test_reconnecting_starts_over(enabled: Any) -> None:
     enabled.run(0.5, FORWARD)
     enabled.bus.connect()
     state = enabled.run(0.1, FORWARD)
@@ -197,7 +197,7 @@ def test_an_absurd_velocity_saturates_at_the_wire(enabled: Any) -> None:
     assert enabled.run(0.02, (1e39, -1e39)).enabled
 
 
-def test_counters_tell_of_the_traffic(connected: Any) -> None:
+def test_counters_count_the_traffic(connected: Any) -> None:
     before = connected.bus.counters
     connected.run(0.1)
     after = connected.bus.counters

@@ -177,7 +177,7 @@ def test_the_strictest_error_decides_who_may_clear(code: int, rule: ResetRule) -
     assert AxisFault(code=int(code)).rule is rule
 
 
-def test_errors_are_told_in_words() -> None:
+def test_errors_are_described_in_words() -> None:
     fault = AxisFault(code=int(AxisError.MOTOR_OVER_TEMP) | 1 << 31)
     assert fault.text == "0x80002000 motor over temp, undocumented bits 0x80000000"
 
@@ -186,7 +186,7 @@ def test_the_shipped_endpoints_are_of_no_real_firmware() -> None:
     assert read_endpoints(EMULATED_ENDPOINTS).firmware == "0.0.0"
 
 
-def test_an_axis_that_rebooted_in_between_is_lost_until_connected_anew(odrive: Any) -> None:
+def test_an_axis_that_rebooted_in_between_is_lost_until_reconnected(odrive: Any) -> None:
     odrive.bus.connect()
     odrive.bus.enable()
     assert odrive.run(0.3).enabled

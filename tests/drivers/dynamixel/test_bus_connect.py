@@ -64,7 +64,7 @@ def test_an_offset_or_direction_kept_in_the_servo_is_refused(
         make_bench(1, servos=servos).bus.connect()
 
 
-def test_a_setting_that_torque_locks_is_told_and_left(make_bench: MakeBench) -> None:
+def test_a_setting_that_torque_locks_is_reported_and_left(make_bench: MakeBench) -> None:
     bench = make_bench(1)
     bench.bus.connect()
     bench.bus.enable_torque()

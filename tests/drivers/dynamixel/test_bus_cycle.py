@@ -92,7 +92,7 @@ def test_several_silent_servos_do_not_mute_the_rest(make_bench: MakeBench) -> No
     assert missing.tolist() == [2, 3, 9, 16]
 
 
-def test_nobody_is_suspended_when_the_whole_bus_is_silent(make_bench: MakeBench) -> None:
+def test_no_servo_is_suspended_when_the_whole_bus_is_silent(make_bench: MakeBench) -> None:
     bench = connected(make_bench)
     for servo_id in (1, 2, 3, 4):
         bench.bank.silence(servo_id)

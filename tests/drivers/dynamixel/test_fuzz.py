@@ -243,7 +243,7 @@ def test_a_block_read_takes_an_undamaged_reply_without_stuffing_at_once(fast: bo
 
 
 def taken(read: BlockRead, stream: bytes) -> list[Entry]:
-    """Return what the short way makes of a reply, put together anew from its columns."""
+    """Return what the short way makes of a reply, rebuilt from its columns."""
     if not read.take(stream):
         return []
     columns = [read.columns([name])[0].tolist() for name in ("effort", "velocity", "position")]

@@ -1,4 +1,4 @@
-"""Every wait is bounded by the wire time plus the margin, also on a babbling or silent line."""
+"""Every wait is bounded by the wire time plus the margin, even on a babbling or silent line."""
 
 import pytest
 

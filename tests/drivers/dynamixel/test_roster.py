@@ -1,4 +1,4 @@
-"""A servo that stays silent is taken out of the block read; nobody else is."""
+"""A servo that stays silent is taken out of the block read; no other is."""
 
 from drivers.dynamixel.roster import SUSPEND_AFTER, Roster
 
@@ -28,7 +28,7 @@ def test_only_who_is_blamed_every_time_is_suspended() -> None:
     assert roster.polled == (0, 2, 3)
 
 
-def test_somebody_is_always_polled() -> None:
+def test_at_least_one_servo_is_always_polled() -> None:
     roster = Roster(2)
     for _ in range(10):
         assert roster.note_missing([0, 1]) == ()

@@ -53,7 +53,7 @@ def test_events_in_order_give_the_state(told: bytes, state: ButtonState) -> None
     assert reading.pressed is (state is not ButtonState.RELEASED)
 
 
-def test_a_device_that_sends_without_end_is_lost_and_holds_nobody_up() -> None:
+def test_a_device_that_sends_without_end_is_lost_and_does_not_block() -> None:
     button, _ = make(RELEASE * 100_000)
     reading = button.poll()
     assert reading.state is ButtonState.LOST

@@ -41,7 +41,7 @@ def turn(distance_mm: int, first_ms: int = 0) -> list[bytes]:
 
 
 def turn_and_next(distance_mm: int) -> list[bytes]:
-    """Return one turn and the packet after it, which tells the driver that the turn is over."""
+    """Return one turn and the packet after it, which ends the turn for the driver."""
     return [*turn(distance_mm), turn(distance_mm, 100)[0]]
 
 
@@ -152,7 +152,7 @@ def test_the_sides_of_a_gap_in_time_are_not_glued_into_one_scan() -> None:
     assert lidar.counters.incomplete_scans == 2
 
 
-def test_stamps_tell_the_time_of_measurement_and_survive_the_wrap() -> None:
+def test_stamps_are_the_time_of_measurement_and_survive_the_wrap() -> None:
     lidar, line, clock = make()
     scans = []
     for t in range(4):

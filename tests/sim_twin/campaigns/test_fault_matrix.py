@@ -62,7 +62,7 @@ def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
     assert any("rest" in failure for failure in play(cell).failures)
 
 
-def test_whoever_comes_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fault_matrix, "_LEAST_GAP_M", 0.2)
     case = play(CELLS["servo.left_elbow/off/driving"])
     assert any("to furniture" in failure for failure in case.failures)

@@ -1,4 +1,4 @@
-"""Rest must come in time and last until a hand, where the rule wants one."""
+"""The robot must rest in time, and until an operator acts where the rule says so."""
 
 import math
 import signal

@@ -62,7 +62,7 @@ def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
     [(text, "pick_up", None) for text in COMMANDS]
     + [(text, "place", "object") for text in PUT_DOWN],
 )
-def test_what_the_robot_is_told_is_understood_by_patterns_alone(text, skill, held):
+def test_every_command_of_the_campaign_is_planned_by_patterns_alone(text, skill, held):
     world = world_of(load_robot("butler"), {"left": held, "right": held})
     assert skill in [action.skill for action in plan_command(text, world).actions]
 

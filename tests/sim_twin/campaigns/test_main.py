@@ -50,7 +50,7 @@ def test_a_figure_that_plays_nothing_is_refused_in_one_line(
     assert (ended.value.code, played) == (2, [])
 
 
-def test_a_campaign_plays_as_many_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_campaign_plays_as_many_cases_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kills, "inject_all", lambda drawn, _seed, _tell: drawn)
     for count, expected in ((None, kills.INJECTIONS), (3, 3), (0, 0)):
         options = argparse.Namespace(count=count, seed=0, only="")
@@ -77,7 +77,7 @@ def test_a_junit_file_that_cannot_be_is_refused_before_anything_is_played(
 
 
 @pytest.mark.usefixtures("played")
-def test_the_report_is_told_before_its_file_is_written(
+def test_the_report_is_printed_before_its_file_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def full(_report: CampaignReport, _path: Path) -> None:

@@ -62,7 +62,7 @@ def test_what_is_as_declared_has_no_fault() -> None:
         ({"hazards": ("fall red_cup: 2, limit 1",)}, "fall red_cup"),
     ],
 )
-def test_what_is_not_as_declared_is_told(changes: dict[str, object], word: str) -> None:
+def test_what_is_not_as_declared_is_reported(changes: dict[str, object], word: str) -> None:
     found = faults(**changes)
     assert any(word in fault for fault in found), found
 
@@ -73,7 +73,7 @@ def test_a_computer_that_was_late_before_is_allowed_twice_that() -> None:
     assert faults(before=busy, during=TickWatch(ticks=1000, late=201))
 
 
-def test_steps_are_told_with_their_process_in_their_order() -> None:
+def test_steps_are_listed_with_their_process_in_order() -> None:
     history = [
         {"action": "slow", "process": "perception", "taken": True},
         {"action": "protective_stop", "process": None, "taken": True},

@@ -1,4 +1,4 @@
-"""Whoever nobody answers for is found, by real processes with the marks of a run."""
+"""Stray processes are found, by real processes with the marks of a run."""
 
 import os
 import subprocess

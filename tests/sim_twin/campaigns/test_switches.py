@@ -64,7 +64,7 @@ def test_a_switch_that_is_kept_in_motion_has_no_fault() -> None:
         ({"late_at_commit": 3, "explained_at_commit": 2}, "the computer explains 2"),
     ],
 )
-def test_what_a_switch_must_not_do_is_told(changes: dict[str, object], word: str) -> None:
+def test_what_a_switch_must_not_do_is_reported(changes: dict[str, object], word: str) -> None:
     found = list(judge(replace(KEPT, **changes), ("kept",)))  # type: ignore[arg-type]
     assert any(word in fault for fault in found), found
 

@@ -1,4 +1,4 @@
-"""Whoever gives commands must see each one's end, and not wait for a planner that was away."""
+"""Each command must be seen to end, without waiting for a planner that was away."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,7 +59,7 @@ def test_what_did_not_succeed_counts_as_failed(room: Room, event: str) -> None:
     assert (room.talk.done, room.talk.failed) == (0, 1)
 
 
-def test_a_command_that_nobody_heard_holds_nothing_up(room: Room) -> None:
+def test_a_command_without_an_answer_does_not_block(room: Room) -> None:
     room.say("look left")
     room.clock.ns += 7 * NS_PER_S
     assert room.talk.is_busy

@@ -120,7 +120,7 @@ def host(dbc: Database) -> Iterator[Host]:
 
 
 @pytest.mark.parametrize("command", TELLING)
-def test_what_the_axis_tells_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
+def test_every_message_of_the_axis_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
     host.enable(1.0)
     host.pass_time(0.3)
     answer = host.ask(MESSAGES[command].name)
@@ -143,7 +143,7 @@ def test_heartbeats_and_estimates_come_at_their_rates(host: Host) -> None:
     assert 99 <= frames.count(OdriveCommand.GET_ENCODER_ESTIMATES) <= 101
 
 
-def test_velocity_control_follows_and_tells_position_and_speed(host: Host) -> None:
+def test_velocity_control_follows_and_reports_position_and_speed(host: Host) -> None:
     host.enable(2.0)
     host.pass_time(1.0)
     assert host.speed_rev_s == pytest.approx(2.0, abs=0.02)

@@ -206,6 +206,8 @@ def test_an_axis_has_the_firmware_and_the_numbers_of_its_endpoint_file(tmp_path:
 
 
 @pytest.mark.parametrize("firmware", ["0.6", "0.6.x", "0.6.999", "-1.0.0"])
-def test_a_firmware_that_cannot_be_told_is_refused(tmp_path: Path, firmware: str) -> None:
+def test_a_firmware_version_that_cannot_be_encoded_is_refused(
+    tmp_path: Path, firmware: str
+) -> None:
     with pytest.raises(ValueError, match="three numbers"):
         ODriveAxis(1, endpoints_path=written_endpoints(tmp_path, firmware))

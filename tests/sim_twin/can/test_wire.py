@@ -69,7 +69,7 @@ def test_a_cut_wire_separates_computer_and_nodes_only() -> None:
     assert node.heard == []
 
 
-def test_a_bus_that_was_shut_down_hears_nothing_more() -> None:
+def test_a_bus_that_was_shut_down_receives_nothing_more() -> None:
     wire = CanWire()
     with MemoryBus(wire) as sender:
         listener = MemoryBus(wire)

@@ -13,7 +13,7 @@ MS = 1_000_000
 
 
 class Node:
-    """Acknowledge, and note frames and what the own controller tells."""
+    """Acknowledge, and note frames and the error frames of its own controller."""
 
     def __init__(self) -> None:
         self.supplied = True
@@ -163,7 +163,7 @@ def test_a_forced_bus_off_lasts_until_the_restart_and_128_times_11_bits(bench: B
     assert bench.state() is ErrorState.ACTIVE
 
 
-def test_opening_the_interface_anew_does_not_end_a_forced_bus_off(bench: Bench) -> None:
+def test_reopening_the_interface_does_not_end_a_forced_bus_off(bench: Bench) -> None:
     bench.wire.set_bus_off()
     with MemoryBus(bench.wire) as second:
         frame = second.recv()
@@ -222,7 +222,7 @@ def test_two_nodes_of_one_identifier_destroy_each_other_until_one_gives_way(benc
         assert bench.wire.health(other).tec > bench.wire.health(bench.node).tec
 
 
-def test_lost_frames_cost_nobody_an_error(bench: Bench) -> None:
+def test_lost_frames_are_no_error_of_any_node(bench: Bench) -> None:
     bench.wire.drop_every(3)
     for value in range(9):
         bench.bus.send(message(value))
@@ -255,7 +255,7 @@ def test_a_delayed_frame_comes_late_and_in_order(bench: Bench) -> None:
     assert bench.node.heard == [1, 2]
 
 
-def test_single_errors_are_told_only_to_who_asks() -> None:
+def test_single_errors_are_reported_only_on_request() -> None:
     frames: list[can.Message] = []
     wire = CanWire([Node()])
     wire.attach(frames.append, report_bus_errors=True)

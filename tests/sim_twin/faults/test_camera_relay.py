@@ -49,7 +49,7 @@ def test_nothing_in_force_is_an_empty_list(bench: Bench) -> None:
     assert faults_in_force(bench.twin_side) == NO_FAULTS
 
 
-def test_the_other_end_does_what_it_is_told_and_undoes_it(bench: Bench) -> None:
+def test_a_fault_is_applied_at_the_other_end_and_removed(bench: Bench) -> None:
     whole = bench.frame()
     bench.camera_side.follow(json.dumps([{"fault": "off", "seed": 0}]))
     assert bench.frame() == b""

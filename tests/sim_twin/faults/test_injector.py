@@ -156,7 +156,7 @@ def test_every_effect_begins_and_ends(shared: Lockstep, component: Component, fa
     assert shared.faults.pending == ()
 
 
-def test_the_desk_lists_injects_and_clears(lockstep: Lockstep) -> None:
+def test_the_fault_server_lists_injects_and_clears(lockstep: Lockstep) -> None:
     desk = FaultServer(lockstep.faults, lockstep.robot).operations
     listed = desk["fault_list"]({})
     (servo,) = [row for row in listed["catalogue"] if row["component"] == "servo"]
@@ -174,7 +174,7 @@ def test_the_desk_lists_injects_and_clears(lockstep: Lockstep) -> None:
     assert desk["fault_clear"]({"id": 1}) == {"pending": []}
 
 
-def test_the_desk_plays_a_scenario_by_name_or_text(lockstep: Lockstep) -> None:
+def test_the_fault_server_plays_a_scenario_by_name_or_text(lockstep: Lockstep) -> None:
     desk = FaultServer(lockstep.faults, lockstep.robot).operations
     played = desk["fault_run"]({"name": "servo_bus_unplug"})
     assert played["expect"]["cause"] == "servo_bus_lost"

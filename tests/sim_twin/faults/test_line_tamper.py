@@ -113,14 +113,14 @@ class Watch:
         self.now_ns = now_ns
 
 
-def test_a_device_learns_the_time_whenever_its_line_talks_to_it() -> None:
+def test_every_access_to_a_line_steps_its_device() -> None:
     watch, times_ns = Watch(), iter([3, 8])
     line = LineTamper(watch, lambda: next(times_ns))
     line.receive(b"?")
     assert (watch.asked_ns, line.transmit()) == (3, b"8")
 
 
-def test_a_line_leaves_the_time_alone_where_somebody_else_steps_the_device() -> None:
+def test_a_line_does_not_step_a_device_that_is_stepped_elsewhere() -> None:
     watch = Watch()
     line = LineTamper(watch, lambda: 3, tells_time=False)
     line.receive(b"?")

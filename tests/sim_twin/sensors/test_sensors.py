@@ -272,7 +272,7 @@ def test_a_restarted_request_with_the_same_rate_keeps_the_cadence() -> None:
     assert scenery.renders == 1
 
 
-def test_requests_survive_garbage_and_pieces() -> None:
+def test_requests_are_found_in_garbage_and_in_pieces() -> None:
     scenery = Scenery()
     device = CameraDevice(scenery.render, CAMERA)
     line = Line(device)

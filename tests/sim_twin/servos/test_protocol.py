@@ -29,7 +29,7 @@ def ids(packets: Any) -> list[int]:
     return [packet.servo_id for packet in packets]
 
 
-def test_ping_tells_model_and_firmware(trio: Any) -> None:
+def test_ping_returns_model_and_firmware(trio: Any) -> None:
     assert trio.send(2, Instruction.PING)[0].params == struct.pack("<HB", 1060, 48)
     assert trio.send(7, Instruction.PING) == []
 
@@ -103,12 +103,12 @@ def test_a_fast_sync_read_longer_than_any_packet_stays_unanswered(trio: Any) -> 
 @pytest.mark.parametrize(
     "instruction", [Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ, Instruction.SYNC_READ]
 )
-def test_a_group_read_of_nobody_stays_unanswered(trio: Any, instruction: Instruction) -> None:
+def test_a_group_read_without_ids_stays_unanswered(trio: Any, instruction: Instruction) -> None:
     assert trio.send(BROADCAST_ID, instruction) == []
     assert trio.send(BROADCAST_ID, instruction, POSITION) == []
 
 
-def test_a_fast_sync_read_past_the_table_tells_the_error_of_every_servo(trio: Any) -> None:
+def test_a_fast_sync_read_past_the_table_returns_the_error_of_every_servo(trio: Any) -> None:
     params = struct.pack("<HH", 662, 2) + b"\1\2"
     trio.bank.receive(encode_instruction(BROADCAST_ID, Instruction.FAST_SYNC_READ, params))
     entries = decode_fast_entries(trio.bank.transmit(), 2)
@@ -210,7 +210,7 @@ def test_clear_forgets_turns_at_standstill_only(bench: Any) -> None:
     assert abs(bench.rotors.velocity_rad_s[0]) < 0.02
 
 
-def test_a_status_packet_on_the_bus_is_nobodys_instruction(trio: Any) -> None:
+def test_a_status_packet_on_the_bus_is_no_instruction(trio: Any) -> None:
     assert trio.send(1, Instruction.STATUS, b"\x00") == []
     assert trio.send(BROADCAST_ID, Instruction.STATUS, b"\x00") == []
 

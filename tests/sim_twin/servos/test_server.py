@@ -1,4 +1,4 @@
-"""The server paces its bus, sleeps between packets, ends when told and refuses what no bus has."""
+"""The server paces its bus, sleeps between packets, ends by itself and refuses impossible words."""
 
 import os
 import signal

@@ -169,7 +169,7 @@ def test_a_trip_outlives_torque_off_but_not_a_reboot(bench: Any) -> None:
     assert bench.read("bus_watchdog") == 0
 
 
-def test_time_alone_trips_it_when_nobody_moves_the_shafts(bench: Any) -> None:
+def test_time_alone_trips_it_without_physics(bench: Any) -> None:
     arm(bench)
     bench.bank.step(bench.now_ns + 90_000_000)
     assert watchdog(bench) == PERIODS
