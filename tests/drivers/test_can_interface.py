@@ -45,7 +45,7 @@ def test_a_kernel_without_can_says_what_to_load_or_take(monkeypatch: pytest.Monk
 
 
 class OpenBus(can.BusABC):  # type: ignore[misc]
-    """Be an interface that could be opened."""
+    """An interface that opens."""
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel=channel)

@@ -1,4 +1,4 @@
-"""The watch must see what is dangerous, and nothing in ordinary work."""
+"""The hazard watch reports what is dangerous, and nothing in ordinary work."""
 
 import math
 from pathlib import Path

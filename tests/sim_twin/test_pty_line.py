@@ -28,7 +28,7 @@ class Echo:
         return ready
 
     def step(self, now_ns: int) -> None:
-        """Have nothing of its own to say."""
+        """Send nothing unasked."""
 
 
 @pytest.fixture
@@ -47,20 +47,25 @@ def open_host(line: PtyLine) -> int:
     return os.open(line.link_path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
 
+@pytest.fixture
+def host(line: PtyLine) -> Iterator[int]:
+    host = open_host(line)
+    yield host
+    os.close(host)
+
+
 def readable(descriptor: int, timeout_ms: int) -> bool:
     poller = select.poll()
     poller.register(descriptor, select.POLLIN)
     return bool(poller.poll(timeout_ms))
 
 
-def test_every_byte_passes_unchanged_in_both_directions(line: PtyLine) -> None:
-    host = open_host(line)
+def test_every_byte_passes_unchanged_in_both_directions(line: PtyLine, host: int) -> None:
     os.write(host, EVERY_BYTE)
     assert readable(line.fileno(), 1000)
     assert line.poll_once()
     assert readable(host, 1000)
     assert os.read(host, 4096) == EVERY_BYTE
-    os.close(host)
 
 
 def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine) -> None:
@@ -71,8 +76,9 @@ def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine
     assert not line.poll_once()
 
 
-def test_what_is_ready_is_sent_without_hearing_the_host(line: PtyLine, device: Echo) -> None:
-    host = open_host(line)
+def test_what_is_ready_is_sent_without_hearing_the_host(
+    line: PtyLine, host: int, device: Echo
+) -> None:
     os.write(host, b"asked")
     device.ready = b"told"
     assert line.send_once()
@@ -81,7 +87,6 @@ def test_what_is_ready_is_sent_without_hearing_the_host(line: PtyLine, device: E
     assert not line.send_once()
     assert line.poll_once()
     assert os.read(host, 4096) == b"asked"
-    os.close(host)
 
 
 def test_unread_bytes_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
@@ -97,21 +102,18 @@ def test_unread_bytes_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
     os.close(host)
 
 
-def test_unplugging_ends_the_hosts_session_and_removes_the_path(line: PtyLine) -> None:
-    host = open_host(line)
+def test_unplugging_ends_the_hosts_session_and_removes_the_path(line: PtyLine, host: int) -> None:
     line.unplug()
     with pytest.raises(OSError, match="Input/output error"):
         os.write(host, b"x")
     assert not line.link_path.is_symlink()
     with pytest.raises(LinkLost, match="unplugged"):
         line.poll_once()
-    os.close(host)
 
 
 def test_replugging_gives_a_fresh_terminal_behind_the_same_path(
-    line: PtyLine, device: Echo
+    line: PtyLine, host: int, device: Echo
 ) -> None:
-    host = open_host(line)
     line.unplug()
     device.ready = b"stale"
     line.replug()
@@ -121,7 +123,6 @@ def test_replugging_gives_a_fresh_terminal_behind_the_same_path(
     line.poll_once()
     assert readable(fresh, 1000)
     assert os.read(fresh, 64) == b"hello"
-    os.close(host)
     os.close(fresh)
 
 
@@ -182,9 +183,8 @@ def test_a_device_is_stepped_before_it_is_read(tmp_path: Path) -> None:
 
 
 def test_bytes_are_sent_at_the_moment_they_are_due_and_not_before(
-    line: PtyLine, device: Echo
+    line: PtyLine, host: int, device: Echo
 ) -> None:
-    host = open_host(line)
     device.ready = b"reply"
     early = []
 
@@ -196,4 +196,3 @@ def test_bytes_are_sent_at_the_moment_they_are_due_and_not_before(
     assert early == [False] * 5
     assert readable(host, 1000)
     assert os.read(host, 16) == b"reply"
-    os.close(host)

@@ -1,4 +1,4 @@
-"""A microphone that is pushed keeps the contract of every other one."""
+"""A microphone fed by pushed samples keeps the microphone contract."""
 
 import numpy as np
 import pytest

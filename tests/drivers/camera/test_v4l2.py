@@ -1,4 +1,4 @@
-"""The colour camera on real video files, on a source that the test leads, and on what is missing.
+"""The colour camera on real video files, on a source that the test controls, and without one.
 
 No video device is at hand where these tests run: V4L2's part of OpenCV is not exercised here.
 """
@@ -42,7 +42,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Paced:
-    """Let a real capture deliver no faster than a camera would."""
+    """Slow a real capture down to a camera's rate."""
 
     def __init__(self, request: CaptureRequest) -> None:
         self._capture = open_capture(request)
@@ -178,7 +178,7 @@ def test_an_impossible_request_is_refused(asked: dict[str, Any]) -> None:
 
 @dataclass
 class Led:
-    """Be a source whose every image, stamp and end the test decides."""
+    """A source whose images, stamps and end the test controls."""
 
     images: "queue.Queue[tuple[bool, int]]" = field(default_factory=queue.Queue)
     stamp_ms: float = 0.0
@@ -219,11 +219,18 @@ def device(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CaptureRequest, "is_device", property(lambda _: True))
 
 
-def watch(led: Led, clock: ManualClock, latency_s: float = 0.0) -> VideoCamera:
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock(5 * NS_PER_S)
+
+
+@pytest.fixture
+def camera(led: Led, clock: ManualClock) -> Iterator[VideoCamera]:
     request = CaptureRequest(source="/dev/video0")
-    camera = VideoCamera(request, clock, latency_s=latency_s, connect=led.connect)
+    camera = VideoCamera(request, clock, latency_s=0.05, connect=led.connect)
     led.asked.acquire()
-    return camera
+    yield camera
+    camera.close()
 
 
 def shown(camera: VideoCamera) -> ColourFrame:
@@ -232,52 +239,46 @@ def shown(camera: VideoCamera) -> ColourFrame:
     return frame
 
 
-def test_the_newest_image_wins_and_the_others_are_counted(led: Led) -> None:
-    camera = watch(led, ManualClock(NS_PER_S))
+def test_the_newest_image_wins_and_the_others_are_counted(led: Led, camera: VideoCamera) -> None:
     assert camera.poll() is None
     led.show(1, 2, 3)
     frame = shown(camera)
     assert (frame.sequence, frame.rgb[0, 0, 0]) == (2, 3)
     assert (camera.counters.frames, camera.counters.superseded_frames) == (3, 2)
     assert camera.poll() is None
-    camera.close()
 
 
-def test_the_kernels_stamp_is_taken_where_it_can_be_true(led: Led, device: None) -> None:
-    camera = watch(led, ManualClock(5 * NS_PER_S), latency_s=0.05)
+def test_the_kernels_stamp_is_taken_where_it_can_be_true(
+    led: Led, camera: VideoCamera, device: None
+) -> None:
     led.stamp_ms = 4_970.0
     led.show(1)
     frame = shown(camera)
     assert (frame.stamp_ns, frame.stamp_source) == (4_970_000_000, StampSource.BUFFER)
     assert camera.counters.arrival_stamps == 0
-    camera.close()
 
 
 @pytest.mark.parametrize("stamp_ms", [0.0, 3_999.0, 5_001.0, 1.7e12])
 def test_an_impossible_stamp_gives_way_to_arrival_less_latency(
-    led: Led, device: None, stamp_ms: float
+    led: Led, camera: VideoCamera, device: None, stamp_ms: float
 ) -> None:
-    camera = watch(led, ManualClock(5 * NS_PER_S), latency_s=0.05)
     led.stamp_ms = stamp_ms
     led.show(1)
     frame = shown(camera)
     assert (frame.stamp_ns, frame.stamp_source) == (4_950_000_000, StampSource.ARRIVAL)
     assert camera.counters.arrival_stamps == 1
-    camera.close()
 
 
-def test_a_file_has_no_stamps_of_exposure(led: Led) -> None:
-    camera = watch(led, ManualClock(5 * NS_PER_S))
+def test_a_file_has_no_stamps_of_exposure(led: Led, camera: VideoCamera) -> None:
     led.stamp_ms = 4_970.0
     led.show(1)
     frame = shown(camera)
     assert frame.stamp_source is StampSource.ARRIVAL
-    camera.close()
 
 
-def test_two_seconds_of_silence_are_a_lost_link(led: Led) -> None:
-    clock = ManualClock(NS_PER_S)
-    camera = watch(led, clock)
+def test_two_seconds_of_silence_are_a_lost_link(
+    led: Led, camera: VideoCamera, clock: ManualClock
+) -> None:
     led.show(1)
     camera.poll()
     clock.ns += 2 * NS_PER_S
@@ -285,11 +286,11 @@ def test_two_seconds_of_silence_are_a_lost_link(led: Led) -> None:
     clock.ns += 1
     with pytest.raises(LinkLost, match="no image for 2 s"):
         camera.poll()
-    camera.close()
 
 
-def test_an_unplugged_camera_is_lost_and_lets_go_of_its_source(led: Led) -> None:
-    camera = watch(led, ManualClock(NS_PER_S))
+def test_an_unplugged_camera_is_lost_and_lets_go_of_its_source(
+    led: Led, camera: VideoCamera
+) -> None:
     led.images.put((False, 0))
     error = failure_of(camera)
     assert isinstance(error, LinkLost)
@@ -299,8 +300,9 @@ def test_an_unplugged_camera_is_lost_and_lets_go_of_its_source(led: Led) -> None
     camera.close()
 
 
-def test_closing_waits_for_nothing_and_the_source_is_let_go_after_the_read(led: Led) -> None:
-    camera = watch(led, ManualClock(NS_PER_S))
+def test_closing_waits_for_nothing_and_the_source_is_let_go_after_the_read(
+    led: Led, camera: VideoCamera
+) -> None:
     camera.close()
     assert not led.released.is_set()
     led.images.put((True, 1))

@@ -1,4 +1,4 @@
-"""Let the vendor-neutral library's SDO server answer our client, and break the protocol on it."""
+"""Our SDO client against the vendor-neutral library's server, and against broken replies."""
 
 from typing import Any
 

@@ -171,7 +171,7 @@ class PacedLine:
 
 
 class SleepingLine(PacedLine):
-    """Do not look at the line before all bytes should be there, as a serial port does."""
+    """Read only when all bytes are due, as a serial port does."""
 
     def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         self._clock.sleep_until(due_ns)

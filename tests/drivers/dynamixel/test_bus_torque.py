@@ -228,7 +228,7 @@ def test_a_silent_servo_is_asked_again_and_then_named(bench: Any) -> None:
 
 
 def after_replies(bench: Any, count: int, act: Callable[[], None]) -> None:
-    """Do something to the bus once it has sent so many replies."""
+    """Call `act` once the bus has sent `count` replies."""
     sent = 0
 
     def pass_on(reply: bytes) -> bytes:

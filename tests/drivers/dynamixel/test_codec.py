@@ -1,4 +1,4 @@
-"""Golden packets of the e-manual, round trips with stuffing anywhere, a parser nothing upsets."""
+"""Golden packets of the e-manual, round trips with stuffing anywhere, a robust parser."""
 
 import pytest
 from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler

@@ -37,7 +37,7 @@ class SilentLine:
 
 
 class BabblingLine(SilentLine):
-    """Never stop sending bytes that mean nothing; each read takes their time on the wire."""
+    """Send meaningless bytes without end; each read takes their time on the wire."""
 
     def read(self, max_bytes: int, deadline_ns: int) -> bytes:
         if self._clock.ns >= deadline_ns:
@@ -72,7 +72,7 @@ class SwitchedLine:
 
 
 class FloodedLine(SilentLine):
-    """Have bytes without end already waiting."""
+    """Return bytes without end at once."""
 
     def read(self, max_bytes: int, deadline_ns: int) -> bytes:
         self._clock.ns += BYTE_NS

@@ -1,4 +1,4 @@
-"""Stray processes are found, by real processes with the marks of a run."""
+"""Stray processes of a run are found, tested with real processes."""
 
 import os
 import subprocess

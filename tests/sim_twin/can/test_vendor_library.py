@@ -1,11 +1,10 @@
-"""Let the vendor-neutral `canopen` library drive the emulated drive through the hub process."""
+"""The vendor-neutral `canopen` library controls the emulated drive through the hub process."""
 
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 
 import canopen
 import pytest
@@ -32,9 +31,9 @@ def is_near(drive: BaseNode402, target: int) -> bool:
     return bool(abs(drive.sdo[0x606C].raw - target) < 100)
 
 
-@pytest.fixture
-def network(tmp_path: Path) -> Iterator[canopen.Network]:
-    path = tmp_path / "can"
+@pytest.fixture(scope="module")
+def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[canopen.Network]:
+    path = tmp_path_factory.mktemp("hub") / "can"
     options = ["--socket", str(path), "--nodes", str(NODE_ID), "--timed", "--bitrate", "500000"]
     command = [sys.executable, "-m", "sim_twin.can", *options]
     with subprocess.Popen(command) as hub:
@@ -44,17 +43,20 @@ def network(tmp_path: Path) -> Iterator[canopen.Network]:
             network.NOTIFIER_CYCLE = 0.05
             network.connect(interface="vla_hub", channel=str(path))
             yield network
-            network.sync.stop()
             network.disconnect()
         finally:
             hub.terminate()
 
 
 @pytest.fixture
-def node(network: canopen.Network) -> BaseNode402:
+def node(network: canopen.Network) -> Iterator[BaseNode402]:
+    """Return a drive that has just booted."""
     node = network.add_node(BaseNode402(NODE_ID, str(EDS_PATH)))
-    node.nmt.state = "PRE-OPERATIONAL"
-    return node
+    node.nmt.state = "RESET"
+    assert eventually(lambda: node.nmt.state == "PRE-OPERATIONAL")
+    yield node
+    network.sync.stop()
+    del network[NODE_ID]
 
 
 @pytest.fixture
@@ -138,7 +140,6 @@ def test_it_gets_the_emergency_of_its_own_lost_heartbeat_and_resets_the_fault(
     drive.reset_from_fault()
     assert drive.state == "OPERATION ENABLED"
     assert eventually(lambda: not drive.emcy.active)
-    drive.state = "SWITCH ON DISABLED"
 
 
 def test_it_maps_other_process_data_and_gets_them(
@@ -166,7 +167,6 @@ def test_it_follows_cyclic_velocities_and_shows_the_mode(drive: BaseNode402) -> 
         drive.rpdo[1]["Target velocity"].raw = target
         drive.rpdo[1].transmit()
         assert eventually(partial(is_near, drive, target))
-    drive.state = "SWITCH ON DISABLED"
 
 
 def test_it_reboots_a_drive_into_its_defaults(drive: BaseNode402) -> None:

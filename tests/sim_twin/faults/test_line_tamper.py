@@ -97,7 +97,7 @@ def test_a_bus_repeats_its_last_answer_of_the_same_length() -> None:
 
 
 class Watch:
-    """Say what time it is."""
+    """A device that reports the time it was stepped to."""
 
     def __init__(self) -> None:
         self.now_ns = 0

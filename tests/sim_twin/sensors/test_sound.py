@@ -1,4 +1,4 @@
-"""The twin's room: what is played is heard, what the robot says is kept."""
+"""The twin's room: the microphone receives what is played, the speaker's sound is kept."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Who hears a packet: ids given twice, secondary ids, baud rates, broken packets."""
+"""Which servos receive a packet: duplicate ids, secondary ids, baud rates, broken packets."""
 
 import struct
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The server paces its bus, sleeps between packets, ends by itself and refuses impossible words."""
+"""The server paces its bus, sleeps in between, ends by itself and refuses impossible options."""
 
 import os
 import signal

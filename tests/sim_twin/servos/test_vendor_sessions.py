@@ -1,4 +1,4 @@
-"""Two host libraries of others each take emulated servos through a whole session, over a terminal.
+"""Two third-party host libraries each run a whole session with emulated servos on a terminal.
 
 The bus is paced at 1 Mbps and hears the speed at which the library opens the terminal.
 """
@@ -236,7 +236,7 @@ def trip_the_watchdog(host: Host, servo_id: int) -> None:
 
 
 def overheat(host: Host, servo_id: int) -> None:
-    """Lower the limit below room temperature: the servo protects itself and says so."""
+    """Lower the limit below room temperature: the servo switches off and raises the alert."""
     assert host.write(servo_id, TORQUE, 0) == 0
     assert host.write(servo_id, TEMPERATURE_LIMIT, 10) == 0
     assert host.write(servo_id, TORQUE, 1) & ~ALERT == 0

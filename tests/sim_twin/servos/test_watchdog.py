@@ -19,7 +19,7 @@ def arm(bench: Any, servo_id: int = 1) -> None:
 
 
 def watchdog(bench: Any, servo_id: int = 1) -> int:
-    """Look without talking on the bus, which would feed the watchdog."""
+    """Read without a packet on the bus, which would feed the watchdog."""
     value: int = bench.bank.register(servo_id, "bus_watchdog")
     return value
 

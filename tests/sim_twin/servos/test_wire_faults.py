@@ -1,4 +1,4 @@
-"""Each fault of the bus does what it says to the servo it names, and ends when taken back."""
+"""Each bus fault affects only the servo it names, and ends when it is cleared."""
 
 import struct
 from collections.abc import Callable
