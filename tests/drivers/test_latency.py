@@ -13,9 +13,9 @@ def histogram_of(values: list[int]) -> LatencyHistogram:
 
 
 def test_nothing_recorded_is_zero_everywhere() -> None:
-    told = LatencyHistogram().as_dict()
-    bounds_s, counts = told.pop("le_s"), told.pop("counts")
-    assert set(told.values()) == {0}
+    reported = LatencyHistogram().as_dict()
+    bounds_s, counts = reported.pop("le_s"), reported.pop("counts")
+    assert set(reported.values()) == {0}
     assert counts == [0] * len(bounds_s)
 
 
@@ -45,9 +45,9 @@ def test_what_is_beyond_the_last_bucket_or_before_the_first_is_counted() -> None
 def test_counts_by_octave_are_those_below_each_bound() -> None:
     chance = random.Random(7)
     values = [chance.randrange(2 * 10**8) for _ in range(3000)]
-    told = histogram_of(values).as_dict()
-    expected = [sum(value < bound_s * 10**9 for value in values) for bound_s in told["le_s"]]
-    assert told["counts"] == expected
+    reported = histogram_of(values).as_dict()
+    expected = [sum(value < bound_s * 10**9 for value in values) for bound_s in reported["le_s"]]
+    assert reported["counts"] == expected
     assert 0 < expected[0] < expected[-1] < len(values)
 
 

@@ -245,6 +245,15 @@ def test_one_that_only_watches_holds_nothing(metronome: Metronome, folder: Path)
     assert passes(clock)
 
 
+def test_a_governor_that_ends_disconnects_its_members_and_frees_time(folder: Path) -> None:
+    with Metronome(folder):
+        clock = TwinClock(folder)
+        clock.join(TimeRole(name="control", order=0), os.getpid())
+        assert clock.page.is_governed
+    assert not clock.page.is_governed
+    assert passes(clock)
+
+
 def test_work_in_a_thread_is_done_when_declared_whatever_it_took(
     metronome: Metronome, folder: Path
 ) -> None:

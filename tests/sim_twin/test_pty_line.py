@@ -80,10 +80,10 @@ def test_what_is_ready_is_sent_without_hearing_the_host(
     line: PtyLine, host: int, device: Echo
 ) -> None:
     os.write(host, b"asked")
-    device.ready = b"told"
+    device.ready = b"reported"
     assert line.send_once()
     assert readable(host, 1000)
-    assert os.read(host, 4096) == b"told"
+    assert os.read(host, 4096) == b"reported"
     assert not line.send_once()
     assert line.poll_once()
     assert os.read(host, 4096) == b"asked"
@@ -140,29 +140,29 @@ def test_a_stale_link_is_replaced(device: Echo, tmp_path: Path) -> None:
 def test_the_speed_set_by_the_host_is_reported_before_its_bytes(
     device: Echo, tmp_path: Path, baud: int
 ) -> None:
-    told: list[tuple[int, bytes]] = []
+    reported: list[tuple[int, bytes]] = []
     line = PtyLine(
-        device, tmp_path / "servos", on_baud=lambda rate: told.append((rate, device.ready))
+        device, tmp_path / "servos", on_baud=lambda rate: reported.append((rate, device.ready))
     )
     port = SerialPort(line.link_path, baud, MonotonicClock())
     port.write(b"x")
     assert readable(line.fileno(), 1000)
     line.poll_once()
-    assert told == [(baud, b"")]
+    assert reported == [(baud, b"")]
     port.close()
     line.close()
 
 
 def test_a_speed_without_a_constant_is_reported_too(device: Echo, tmp_path: Path) -> None:
     serial = pytest.importorskip("serial")
-    told: list[int] = []
-    line = PtyLine(device, tmp_path / "servos", on_baud=told.append)
+    reported: list[int] = []
+    line = PtyLine(device, tmp_path / "servos", on_baud=reported.append)
     assert not hasattr(termios, "B4500000")
     with serial.Serial(str(line.link_path), 4_500_000) as host:
         host.write(b"x")
         assert readable(line.fileno(), 1000)
         line.poll_once()
-    assert told == [4_500_000]
+    assert reported == [4_500_000]
     line.close()
 
 

@@ -126,7 +126,7 @@ def test_the_granted_format_is_reported(film: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("asked", "reported"),
     [
         ({"width": 640, "height": 480}, "width 640 asked, 64 got; height 480 asked, 48 got"),
         ({"rate_hz": 30.0}, "rate in Hz 30.0 asked, 25.0 got"),
@@ -134,11 +134,11 @@ def test_the_granted_format_is_reported(film: Path) -> None:
     ],
 )
 def test_another_size_rate_or_format_than_asked_is_the_wrong_device(
-    film: Path, asked: dict[str, Any], told: str
+    film: Path, asked: dict[str, Any], reported: str
 ) -> None:
     error = failure_of(VideoCamera(CaptureRequest(source=str(film), **asked), CLOCK))
     assert isinstance(error, WrongDevice)
-    assert told in str(error)
+    assert reported in str(error)
     assert "v4l2-ctl" in str(error)
 
 

@@ -32,7 +32,7 @@ def test_an_event_is_read_as_the_kernel_writes_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "state"),
+    ("events", "state"),
     [
         (b"", ButtonState.UNKNOWN),
         (SYN + SCAN_CODE + OTHER_KEY, ButtonState.UNKNOWN),
@@ -46,8 +46,8 @@ def test_an_event_is_read_as_the_kernel_writes_it() -> None:
         (RELEASE + b"\xff" * EVENT.size + RELEASE, ButtonState.LOST),
     ],
 )
-def test_events_in_order_give_the_state(told: bytes, state: ButtonState) -> None:
-    button, _ = make(told)
+def test_events_in_order_give_the_state(events: bytes, state: ButtonState) -> None:
+    button, _ = make(events)
     reading = button.poll()
     assert reading.state is state
     assert reading.pressed is (state is not ButtonState.RELEASED)

@@ -57,7 +57,7 @@ def test_every_fault_in_every_phase_leaves_the_robot_safe(name: str) -> None:
 def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    cell = CELLS["servo_bus/brown_out/reaching"]
+    cell = CELLS["servo_bus/brown_out/carrying"]
     assert play(cell).failures == ()
     monkeypatch.setattr(fault_matrix, "_LIMP", ())
     assert any("rest" in failure for failure in play(cell).failures)

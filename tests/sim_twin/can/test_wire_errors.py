@@ -41,7 +41,7 @@ class Bench:
             self.now_ns += 2 * MS
             self.wire.poll(self.now_ns)
 
-    def told(self) -> list[can.Message]:
+    def error_frames(self) -> list[can.Message]:
         return [frame for frame in iter(self.bus.recv, None) if frame.is_error_frame]
 
     def state(self) -> ErrorState:
@@ -126,8 +126,8 @@ def test_when_every_frame_is_damaged_the_sender_goes_bus_off_after_32_attempts(
     assert bench.state() is ErrorState.BUS_OFF
     assert bench.wire.frames_destroyed == 32
     assert bench.wire.health(bench.node).rec == 32
-    told = bench.told()
-    assert [frame.arbitration_id & (BUS_OFF | CONTROLLER) for frame in told] == [
+    reported = bench.error_frames()
+    assert [frame.arbitration_id & (BUS_OFF | CONTROLLER) for frame in reported] == [
         CONTROLLER,
         CONTROLLER,
         BUS_OFF,
@@ -145,7 +145,7 @@ def test_a_controller_restarts_by_itself_after_the_configured_time(bench: Bench)
     assert bench.state() is ErrorState.BUS_OFF
     bench.pass_time(0.06)
     assert bench.state() is ErrorState.ACTIVE
-    assert bench.told()[-1].arbitration_id & RESTARTED
+    assert bench.error_frames()[-1].arbitration_id & RESTARTED
     bench.bus.send(message(0x77))
     bench.pass_time(0.002)
     assert bench.node.heard == [0x77]

@@ -64,9 +64,9 @@ def test_parameters_travel(bench: Bench) -> None:
 
 def test_a_fault_that_comes_and_goes_travels_as_what_it_is_while_it_is_on(bench: Bench) -> None:
     bench.twin_side.inject("camera", None, "intermittent", of="off", period_s=0.4)
-    told = []
+    reported = []
     for _ in range(4):
         bench.twin_side.step()
-        told.append([fault["fault"] for fault in json.loads(faults_in_force(bench.twin_side))])
+        reported.append([fault["fault"] for fault in json.loads(faults_in_force(bench.twin_side))])
         bench.time_ns += PERIOD_NS
-    assert told == [["off"], ["off"], [], []]
+    assert reported == [["off"], ["off"], [], []]

@@ -81,6 +81,6 @@ def test_a_servo_of_protocol_1_is_recognised(make_wire, ids):
 
 
 def test_progress_is_reported_for_every_request(make_wire, make_specs):
-    told = []
-    scan_speed(make_wire(make_specs(4)).open(57_600), [3, 4], told.append)
-    assert told == ["57600 baud: id 3", "57600 baud: id 4"]
+    reported = []
+    scan_speed(make_wire(make_specs(4)).open(57_600), [3, 4], reported.append)
+    assert reported == ["57600 baud: id 3", "57600 baud: id 4"]
