@@ -56,8 +56,13 @@ def test_any_packet_is_a_frame_or_a_protocol_error(packet: bytes) -> None:
 
 
 @pytest.fixture
-def hub(tmp_path: Path) -> Iterator[CanHub]:
-    hub = CanHub(CanWire(), tmp_path / "can")
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "can"
+
+
+@pytest.fixture
+def hub(path: Path) -> Iterator[CanHub]:
+    hub = CanHub(CanWire(), path)
     yield hub
     hub.close()
 
@@ -68,8 +73,7 @@ def opened(hub: CanHub, path: Path) -> HubBus:
     return bus
 
 
-def test_the_hub_passes_a_frame_to_all_but_its_sender(hub: CanHub, tmp_path: Path) -> None:
-    path = tmp_path / "can"
+def test_the_hub_passes_a_frame_to_all_but_its_sender(hub: CanHub, path: Path) -> None:
     with opened(hub, path) as sender, opened(hub, path) as one, opened(hub, path) as two:
         sender.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=b"abc"))
         hub.poll_once()
@@ -80,14 +84,13 @@ def test_the_hub_passes_a_frame_to_all_but_its_sender(hub: CanHub, tmp_path: Pat
         assert sender.recv(timeout=0.0) is None
 
 
-def test_the_plug_in_is_found_by_its_name(hub: CanHub, tmp_path: Path) -> None:
-    with can.Bus(interface="vla_hub", channel=str(tmp_path / "can")) as bus:
+def test_the_plug_in_is_found_by_its_name(hub: CanHub, path: Path) -> None:
+    with can.Bus(interface="vla_hub", channel=str(path)) as bus:
         assert isinstance(bus, HubBus)
         assert bus.fileno() >= 0
 
 
-def test_filters_hide_other_frames(hub: CanHub, tmp_path: Path) -> None:
-    path = tmp_path / "can"
+def test_filters_hide_other_frames(hub: CanHub, path: Path) -> None:
     with opened(hub, path) as sender, opened(hub, path) as receiver:
         receiver.set_filters([{"can_id": 0x100, "can_mask": 0x7FF}])
         for can_id in (0x200, 0x100):
@@ -98,8 +101,7 @@ def test_filters_hide_other_frames(hub: CanHub, tmp_path: Path) -> None:
         assert frame.arbitration_id == 0x100
 
 
-def test_a_waiting_receiver_wakes_on_a_frame(hub: CanHub, tmp_path: Path) -> None:
-    path = tmp_path / "can"
+def test_a_waiting_receiver_wakes_on_a_frame(hub: CanHub, path: Path) -> None:
     with opened(hub, path) as sender, opened(hub, path) as receiver:
         sender.send(can.Message(arbitration_id=1, is_extended_id=False))
         carry = threading.Timer(0.02, hub.poll_once)
@@ -109,8 +111,8 @@ def test_a_waiting_receiver_wakes_on_a_frame(hub: CanHub, tmp_path: Path) -> Non
         assert frame is not None
 
 
-def test_a_closed_hub_is_a_lost_link_in_both_vocabularies(hub: CanHub, tmp_path: Path) -> None:
-    with opened(hub, tmp_path / "can") as bus:
+def test_a_closed_hub_is_a_lost_link_in_both_vocabularies(hub: CanHub, path: Path) -> None:
+    with opened(hub, path) as bus:
         hub.close()
         with pytest.raises(HubLost) as lost:
             bus.recv(timeout=0.0)
@@ -125,17 +127,16 @@ def test_a_missing_hub_is_an_initialisation_error(tmp_path: Path) -> None:
         HubBus(str(tmp_path / "nothing"))
 
 
-def test_a_hub_that_stops_reading_never_blocks_a_sender(hub: CanHub, tmp_path: Path) -> None:
+def test_a_hub_that_stops_reading_never_blocks_a_sender(hub: CanHub, path: Path) -> None:
     frame = can.Message(arbitration_id=1, is_extended_id=False)
-    with opened(hub, tmp_path / "can") as bus, pytest.raises(can.CanTimeoutError):
+    with opened(hub, path) as bus, pytest.raises(can.CanTimeoutError):
         for _ in range(100_000):
             bus.send(frame)
 
 
-def test_a_client_that_stops_reading_loses_its_frames_and_holds_up_nobody(
-    hub: CanHub, tmp_path: Path
+def test_a_client_that_stops_reading_loses_its_frames_and_blocks_no_other(
+    hub: CanHub, path: Path
 ) -> None:
-    path = tmp_path / "can"
     frame = can.Message(arbitration_id=1, is_extended_id=False)
     with opened(hub, path) as sender, opened(hub, path):
         for _ in range(2000):
@@ -144,8 +145,7 @@ def test_a_client_that_stops_reading_loses_its_frames_and_holds_up_nobody(
     assert hub.frames_dropped > 0
 
 
-def test_garbage_from_a_client_is_counted_and_dropped(hub: CanHub, tmp_path: Path) -> None:
-    path = tmp_path / "can"
+def test_garbage_from_a_client_is_counted_and_dropped(hub: CanHub, path: Path) -> None:
     with opened(hub, path) as sender, opened(hub, path) as receiver:
         sender._socket.send(b"noise")
         hub.poll_once()
@@ -153,16 +153,15 @@ def test_garbage_from_a_client_is_counted_and_dropped(hub: CanHub, tmp_path: Pat
         assert receiver.recv(timeout=0.0) is None
 
 
-def test_a_client_that_leaves_is_forgotten(hub: CanHub, tmp_path: Path) -> None:
-    bus = opened(hub, tmp_path / "can")
+def test_a_client_that_leaves_is_forgotten(hub: CanHub, path: Path) -> None:
+    bus = opened(hub, path)
     assert len(hub.filenos()) == 2
     bus.shutdown()
     hub.poll_once()
     assert len(hub.filenos()) == 1
 
 
-def test_a_second_hub_is_refused_but_a_dead_ones_socket_is_taken_over(tmp_path: Path) -> None:
-    path = tmp_path / "can"
+def test_a_second_hub_is_refused_but_a_dead_ones_socket_is_taken_over(path: Path) -> None:
     first = CanHub(CanWire(), path)
     with pytest.raises(DeviceBusy, match="stop that twin first"):
         CanHub(CanWire(), path)

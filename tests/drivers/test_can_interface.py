@@ -45,7 +45,7 @@ def test_a_kernel_without_can_says_what_to_load_or_take(monkeypatch: pytest.Monk
 
 
 class OpenBus(can.BusABC):  # type: ignore[misc]
-    """Be an interface that could be opened."""
+    """An interface that opens."""
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel=channel)
@@ -54,7 +54,7 @@ class OpenBus(can.BusABC):  # type: ignore[misc]
         raise NotImplementedError
 
 
-def test_an_interface_that_is_down_is_told_without_netlink(
+def test_an_interface_that_is_down_is_detected_without_netlink(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(can, "Bus", lambda **options: OpenBus(options["channel"]))

@@ -1,6 +1,7 @@
-"""Watch the bus itself: error frames, bus-off, full buffers, noise."""
+"""The state of the bus itself: error frames, bus-off, full buffers, noise."""
 
 from collections import deque
+from collections.abc import Iterator
 
 import can
 import numpy as np
@@ -12,6 +13,7 @@ from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
+from sim_twin.contracts.scripted import ManualClock
 
 
 class QueueBus(can.BusABC):  # type: ignore[misc]
@@ -36,20 +38,21 @@ class QueueBus(can.BusABC):  # type: ignore[misc]
         return item
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.time_ns = 0
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
 @pytest.fixture
 def bus() -> QueueBus:
     return QueueBus()
+
+
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock()
+
+
+@pytest.fixture
+def link(bus: QueueBus, clock: ManualClock) -> Iterator[CanLink]:
+    link = CanLink(bus, clock)
+    yield link
+    link.close()
 
 
 def error_frame(classes: int, controller: int = 0) -> can.Message:
@@ -67,41 +70,37 @@ def error_frame(classes: int, controller: int = 0) -> can.Message:
         (error_frame(0x104, 0x40), ControllerState.ACTIVE, "controller restarted"),
     ],
 )
-def test_error_frames_tell_the_controllers_state(
-    bus: QueueBus, frame: can.Message, state: ControllerState, words: str
+def test_error_frames_show_the_controllers_state(
+    bus: QueueBus, link: CanLink, frame: can.Message, state: ControllerState, words: str
 ) -> None:
-    link = CanLink(bus, Clock())
     bus.incoming.append(frame)
     assert link.drain() == []
     assert link.controller is state
     assert words in describe(frame)
     assert bool(link.trouble) == (state is not ControllerState.ACTIVE)
-    link.close()
 
 
-def test_lost_arbitration_and_missing_acknowledgements_are_counted(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+def test_lost_arbitration_and_missing_acknowledgements_are_counted(
+    bus: QueueBus, link: CanLink
+) -> None:
     bus.incoming.extend([error_frame(0x02), error_frame(0x20), error_frame(0x22)])
     link.drain()
     counters = link.counters
     assert (counters["arbitration_lost"], counters["not_acknowledged"]) == (2, 2)
     assert counters["error_frames"] == 3
-    link.close()
 
 
-def test_bus_off_is_a_lost_link_with_a_remedy(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+def test_bus_off_is_a_lost_link_with_a_remedy(bus: QueueBus, link: CanLink) -> None:
     bus.incoming.append(error_frame(0x40))
     with pytest.raises(BusOff, match="restart-ms 100"):
         link.drain()
     assert issubclass(BusOff, LinkLost)
     assert "bus-off" in link.trouble
-    link.close()
 
 
-def test_a_transmit_buffer_that_stays_full_is_named(bus: QueueBus) -> None:
-    clock = Clock()
-    link = CanLink(bus, clock)
+def test_a_transmit_buffer_that_stays_full_is_named(
+    bus: QueueBus, link: CanLink, clock: ManualClock
+) -> None:
     bus.full = True
     link.send(0x123, b"a")
     assert link.trouble == ""
@@ -111,35 +110,28 @@ def test_a_transmit_buffer_that_stays_full_is_named(bus: QueueBus) -> None:
     bus.full = False
     link.send(0x123, b"a")
     assert link.trouble == ""
-    link.close()
 
 
-def test_a_vanished_interface_is_a_lost_link(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+def test_a_vanished_interface_is_a_lost_link(bus: QueueBus, link: CanLink) -> None:
     bus.incoming.append(can.CanOperationError("network is down", 100))
     with pytest.raises(LinkLost, match="network is down"):
         link.drain()
-    link.close()
 
 
-def test_noise_is_counted_and_what_follows_is_read(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+def test_noise_is_counted_and_what_follows_is_read(bus: QueueBus, link: CanLink) -> None:
     good = can.Message(arbitration_id=1, is_extended_id=False, data=b"x")
     bus.incoming.extend([ValueError("no hex"), IndexError("short"), good])
     assert [frame.arbitration_id for frame in link.drain()] == [1]
     assert link.frames_malformed == 2
-    link.close()
 
 
-def test_a_babbling_node_cannot_hold_the_caller_up(bus: QueueBus) -> None:
-    link = CanLink(bus, Clock())
+def test_a_babbling_node_cannot_hold_the_caller_up(bus: QueueBus, link: CanLink) -> None:
     frame = can.Message(arbitration_id=1, is_extended_id=False)
     bus.incoming.extend([frame] * 1000)
     assert len(link.drain()) == 256
-    link.close()
 
 
-def test_after_bus_off_the_drives_are_connected_anew_and_disabled() -> None:
+def test_after_bus_off_the_drives_are_reconnected_and_disabled() -> None:
     world = FreeWheelWorld([FreeWheel(WheelDrive(1))])
     specs = [DriveSpec(node_id=1, joint="left")]
 
@@ -170,16 +162,14 @@ def test_after_bus_off_the_drives_are_connected_anew_and_disabled() -> None:
 
 
 def test_a_frame_goes_out_with_its_own_data_whatever_went_before_it(
-    monkeypatch: pytest.MonkeyPatch,
+    bus: QueueBus, link: CanLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = QueueBus()
     sent: list[tuple[int, bytes, bool, int]] = []
 
     def note(msg: can.Message, timeout: float | None = None) -> None:
         sent.append((msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.dlc))
 
     monkeypatch.setattr(bus, "send", note)
-    link = CanLink(bus, Clock())
     for data in (b"\x01", b"\x01", b"\x02\x03", b""):
         link.send(0x201, data)
     link.send(0x202, b"\x01")

@@ -1,4 +1,4 @@
-"""Read frames as a person would want them read."""
+"""Describe frames in words."""
 
 import can
 import pytest
@@ -57,7 +57,7 @@ def test_odrive_frames(command: OdriveCommand, values: tuple[float, ...], text: 
     assert text in words.text
 
 
-def test_requests_by_remote_frame_and_unknown_commands_are_told() -> None:
+def test_requests_by_remote_frame_and_unknown_commands_are_described() -> None:
     asked = describe_odrive(frame(can_id(5, OdriveCommand.GET_IQ), remote=True))
     assert asked == Words(kind="Get_Iq", node=5, text="asked for by a remote frame")
     assert describe_odrive(frame(5 << 5 | 0x08)).kind == "command 0x08"

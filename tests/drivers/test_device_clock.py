@@ -38,7 +38,7 @@ def test_a_slow_drift_is_followed_after_two_windows() -> None:
     assert host_ns - mapped < 2.1 * 500e-6 * WINDOW_NS
 
 
-def test_a_device_that_was_away_is_measured_anew() -> None:
+def test_the_offset_is_measured_again_after_a_gap() -> None:
     clock = DeviceClock()
     clock.to_host_ns(5_000 * MS, 1_000 * MS)
     late_ns = 1_100 * MS + 3 * RESTART_NS

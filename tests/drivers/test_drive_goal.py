@@ -1,4 +1,4 @@
-"""Give a goal up where it is reached, out of reach or out of time."""
+"""A goal ends when it is reached, impossible or out of time."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A sensor's model decides about driver and line speed; an unknown one is told with those known."""
+"""A sensor's model selects driver and line speed; an unknown one is refused with the known ones."""
 
 import subprocess
 import sys
@@ -46,14 +46,14 @@ def test_the_models_are_driven_by_the_classes_of_their_names() -> None:
 
 
 @pytest.mark.parametrize("kind", SensorKind)
-def test_an_unknown_model_is_told_with_those_there_are(kind: SensorKind) -> None:
+def test_an_unknown_model_is_refused_with_the_known_ones(kind: SensorKind) -> None:
     with pytest.raises(UnknownModel, match=f"{kind.value} 'X1'") as caught:
         sensor_model(kind, "X1")
     assert all(name in str(caught.value) for name in model_names(kind))
     assert isinstance(caught.value, DriverError)
 
 
-def test_an_unknown_button_is_told_with_those_there_are() -> None:
+def test_an_unknown_button_is_refused_with_the_known_ones() -> None:
     opener = PathOpener({}, CLOCK)
     with pytest.raises(UnknownModel, match=r"'ROPE'.*HID, GPIO"):
         open_estop("ROPE", opener, "estop", CLOCK, number=1)

@@ -1,4 +1,4 @@
-"""A device that goes away is tried again, less and less often, and nobody waits for it."""
+"""A device that goes away is tried again, less and less often, without blocking."""
 
 from dataclasses import dataclass, field
 
@@ -50,7 +50,7 @@ def pull(socket: Socket) -> None:
     socket.made[-1].plugged = socket.present = False
 
 
-def test_a_missing_device_at_the_start_is_told() -> None:
+def test_a_device_missing_at_the_start_is_an_error() -> None:
     device = Reopening("thermometer", Socket(present=False).connect, ManualClock())
     with pytest.raises(DeviceMissing):
         device.open()

@@ -320,8 +320,8 @@ def campaign(name: str, count: int, seed: int) -> int:
 
 
 @pytest.mark.parametrize("name", PARSERS)
-def test_of_20_000_broken_streams_just_the_true_frames_are_accepted(name: str) -> None:
-    assert campaign(name, 20_000, seed=1) > 8_000
+def test_of_5_000_broken_streams_just_the_true_frames_are_accepted(name: str) -> None:
+    assert campaign(name, 5_000, seed=1) > 2_000
 
 
 @pytest.mark.slow

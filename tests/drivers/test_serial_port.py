@@ -1,4 +1,4 @@
-"""A tty is opened, locked, read without spinning, and its loss is told at once."""
+"""A tty is opened, locked, read without spinning, and its loss is reported at once."""
 
 import os
 import time
@@ -27,13 +27,23 @@ def pty(tmp_path: Path) -> Iterator[tuple[int, Path]]:
         assert "descriptor" in str(error)  # the test closed it to unplug
 
 
+@pytest.fixture
+def port(pty: tuple[int, Path]) -> Iterator[SerialPort]:
+    port = SerialPort(pty[1], 1_000_000, CLOCK)
+    yield port
+    port.close()
+
+
+@pytest.fixture
+def master(pty: tuple[int, Path]) -> int:
+    return pty[0]
+
+
 def soon(seconds: float) -> int:
     return CLOCK.now_ns() + round(seconds * 1e9)
 
 
-def test_bytes_pass_unchanged_both_ways_through_a_symlink(pty: tuple[int, Path]) -> None:
-    master, path = pty
-    port = SerialPort(path, 1_000_000, CLOCK)
+def test_bytes_pass_unchanged_both_ways_through_a_symlink(master: int, port: SerialPort) -> None:
     every_byte = bytes(range(256))
     port.write(every_byte)
     assert os.read(master, 512) == every_byte
@@ -44,14 +54,9 @@ def test_bytes_pass_unchanged_both_ways_through_a_symlink(pty: tuple[int, Path])
         assert chunk
         received += chunk
     assert received == every_byte
-    port.close()
 
 
-def test_a_silent_line_returns_nothing_at_the_deadline_without_spinning(
-    pty: tuple[int, Path],
-) -> None:
-    _, path = pty
-    port = SerialPort(path, 1_000_000, CLOCK)
+def test_a_silent_line_returns_nothing_at_the_deadline_without_spinning(port: SerialPort) -> None:
     cpu = time.process_time()
     start = CLOCK.now_ns()
     assert port.read(10, soon(0.1)) == b""
@@ -59,29 +64,22 @@ def test_a_silent_line_returns_nothing_at_the_deadline_without_spinning(
     assert waited_s >= 0.1
     assert time.process_time() - cpu < 0.03
     assert port.read(10, 0) == b""
-    port.close()
 
 
-def test_a_read_returns_what_is_there_up_to_the_limit(pty: tuple[int, Path]) -> None:
-    master, path = pty
-    port = SerialPort(path, 57_600, CLOCK)
+def test_a_read_returns_what_is_there_up_to_the_limit(master: int, port: SerialPort) -> None:
     os.write(master, b"abcdef")
     assert port.read(4, soon(1.0)) == b"abcd"
     assert port.read(4, soon(1.0)) == b"ef"
-    port.close()
 
 
-def test_discarded_input_is_gone(pty: tuple[int, Path]) -> None:
-    master, path = pty
-    port = SerialPort(path, 57_600, CLOCK)
+def test_discarded_input_is_gone(master: int, port: SerialPort) -> None:
     os.write(master, b"stale")
     assert port.read(1, soon(1.0)) == b"s"
     port.discard_input()
     assert port.read(10, soon(0.01)) == b""
-    port.close()
 
 
-def test_a_second_opener_is_told_that_the_port_is_busy(pty: tuple[int, Path]) -> None:
+def test_a_second_opener_finds_the_port_busy(pty: tuple[int, Path]) -> None:
     _, path = pty
     port = SerialPort(path, 57_600, CLOCK)
     with pytest.raises(DeviceBusy, match="stop the process that holds it"):
@@ -104,9 +102,7 @@ def test_an_unknown_baud_rate_is_refused(tmp_path: Path) -> None:
         SerialPort(tmp_path / "any", 12_345, CLOCK)
 
 
-def test_unplugging_is_told_by_every_operation_at_once(pty: tuple[int, Path]) -> None:
-    master, path = pty
-    port = SerialPort(path, 57_600, CLOCK)
+def test_every_operation_on_an_unplugged_port_fails_at_once(master: int, port: SerialPort) -> None:
     os.close(master)
     start = CLOCK.now_ns()
     with pytest.raises(LinkLost, match="reconnect"):
@@ -114,23 +110,17 @@ def test_unplugging_is_told_by_every_operation_at_once(pty: tuple[int, Path]) ->
     with pytest.raises(LinkLost, match="reconnect"):
         port.write(b"x")
     assert CLOCK.now_ns() - start < 1_000_000_000
-    port.close()
 
 
-def test_a_line_that_takes_no_bytes_is_given_up_instead_of_blocking(
-    pty: tuple[int, Path],
-) -> None:
-    _, path = pty
-    port = SerialPort(path, 57_600, CLOCK)
+def test_a_line_that_takes_no_bytes_is_given_up_instead_of_blocking(port: SerialPort) -> None:
     start = CLOCK.now_ns()
     with pytest.raises(LinkLost, match="took no byte"):
         port.write(bytes(1_000_000))
     assert CLOCK.now_ns() - start < 1_000_000_000
-    port.close()
 
 
 @pytest.mark.parametrize(("latency", "fault"), [("1", ""), ("16", "got 16 ms")])
-def test_an_adapter_that_holds_back_bytes_is_told_with_the_remedy(
+def test_an_adapter_that_holds_back_bytes_is_reported_with_the_remedy(
     pty: tuple[int, Path], tmp_path: Path, latency: str, fault: str
 ) -> None:
     _, path = pty
@@ -145,24 +135,19 @@ def test_an_adapter_that_holds_back_bytes_is_told_with_the_remedy(
     assert not fault or f"sudo tee {device / 'latency_timer'}" in text
 
 
-def test_a_port_that_is_no_usb_adapter_has_no_latency_timer(pty: tuple[int, Path]) -> None:
-    port = SerialPort(pty[1], 1_000_000, CLOCK)
+def test_a_port_that_is_no_usb_adapter_has_no_latency_timer(port: SerialPort) -> None:
     assert port.adapter_fault() == ""
-    port.close()
 
 
-def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Path]) -> None:
-    master, path = pty
-    port = SerialPort(path, 1_000_000, CLOCK)
+def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(master: int, port: SerialPort) -> None:
     os.write(master, b"0123456789")
     assert port.read_burst(4, 0, soon(1.0)) == b"0123"
     assert port.read_burst(10, 0, soon(0.05)) == b"456789"
     assert port.read_burst(10, 0, soon(0.0)) == b""
-    port.close()
 
 
 class NapClock:
-    """Stand still until `idle`; whoever sleeps finds what the other end has sent meanwhile."""
+    """Stand still until `idle`; a sleep lets the other end send meanwhile."""
 
     def __init__(self, master: int) -> None:
         self.naps_until_ns: list[int] = []
@@ -232,10 +217,8 @@ def test_a_burst_that_is_overdue_is_not_slept_for(pty: tuple[int, Path]) -> None
     port.close()
 
 
-def test_the_speed_can_be_changed_to_one_on_offer(pty: tuple[int, Path]) -> None:
-    port = SerialPort(pty[1], 1_000_000, CLOCK)
+def test_the_speed_can_be_changed_to_one_on_offer(port: SerialPort) -> None:
     port.set_baud(57_600)
     with pytest.raises(ValueError, match="baud must be one of"):
         port.set_baud(12_345)
     assert 57_600 in port.bauds
-    port.close()

@@ -1,4 +1,4 @@
-"""A Unix stream carries bytes, and its loss is told at once."""
+"""A Unix stream carries bytes, and its loss is reported at once."""
 
 import socket
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ def test_discarded_input_is_gone(ends: tuple[SocketStream, socket.socket]) -> No
     assert stream.read(100, 0) == b""
 
 
-def test_a_socket_that_nobody_serves_is_missing(tmp_path: Path) -> None:
+def test_a_socket_without_a_server_is_missing(tmp_path: Path) -> None:
     with pytest.raises(DeviceMissing, match=r"camera.*start what serves it"):
         SocketStream(tmp_path / "camera", CLOCK)
 

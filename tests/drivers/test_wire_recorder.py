@@ -26,17 +26,7 @@ from drivers.recording.recording import (
     older_part,
     read_recording,
 )
-
-
-class SteppedClock:
-    def __init__(self) -> None:
-        self.time_ns = 7 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
+from sim_twin.contracts.scripted import ManualClock
 
 
 class EchoLine:
@@ -66,8 +56,8 @@ class EchoLine:
 
 
 @pytest.fixture
-def clock() -> SteppedClock:
-    return SteppedClock()
+def clock() -> ManualClock:
+    return ManualClock(7 * NS_PER_S)
 
 
 @pytest.fixture
@@ -75,11 +65,11 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "servos.wire"
 
 
-def test_what_passes_is_recorded_in_order_with_its_time(file: Path, clock: SteppedClock) -> None:
+def test_what_passes_is_recorded_in_order_with_its_time(file: Path, clock: ManualClock) -> None:
     line = EchoLine()
     wire = RecordingTransport(line, WireRecorder(file, clock, note="echo at 1000000 baud"))
     wire.write(b"abc")
-    clock.time_ns += 400
+    clock.ns += 400
     assert wire.read(10, 0) == b"cba"
     assert wire.read(10, 0) == b""
     wire.close()
@@ -91,7 +81,7 @@ def test_what_passes_is_recorded_in_order_with_its_time(file: Path, clock: Stepp
     ]
 
 
-def test_a_record_reads_as_a_line(file: Path, clock: SteppedClock) -> None:
+def test_a_record_reads_as_a_line(file: Path, clock: ManualClock) -> None:
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock, note="echo"))
     wire.write(b"\xff\xfd")
     assert [str(record) for record in read_recording(file)] == [
@@ -120,7 +110,7 @@ class FullLine(EchoLine):
 
 
 def test_what_a_line_offers_beyond_bytes_is_offered_through_the_recorder(
-    file: Path, clock: SteppedClock
+    file: Path, clock: ManualClock
 ) -> None:
     line = FullLine()
     wire = RecordingTransport(line, WireRecorder(file, clock))
@@ -138,7 +128,7 @@ def test_what_a_line_offers_beyond_bytes_is_offered_through_the_recorder(
 
 
 def test_a_line_that_offers_only_bytes_does_not_pretend_more(
-    file: Path, clock: SteppedClock
+    file: Path, clock: ManualClock
 ) -> None:
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
     wire.write(b"abc")
@@ -155,7 +145,7 @@ def test_a_line_that_offers_only_bytes_does_not_pretend_more(
     "act", [lambda w: w.write(b"x"), lambda w: w.read(1, 0), lambda w: w.read_burst(1, 0, 0)]
 )
 def test_a_lost_link_is_recorded_and_raised(
-    act: Callable[[RecordingTransport], object], file: Path, clock: SteppedClock
+    act: Callable[[RecordingTransport], object], file: Path, clock: ManualClock
 ) -> None:
     line = EchoLine()
     wire = RecordingTransport(line, WireRecorder(file, clock))
@@ -166,14 +156,14 @@ def test_a_lost_link_is_recorded_and_raised(
     assert (last.kind, last.payload) == (RecordKind.LOST, b"echo: unplugged")
 
 
-def test_every_record_is_in_the_file_at_once(file: Path, clock: SteppedClock) -> None:
+def test_every_record_is_in_the_file_at_once(file: Path, clock: ManualClock) -> None:
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
     for count in range(1, 20):
         wire.write(bytes(count))
         assert len(read_recording(file)) == count, "nothing waits for a close that may never come"
 
 
-def test_a_record_cut_anywhere_costs_only_itself(file: Path, clock: SteppedClock) -> None:
+def test_a_record_cut_anywhere_costs_only_itself(file: Path, clock: ManualClock) -> None:
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
     wire.write(b"first")
     whole = file.stat().st_size
@@ -184,7 +174,7 @@ def test_a_record_cut_anywhere_costs_only_itself(file: Path, clock: SteppedClock
         assert [record.payload for record in read_recording(file)] == [b"first"]
 
 
-def test_a_record_with_a_wrong_bit_ends_the_reading(file: Path, clock: SteppedClock) -> None:
+def test_a_record_with_a_wrong_bit_ends_the_reading(file: Path, clock: ManualClock) -> None:
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
     for payload in (b"first", b"second"):
         wire.write(payload)
@@ -196,9 +186,7 @@ def test_a_record_with_a_wrong_bit_ends_the_reading(file: Path, clock: SteppedCl
         assert [record.payload for record in read_recording(file)] == [b"first"]
 
 
-def test_the_file_keeps_the_newest_records_within_its_bound(
-    file: Path, clock: SteppedClock
-) -> None:
+def test_the_file_keeps_the_newest_records_within_its_bound(file: Path, clock: ManualClock) -> None:
     recorder = WireRecorder(file, clock, note="bounded", max_bytes=MIN_MAX_BYTES)
     for number in range(3000):
         recorder.record(RecordKind.WRITE, number.to_bytes(4, "little") * 100)
@@ -214,7 +202,7 @@ def test_the_file_keeps_the_newest_records_within_its_bound(
 
 
 def test_a_new_recording_replaces_the_earlier_one_with_its_older_part(
-    file: Path, clock: SteppedClock
+    file: Path, clock: ManualClock
 ) -> None:
     recorder = WireRecorder(file, clock, max_bytes=MIN_MAX_BYTES)
     for _ in range(400):
@@ -224,7 +212,7 @@ def test_a_new_recording_replaces_the_earlier_one_with_its_older_part(
     assert [record.payload for record in read_recording(file)] == [b"new"]
 
 
-def test_a_payload_longer_than_a_record_becomes_several(file: Path, clock: SteppedClock) -> None:
+def test_a_payload_longer_than_a_record_becomes_several(file: Path, clock: ManualClock) -> None:
     long = os.urandom(MAX_PAYLOAD_BYTES + 5)
     WireRecorder(file, clock).record(RecordKind.READ, long)
     records = read_recording(file)
@@ -236,7 +224,7 @@ def test_a_payload_longer_than_a_record_becomes_several(file: Path, clock: Stepp
 
 def test_a_full_disk_ends_the_recording_and_not_the_wire(
     file: Path,
-    clock: SteppedClock,
+    clock: ManualClock,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -263,7 +251,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_written_and_a_tiny_bound_are_refused(
-    tmp_path: Path, clock: SteppedClock
+    tmp_path: Path, clock: ManualClock
 ) -> None:
     with pytest.raises(DeviceMissing, match="choose another file"):
         WireRecorder(tmp_path / "no" / "such" / "folder.wire", clock)
@@ -281,7 +269,7 @@ def frames() -> list[can.Message]:
 
 
 def test_can_frames_are_recorded_both_ways_and_come_back_as_they_were(
-    file: Path, clock: SteppedClock
+    file: Path, clock: ManualClock
 ) -> None:
     with can.Bus(interface="virtual", channel="recorder", protocol=can.CanProtocol.CAN_FD) as peer:
         inner = can.Bus(interface="virtual", channel="recorder", protocol=can.CanProtocol.CAN_FD)
@@ -319,7 +307,7 @@ class OneLineOpener:
 
 
 def test_an_opener_records_each_device_each_time_it_is_opened(
-    tmp_path: Path, clock: SteppedClock
+    tmp_path: Path, clock: ManualClock
 ) -> None:
     opener = recorded_if_asked(OneLineOpener(), clock, str(tmp_path / "run"))
     for _ in range(12):
@@ -332,13 +320,13 @@ def test_an_opener_records_each_device_each_time_it_is_opened(
     assert (note.payload, write.payload) == (b"device servos", b"hello")
 
 
-def test_nothing_is_recorded_unless_asked(clock: SteppedClock) -> None:
+def test_nothing_is_recorded_unless_asked(clock: ManualClock) -> None:
     opener = OneLineOpener()
     assert recorded_if_asked(opener, clock, None) is opener
 
 
 def test_a_recording_directory_that_cannot_be_made_is_refused(
-    tmp_path: Path, clock: SteppedClock
+    tmp_path: Path, clock: ManualClock
 ) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(DeviceMissing, match="choose another directory"):

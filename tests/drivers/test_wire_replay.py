@@ -10,6 +10,7 @@ from drivers.errors import LinkLost
 from drivers.recording.recorder import RecordingTransport, WireRecorder
 from drivers.recording.recording import RecordKind, WireRecord, read_recording
 from drivers.recording.replay import ReplayDiverged, WireReplay
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
@@ -26,73 +27,62 @@ SESSION = [
 ]
 
 
-class SteppedClock:
-    def __init__(self, time_ns: int = 50 * NS_PER_S) -> None:
-        self.time_ns = time_ns
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-
-
 def test_replies_come_as_late_after_their_request_as_they_did() -> None:
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(SESSION, clock)
     wire.write(b"ping")
-    start_ns = clock.time_ns
+    start_ns = clock.ns
     assert wire.read(10, start_ns + 300 * US) == b""
-    assert clock.time_ns == start_ns + 300 * US
+    assert clock.ns == start_ns + 300 * US
     assert wire.read(10, start_ns + NS_PER_S) == b"po"
-    assert clock.time_ns == start_ns + 400 * US
+    assert clock.ns == start_ns + 400 * US
     assert wire.read(10, start_ns + NS_PER_S) == b"ng"
-    assert clock.time_ns == start_ns + 500 * US
+    assert clock.ns == start_ns + 500 * US
     wire.write(b"more")
     assert not wire.finished
-    assert wire.read(10, clock.time_ns + NS_PER_S) == b"done"
+    assert wire.read(10, clock.ns + NS_PER_S) == b"done"
     assert wire.finished
 
 
 def test_a_poll_takes_only_what_is_due_and_a_small_read_leaves_the_rest() -> None:
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(SESSION, clock)
     wire.write(b"ping")
     assert wire.read(10, 0) == b""
-    clock.time_ns += 450 * US
+    clock.ns += 450 * US
     assert [wire.read(1, 0) for _ in range(3)] == [b"p", b"o", b""]
 
 
-def test_a_reply_that_nobody_read_is_still_there_at_the_next_request() -> None:
-    clock = SteppedClock()
+def test_an_unread_reply_is_still_there_at_the_next_request() -> None:
+    clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(SESSION, clock)
     wire.write(b"ping")
     wire.write(b"more")
-    clock.time_ns += NS_PER_S
+    clock.ns += NS_PER_S
     assert [wire.read(10, 0) for _ in range(4)] == [b"po", b"ng", b"done", b""]
 
 
 def test_discarded_input_is_gone() -> None:
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(SESSION, clock)
     wire.write(b"ping")
-    clock.time_ns += 450 * US
+    clock.ns += 450 * US
     wire.discard_input()
-    assert wire.read(10, clock.time_ns + NS_PER_S) == b"ng"
+    assert wire.read(10, clock.ns + NS_PER_S) == b"ng"
 
 
 def test_what_came_before_any_request_comes_by_itself() -> None:
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     stream = [WireRecord(READ, n * 100_000 * US, bytes([n])) for n in range(5)]
     wire = WireReplay(stream, clock)
-    start_ns = clock.time_ns
+    start_ns = clock.ns
     got = [wire.read(100, start_ns + NS_PER_S) for _ in range(5)]
     assert got == [bytes([n]) for n in range(5)]
-    assert clock.time_ns == start_ns + 400_000 * US
+    assert clock.ns == start_ns + 400_000 * US
 
 
 def test_another_request_is_an_error_that_shows_both() -> None:
-    wire = WireReplay(SESSION, SteppedClock())
+    wire = WireReplay(SESSION, ManualClock(50 * NS_PER_S))
     wire.write(b"ping")
     with pytest.raises(ReplayDiverged) as caught:
         wire.write(b"pink")
@@ -103,7 +93,7 @@ def test_another_request_is_an_error_that_shows_both() -> None:
 
 
 def test_a_request_beyond_the_end_is_an_error() -> None:
-    wire = WireReplay(SESSION, SteppedClock())
+    wire = WireReplay(SESSION, ManualClock(50 * NS_PER_S))
     wire.write(b"ping")
     wire.write(b"more")
     with pytest.raises(ReplayDiverged, match="the recording ended before the request 78"):
@@ -112,10 +102,10 @@ def test_a_request_beyond_the_end_is_an_error() -> None:
 
 def test_a_lost_link_is_lost_again_at_its_place() -> None:
     records = [*SESSION[:3], WireRecord(LOST, 1_500 * US, b"adapter gone")]
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     wire = WireReplay(records, clock)
     wire.write(b"ping")
-    assert wire.read(10, clock.time_ns + NS_PER_S) == b"po"
+    assert wire.read(10, clock.ns + NS_PER_S) == b"po"
     for act in (lambda: wire.read(10, 0), lambda: wire.write(b"more")):
         with pytest.raises(LinkLost, match="adapter gone"):
             act()
@@ -123,24 +113,24 @@ def test_a_lost_link_is_lost_again_at_its_place() -> None:
 
 def test_a_recording_without_traffic_is_refused() -> None:
     with pytest.raises(ValueError, match="no byte traffic"):
-        WireReplay(SESSION[:1], SteppedClock())
+        WireReplay(SESSION[:1], ManualClock(50 * NS_PER_S))
 
 
-class TurningServos(SteppedClock):
+class TurningServos(ManualClock):
     """Servos whose time is this clock."""
 
     def __init__(self, specs: Sequence[ServoSpec]) -> None:
         super().__init__(10 * NS_PER_S)
         emulated = [EmulatedServoSpec(id=one.id, model_name=one.model_name) for one in specs]
         self.servos = FreeServos(emulated)
-        self.sleep_until(self.time_ns + NS_PER_S // 100)
+        self.sleep_until(self.ns + NS_PER_S // 100)
 
     def sleep_until(self, deadline_ns: int) -> None:
         super().sleep_until(deadline_ns)
-        self.servos.advance_to(self.time_ns)
+        self.servos.advance_to(self.ns)
 
 
-def drive(clock: SteppedClock, bus: DynamixelBus) -> np.ndarray:
+def drive(clock: ManualClock, bus: DynamixelBus) -> np.ndarray:
     """Connect, hold, and follow a sine; return every value that was read."""
     bus.connect()
     positions = [bus.read_state().position_rad.copy()]
@@ -159,13 +149,13 @@ def test_a_servo_session_replays_to_the_same_values_without_any_servo(tmp_path: 
     recorder = WireRecorder(tmp_path / "servos.wire", bench)
 
     def new_bus(
-        line: MemoryLine | RecordingTransport | WireReplay, clock: SteppedClock
+        line: MemoryLine | RecordingTransport | WireReplay, clock: ManualClock
     ) -> DynamixelBus:
         return DynamixelBus(line, clock, specs, baud=1_000_000)
 
     recorded = drive(bench, new_bus(RecordingTransport(line, recorder), bench))
     assert np.ptp(recorded, axis=0).min() > 0.1, "the servos moved"
-    clock = SteppedClock(20 * NS_PER_S)
+    clock = ManualClock(20 * NS_PER_S)
     replay = WireReplay(read_recording(tmp_path / "servos.wire"), clock)
     replayed = drive(clock, new_bus(replay, clock))
     assert np.array_equal(recorded, replayed)
@@ -178,7 +168,7 @@ def test_a_driver_with_other_goals_diverges(tmp_path: Path) -> None:
     line = MemoryLine(bench.servos.bank, bench)
     wire = RecordingTransport(line, WireRecorder(tmp_path / "servos.wire", bench))
     drive(bench, DynamixelBus(wire, bench, specs, baud=1_000_000))
-    clock = SteppedClock()
+    clock = ManualClock(50 * NS_PER_S)
     mirrored = [ServoSpec(id=1, model_name="XM430-W350", joint="joint_1", sign=-1)]
     replay = WireReplay(read_recording(tmp_path / "servos.wire"), clock)
     with pytest.raises(ReplayDiverged, match="expected the request"):

@@ -76,18 +76,18 @@ def test_posing_an_unknown_joint_is_refused(engine: Engine) -> None:
         engine.pose({"knee": 1.0})
 
 
-def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
+def test_plain_numbers_give_the_same_motion_as_arrays(engine: Engine) -> None:
     engine.data.joint("arm").qpos[0] = 0.8
     engine.data.joint("arm").qvel[0] = 0.1
     engine.servos.slip(0, 0.05)
-    told: list[tuple[int, float, float]] = []
+    reported: list[tuple[int, float, float]] = []
 
     def law(now_ns: int, angle_rad: float, speed_rad_s: float) -> float:
-        told.append((now_ns, angle_rad, speed_rad_s))
+        reported.append((now_ns, angle_rad, speed_rad_s))
         return 0.25
 
     engine.servos.command_each(engine.now_ns, [law])
-    ((now_ns, angle_rad, speed_rad_s),) = told
+    ((now_ns, angle_rad, speed_rad_s),) = reported
     assert now_ns == engine.now_ns
     assert angles(engine) == pytest.approx([angle_rad])
     assert speeds(engine) == pytest.approx([speed_rad_s])

@@ -60,7 +60,7 @@ def test_the_sheet_spreads_over_the_whole_film() -> None:
 
 
 @pytest.mark.gl
-def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
+def test_the_film_server_shoots_at_the_films_rate_in_simulated_time(
     engine: Engine, tmp_path: Path
 ) -> None:
     desk = FilmServer(engine.model, engine.data, camera=OWN)
@@ -73,7 +73,7 @@ def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
 
 
 @pytest.mark.parametrize("op", ["film_stop", "caption", "explode"])
-def test_the_desk_refuses_what_it_cannot_do(engine: Engine, op: str) -> None:
+def test_the_film_server_refuses_what_it_cannot_do(engine: Engine, op: str) -> None:
     with pytest.raises(RefereeRefusal):
         FilmServer(engine.model, engine.data, camera=OWN).answer({"op": op})
 

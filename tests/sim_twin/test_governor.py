@@ -1,4 +1,4 @@
-"""Time waits for who works on it, and for nobody who cannot go on.
+"""Time waits for members that work, not for those that cannot go on.
 
 Run as a program, this moves time in a folder as the twin does, without any physics.
 """
@@ -39,7 +39,7 @@ sys.stdin.read()
 
 
 class Metronome:
-    """Advance a governor step by step until told to stop."""
+    """Advance a governor step by step until stopped."""
 
     def __init__(self, folder: Path, *, is_fast: bool = True) -> None:
         self.governor = Governor(folder, Pacer(MonotonicClock(), is_fast=is_fast))
@@ -108,7 +108,7 @@ def child(metronome: Metronome, folder: Path) -> Iterator["subprocess.Popen[str]
         child.kill()
 
 
-def test_time_goes_on_while_nobody_works(metronome: Metronome, folder: Path) -> None:
+def test_time_goes_on_while_no_member_works(metronome: Metronome, folder: Path) -> None:
     assert passes(TwinClock(folder))
 
 
@@ -214,7 +214,7 @@ def test_a_child_that_loads_holds_time_at_what_was_declared_and_begins_there(
     assert begins == [now_ns + 500 * MS]
 
 
-def test_a_child_that_is_quicker_than_its_announcement_freezes_nobody(
+def test_a_child_that_is_quicker_than_its_announcement_does_not_freeze_time(
     metronome: Metronome, folder: Path, child: "subprocess.Popen[str]"
 ) -> None:
     clock = TwinClock(folder)
@@ -226,7 +226,7 @@ def test_a_child_that_is_quicker_than_its_announcement_freezes_nobody(
 @pytest.mark.parametrize(
     "packet", [b"x", b"\xff" * 17, pack(Op.JOIN, 1) + b"{}", pack(Op.JOIN, 1) + b"[1]"]
 )
-def test_what_is_no_packet_costs_its_sender_the_connection_and_nobody_else(
+def test_an_invalid_packet_costs_only_its_sender_the_connection(
     metronome: Metronome, folder: Path, packet: bytes
 ) -> None:
     clock = TwinClock(folder)
@@ -242,6 +242,15 @@ def test_one_that_only_watches_holds_nothing(metronome: Metronome, folder: Path)
     due_ns = clock.now_ns() + 50 * MS
     clock.sleep_until(due_ns)
     assert clock.now_ns() >= due_ns
+    assert passes(clock)
+
+
+def test_a_governor_that_ends_disconnects_its_members_and_frees_time(folder: Path) -> None:
+    with Metronome(folder):
+        clock = TwinClock(folder)
+        clock.join(TimeRole(name="control", order=0), os.getpid())
+        assert clock.page.is_governed
+    assert not clock.page.is_governed
     assert passes(clock)
 
 
@@ -319,7 +328,7 @@ def test_a_clock_that_first_waits_when_the_twin_has_died_goes_by_the_wall(
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
 @pytest.mark.parametrize("joined", [True, False])
-def test_a_twin_that_dies_or_is_stopped_freezes_nobody(
+def test_a_twin_that_dies_or_is_stopped_does_not_freeze_time(
     apart: Apart, folder: Path, number: signal.Signals, joined: bool
 ) -> None:
     clock = TwinClock(folder)

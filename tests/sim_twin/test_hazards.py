@@ -1,4 +1,4 @@
-"""The watch must see what is dangerous, and nothing in ordinary work."""
+"""The hazard watch reports what is dangerous, and nothing in ordinary work."""
 
 import math
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_a_robot_that_tips_is_seen(twin: Twin) -> None:
     assert ("tilt", "base") in kinds(watch)
 
 
-def test_what_is_begun_anew_forgets(twin: Twin) -> None:
+def test_beginning_again_clears_the_findings(twin: Twin) -> None:
     watch = twin.hazards
     twin.engine.place("red_cup", 1.0, 3.0, 0.5, 0.0)
     run(twin, 250)

@@ -2,20 +2,10 @@ import pytest
 
 from drivers.base import ByteTransport
 from drivers.errors import LinkLost
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.ports.lines import MemoryLine
 
 LATER_NS = 10**12
-
-
-class FakeClock:
-    def __init__(self) -> None:
-        self.time_ns = 0
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
 
 
 class Shouter:
@@ -36,8 +26,8 @@ class Shouter:
 
 
 @pytest.fixture
-def clock() -> FakeClock:
-    return FakeClock()
+def clock() -> ManualClock:
+    return ManualClock()
 
 
 @pytest.fixture
@@ -46,7 +36,7 @@ def device() -> Shouter:
 
 
 @pytest.fixture
-def line(device: Shouter, clock: FakeClock) -> MemoryLine:
+def line(device: Shouter, clock: ManualClock) -> MemoryLine:
     return MemoryLine(device, clock)
 
 
@@ -57,7 +47,7 @@ def test_it_is_a_transport_and_a_reply_is_there_at_once(line: MemoryLine) -> Non
 
 
 def test_a_silent_device_gives_nothing_at_once_and_time_stands_still(
-    line: MemoryLine, clock: FakeClock
+    line: MemoryLine, clock: ManualClock
 ) -> None:
     assert line.read(64, LATER_NS) == b""
     assert clock.now_ns() == 0
@@ -85,8 +75,8 @@ def test_discarding_drops_bytes_on_both_sides_of_the_line(line: MemoryLine) -> N
     assert line.read(64, LATER_NS) == b""
 
 
-def test_an_unplugged_line_says_since_when(line: MemoryLine, clock: FakeClock) -> None:
-    clock.time_ns = 12_345_000_000
+def test_an_unplugged_line_says_since_when(line: MemoryLine, clock: ManualClock) -> None:
+    clock.ns = 12_345_000_000
     line.unplug()
     with pytest.raises(LinkLost, match=r"Shouter: unplugged at 12\.345 s"):
         line.write(b"a")
@@ -138,7 +128,7 @@ class Postman(Shouter):
 
 @pytest.mark.parametrize("paced", [False, True])
 def test_a_read_moves_time_to_the_arrival_of_what_is_under_way(
-    clock: FakeClock, paced: bool
+    clock: ManualClock, paced: bool
 ) -> None:
     line = MemoryLine(Postman(300, paced=paced), clock)
     line.write(b"hello")
@@ -148,7 +138,7 @@ def test_a_read_moves_time_to_the_arrival_of_what_is_under_way(
 
 @pytest.mark.parametrize(("paced", "waited_ns"), [(False, 0), (True, 200)])
 def test_a_read_that_ends_too_early_waits_to_its_deadline_on_a_paced_line_only(
-    clock: FakeClock, paced: bool, waited_ns: int
+    clock: ManualClock, paced: bool, waited_ns: int
 ) -> None:
     line = MemoryLine(Postman(300, paced=paced), clock)
     line.write(b"hello")

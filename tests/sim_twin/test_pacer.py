@@ -26,7 +26,7 @@ def test_a_small_delay_is_caught_up_with(clock: ManualClock) -> None:
     assert [pacer.wait_ns(due * MS) for due in (2, 20, 22)] == [0, 0, 2 * MS]
 
 
-def test_what_somebody_held_for_longer_is_not_caught_up_with(clock: ManualClock) -> None:
+def test_a_long_delay_is_not_caught_up_with(clock: ManualClock) -> None:
     pacer = Pacer(clock, is_fast=False)
     pacer.start(0)
     clock.ns = 1000 * MS

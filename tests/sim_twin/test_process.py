@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import shutil
 import signal
 import statistics
@@ -83,7 +84,7 @@ def children(pid: int) -> list[int]:
 
 
 def is_running(pid: int) -> bool:
-    """Return whether a process still runs; a zombie that nobody reaped does not."""
+    """Return whether a process still runs; a zombie that was not reaped does not."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
     except FileNotFoundError:
@@ -163,7 +164,7 @@ def test_paced_frames_take_the_time_of_their_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "header"), [("lidar", b"\x54\x2c"), ("imu", b"\xaa\xaa")])
-def test_sensors_talk_by_themselves(devices: PathOpener, name: str, header: bytes) -> None:
+def test_sensors_send_unasked(devices: PathOpener, name: str, header: bytes) -> None:
     line = devices.serial(name)
     line.discard_input()
     heard = b""
@@ -173,7 +174,7 @@ def test_sensors_talk_by_themselves(devices: PathOpener, name: str, header: byte
     assert header in heard
 
 
-def test_the_referee_tells_the_truth_and_the_pace(run_dir: Path) -> None:
+def test_the_referee_reports_the_truth_and_the_pace(run_dir: Path) -> None:
     first = ask(run_dir, "truth")
     second = ask(run_dir, "truth")
     assert second["sim_s"] >= first["sim_s"]
@@ -235,10 +236,24 @@ def test_a_robot_whose_camera_has_another_name_is_filmed_too(tmp_path: Path) -> 
     assert end(twin) == 0
 
 
-def test_a_robot_file_without_its_camera_in_the_mjcf_is_one_clear_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("run_dir", "words", "reason"),
+    [
+        ("", ["--world", "moon"], "'moon'.*flat"),
+        ("long" * 20, [], "choose a shorter one"),
+        ("", ["--robot", "{robot}"], 'expected a <camera name="chest_eye">.*head_camera'),
+    ],
+    ids=["unknown world", "path too long for sockets", "camera that the MJCF lacks"],
+)
+def test_what_cannot_be_started_is_refused_in_one_line(
+    tmp_path: Path, run_dir: str, words: list[str], reason: str
+) -> None:
     robot = butler_with_camera(tmp_path / "robot", site="chest_eye", camera="head_camera")
+    folder = tmp_path / run_dir
+    folder.mkdir(exist_ok=True)
+    words = [word.replace("{robot}", str(robot)) for word in words]
     refused = subprocess.run(
-        [sys.executable, "-m", "sim_twin", "--run-dir", str(tmp_path), "--robot", str(robot)],
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(folder), *words],
         capture_output=True,
         text=True,
         timeout=START_TIMEOUT_S,
@@ -246,8 +261,7 @@ def test_a_robot_file_without_its_camera_in_the_mjcf_is_one_clear_line(tmp_path:
     )
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()
-    assert 'expected a <camera name="chest_eye">' in line
-    assert "head_camera" in line
+    assert re.search(reason, line)
 
 
 @pytest.mark.gl
@@ -287,19 +301,6 @@ def test_a_twin_in_the_background_outlives_the_shell_that_started_it(tmp_path: P
     assert not ready.exists()
 
 
-def test_an_unknown_world_is_one_clear_line(tmp_path: Path) -> None:
-    refused = subprocess.run(
-        [sys.executable, "-m", "sim_twin", "--run-dir", str(tmp_path), "--world", "moon"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert refused.returncode == 2
-    (line,) = refused.stderr.splitlines()
-    assert "'moon'" in line
-    assert "flat" in line
-
-
 def test_the_button_and_the_room_are_served(devices: PathOpener) -> None:
     clock = MonotonicClock()
     robot = load_robot("butler")
@@ -318,22 +319,7 @@ def test_the_button_and_the_room_are_served(devices: PathOpener) -> None:
     microphone.close()
 
 
-def test_a_path_too_long_for_sockets_is_refused_with_a_remedy(tmp_path: Path) -> None:
-    run_dir = tmp_path / ("long" * 20)
-    run_dir.mkdir()
-    done = subprocess.run(
-        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir)],
-        capture_output=True,
-        text=True,
-        timeout=START_TIMEOUT_S,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "choose a shorter one" in done.stderr
-
-
-def test_somebody_speaks_into_the_room_and_the_robot_is_heard(run_dir: Path) -> None:
+def test_speech_reaches_the_microphone_and_the_speaker_is_recorded(run_dir: Path) -> None:
     clock = MonotonicClock()
     opener = PathOpener(device_links(load_robot("butler"), run_dir / "dev"), clock)
     format_ = AudioFormat(rate_hz=16_000)

@@ -28,7 +28,7 @@ class Echo:
         return ready
 
     def step(self, now_ns: int) -> None:
-        """Have nothing of its own to say."""
+        """Send nothing unasked."""
 
 
 @pytest.fixture
@@ -47,20 +47,25 @@ def open_host(line: PtyLine) -> int:
     return os.open(line.link_path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
 
+@pytest.fixture
+def host(line: PtyLine) -> Iterator[int]:
+    host = open_host(line)
+    yield host
+    os.close(host)
+
+
 def readable(descriptor: int, timeout_ms: int) -> bool:
     poller = select.poll()
     poller.register(descriptor, select.POLLIN)
     return bool(poller.poll(timeout_ms))
 
 
-def test_every_byte_passes_unchanged_in_both_directions(line: PtyLine) -> None:
-    host = open_host(line)
+def test_every_byte_passes_unchanged_in_both_directions(line: PtyLine, host: int) -> None:
     os.write(host, EVERY_BYTE)
     assert readable(line.fileno(), 1000)
     assert line.poll_once()
     assert readable(host, 1000)
     assert os.read(host, 4096) == EVERY_BYTE
-    os.close(host)
 
 
 def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine) -> None:
@@ -71,20 +76,20 @@ def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine
     assert not line.poll_once()
 
 
-def test_what_is_ready_is_sent_without_hearing_the_host(line: PtyLine, device: Echo) -> None:
-    host = open_host(line)
+def test_what_is_ready_is_sent_without_hearing_the_host(
+    line: PtyLine, host: int, device: Echo
+) -> None:
     os.write(host, b"asked")
-    device.ready = b"told"
+    device.ready = b"reported"
     assert line.send_once()
     assert readable(host, 1000)
-    assert os.read(host, 4096) == b"told"
+    assert os.read(host, 4096) == b"reported"
     assert not line.send_once()
     assert line.poll_once()
     assert os.read(host, 4096) == b"asked"
-    os.close(host)
 
 
-def test_bytes_that_nobody_fetches_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
+def test_unread_bytes_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
     for _ in range(200):
         device.ready = EVERY_BYTE
         line.poll_once()
@@ -97,21 +102,18 @@ def test_bytes_that_nobody_fetches_are_lost_and_counted(line: PtyLine, device: E
     os.close(host)
 
 
-def test_unplugging_ends_the_hosts_session_and_removes_the_path(line: PtyLine) -> None:
-    host = open_host(line)
+def test_unplugging_ends_the_hosts_session_and_removes_the_path(line: PtyLine, host: int) -> None:
     line.unplug()
     with pytest.raises(OSError, match="Input/output error"):
         os.write(host, b"x")
     assert not line.link_path.is_symlink()
     with pytest.raises(LinkLost, match="unplugged"):
         line.poll_once()
-    os.close(host)
 
 
 def test_replugging_gives_a_fresh_terminal_behind_the_same_path(
-    line: PtyLine, device: Echo
+    line: PtyLine, host: int, device: Echo
 ) -> None:
-    host = open_host(line)
     line.unplug()
     device.ready = b"stale"
     line.replug()
@@ -121,7 +123,6 @@ def test_replugging_gives_a_fresh_terminal_behind_the_same_path(
     line.poll_once()
     assert readable(fresh, 1000)
     assert os.read(fresh, 64) == b"hello"
-    os.close(host)
     os.close(fresh)
 
 
@@ -136,36 +137,36 @@ def test_a_stale_link_is_replaced(device: Echo, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("baud", [9_600, 57_600, 1_000_000, 4_000_000])
-def test_the_speed_that_the_host_has_set_is_told_before_its_bytes(
+def test_the_speed_set_by_the_host_is_reported_before_its_bytes(
     device: Echo, tmp_path: Path, baud: int
 ) -> None:
-    told: list[tuple[int, bytes]] = []
+    reported: list[tuple[int, bytes]] = []
     line = PtyLine(
-        device, tmp_path / "servos", on_baud=lambda rate: told.append((rate, device.ready))
+        device, tmp_path / "servos", on_baud=lambda rate: reported.append((rate, device.ready))
     )
     port = SerialPort(line.link_path, baud, MonotonicClock())
     port.write(b"x")
     assert readable(line.fileno(), 1000)
     line.poll_once()
-    assert told == [(baud, b"")]
+    assert reported == [(baud, b"")]
     port.close()
     line.close()
 
 
-def test_a_speed_without_a_constant_is_told_too(device: Echo, tmp_path: Path) -> None:
+def test_a_speed_without_a_constant_is_reported_too(device: Echo, tmp_path: Path) -> None:
     serial = pytest.importorskip("serial")
-    told: list[int] = []
-    line = PtyLine(device, tmp_path / "servos", on_baud=told.append)
+    reported: list[int] = []
+    line = PtyLine(device, tmp_path / "servos", on_baud=reported.append)
     assert not hasattr(termios, "B4500000")
     with serial.Serial(str(line.link_path), 4_500_000) as host:
         host.write(b"x")
         assert readable(line.fileno(), 1000)
         line.poll_once()
-    assert told == [4_500_000]
+    assert reported == [4_500_000]
     line.close()
 
 
-def test_a_device_is_told_the_time_before_it_is_asked(tmp_path: Path) -> None:
+def test_a_device_is_stepped_before_it_is_read(tmp_path: Path) -> None:
     class Watch(Echo):
         def __init__(self) -> None:
             super().__init__()
@@ -182,9 +183,8 @@ def test_a_device_is_told_the_time_before_it_is_asked(tmp_path: Path) -> None:
 
 
 def test_bytes_are_sent_at_the_moment_they_are_due_and_not_before(
-    line: PtyLine, device: Echo
+    line: PtyLine, host: int, device: Echo
 ) -> None:
-    host = open_host(line)
     device.ready = b"reply"
     early = []
 
@@ -196,4 +196,3 @@ def test_bytes_are_sent_at_the_moment_they_are_due_and_not_before(
     assert early == [False] * 5
     assert readable(host, 1000)
     assert os.read(host, 16) == b"reply"
-    os.close(host)

@@ -55,11 +55,15 @@ def run_pytest(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
 
 @pytest.mark.gl
 @pytest.mark.timeout(120)
-def test_the_example_of_the_page_runs_as_it_stands(tmp_path: Path) -> None:
+def test_the_example_of_the_page_runs_and_an_unknown_choice_is_refused_by_name(
+    tmp_path: Path,
+) -> None:
     example = PAGE.read_text().split("```python\n")[1].split("```")[0]
     (tmp_path / "test_mine.py").write_text(example)
+    (tmp_path / "test_mistaken.py").write_text(MISTAKEN)
     done = run_pytest(tmp_path, "--strict-markers")
-    assert "2 passed" in done.stdout, done.stdout
+    assert "2 passed, 1 error" in done.stdout, done.stdout
+    assert "expected robot, world, seed, profile, speech by name, got 'sed'" in done.stdout
 
 
 @pytest.mark.gl
@@ -71,15 +75,9 @@ def test_faults_reach_the_twin_that_the_test_uses(tmp_path: Path) -> None:
     assert "2 passed" in done.stdout, done.stdout
 
 
-def test_an_unknown_choice_is_refused_by_name(tmp_path: Path) -> None:
-    (tmp_path / "test_mine.py").write_text(MISTAKEN)
-    done = run_pytest(tmp_path)
-    assert "expected robot, world, seed, profile, speech by name, got 'sed'" in done.stdout
-
-
 @pytest.fixture
 def devices_dir(tmp_path: Path) -> Iterator[Path]:
-    """A twin's devices, which nobody can tell from real ones."""
+    """A twin's devices, which look like real ones."""
     run_dir = tmp_path / "run"
     run_dir.mkdir()
     clock = MonotonicClock()

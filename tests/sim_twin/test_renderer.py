@@ -1,6 +1,7 @@
 import gc
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import mujoco
 import numpy as np
@@ -25,11 +26,16 @@ except OpenGLMissing as error:
 """
 
 
-@pytest.mark.gl
-def test_depth_is_in_metres_along_the_optical_axis(engine: Engine) -> None:
+@pytest.fixture
+def renderer(engine: Engine) -> Iterator[Renderer]:
     renderer = Renderer(engine.model, 160, 120)
-    rgb, depth_m = renderer.render(engine.data, fixed_camera(engine.model, "head_camera"))
+    yield renderer
     renderer.close()
+
+
+@pytest.mark.gl
+def test_depth_is_in_metres_along_the_optical_axis(engine: Engine, renderer: Renderer) -> None:
+    rgb, depth_m = renderer.render(engine.data, fixed_camera(engine.model, "head_camera"))
     # The wall is flat and faces the camera: the same depth off the axis as on it.
     assert depth_m[60, 80] == pytest.approx(2.0, abs=0.005)
     assert depth_m[60, 20] == pytest.approx(2.0, abs=0.005)
@@ -37,19 +43,15 @@ def test_depth_is_in_metres_along_the_optical_axis(engine: Engine) -> None:
 
 
 @pytest.mark.gl
-def test_images_are_upright(engine: Engine) -> None:
-    renderer = Renderer(engine.model, 160, 120)
+def test_images_are_upright(engine: Engine, renderer: Renderer) -> None:
     _, depth_m = renderer.render(engine.data, fixed_camera(engine.model, "head_camera"))
-    renderer.close()
     assert depth_m[115, 80] < 1.5 < depth_m[60, 80]
 
 
 @pytest.mark.gl
-def test_the_same_state_gives_the_same_picture(engine: Engine) -> None:
-    renderer = Renderer(engine.model, 160, 120)
+def test_the_same_state_gives_the_same_picture(engine: Engine, renderer: Renderer) -> None:
     view = fixed_camera(engine.model, "head_camera")
     first, second = renderer.render(engine.data, view), renderer.render(engine.data, view)
-    renderer.close()
     np.testing.assert_array_equal(first[0], second[0])
     np.testing.assert_array_equal(first[1], second[1])
 

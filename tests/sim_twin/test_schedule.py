@@ -65,8 +65,24 @@ def simulation() -> FakeSimulation:
     return FakeSimulation()
 
 
-def test_nodes_step_at_their_own_periods_in_order_of_arrival(simulation: FakeSimulation) -> None:
-    log: list[str] = []
+@pytest.fixture
+def log() -> list[str]:
+    return []
+
+
+def test_waiting_steps_the_simulation_to_the_first_step_not_before_the_deadline(
+    simulation: FakeSimulation,
+) -> None:
+    clock = SimClock(simulation)
+    clock.sleep_until(5 * MS)
+    assert clock.now_ns() == 6 * MS
+    clock.sleep_until(0)
+    assert clock.now_ns() == 6 * MS
+
+
+def test_nodes_step_at_their_own_periods_in_order_of_arrival(
+    simulation: FakeSimulation, log: list[str]
+) -> None:
     schedule = Schedule(simulation)
     schedule.add(RecordingNode("fast", 0.004, simulation, log))
     schedule.add(RecordingNode("slow", 0.008, simulation, log))
@@ -82,8 +98,9 @@ def test_nodes_step_at_their_own_periods_in_order_of_arrival(simulation: FakeSim
     ]
 
 
-def test_a_node_that_overruns_skips_the_periods_it_missed(simulation: FakeSimulation) -> None:
-    log: list[str] = []
+def test_a_node_that_overruns_skips_the_periods_it_missed(
+    simulation: FakeSimulation, log: list[str]
+) -> None:
     schedule = Schedule(simulation)
     schedule.add(SlowNode("late", 0.004, simulation, log))
     schedule.run_until(lambda: False, 30 * MS)
@@ -101,8 +118,7 @@ def test_a_predicate_that_never_holds_ends_at_the_deadline(simulation: FakeSimul
     assert simulation.now_ns == 6 * MS
 
 
-def test_a_removed_node_is_stopped(simulation: FakeSimulation) -> None:
-    log: list[str] = []
+def test_a_removed_node_is_stopped(simulation: FakeSimulation, log: list[str]) -> None:
     schedule = Schedule(simulation)
     node = RecordingNode("node", 0.002, simulation, log)
     schedule.add(node)
@@ -111,8 +127,7 @@ def test_a_removed_node_is_stopped(simulation: FakeSimulation) -> None:
     assert log == ["node start 0", "node stop 0"]
 
 
-def test_a_killed_node_is_never_called_again(simulation: FakeSimulation) -> None:
-    log: list[str] = []
+def test_a_killed_node_is_never_called_again(simulation: FakeSimulation, log: list[str]) -> None:
     schedule = Schedule(simulation)
     node = RecordingNode("node", 0.002, simulation, log)
     schedule.add(node)
@@ -138,8 +153,7 @@ def test_killing_a_node_that_does_not_run_is_refused(simulation: FakeSimulation)
         Schedule(simulation).kill(RecordingNode("node", 0.002, simulation, []))
 
 
-def test_stopping_all_goes_backwards(simulation: FakeSimulation) -> None:
-    log: list[str] = []
+def test_stopping_all_goes_backwards(simulation: FakeSimulation, log: list[str]) -> None:
     schedule = Schedule(simulation)
     schedule.add(RecordingNode("first", 0.002, simulation, log))
     schedule.add(RecordingNode("second", 0.002, simulation, log))

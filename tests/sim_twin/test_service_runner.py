@@ -1,4 +1,4 @@
-"""The runner treats a service as systemd does: by its words, its silence and its end."""
+"""The runner treats a service as systemd does: by its notifications, its silence and its exit."""
 
 import os
 import signal

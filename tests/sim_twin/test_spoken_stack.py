@@ -1,4 +1,4 @@
-"""The whole robot in lock-step with ears and a mouth."""
+"""The whole robot in lock-step with microphone and speaker."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from sim_twin.harness.stack import LockstepStack
 
 
 @pytest.mark.twin(speech=True)
-def test_the_robot_speaks_in_its_room_and_does_not_heed_itself(twin: LockstepStack) -> None:
+def test_the_robot_speaks_in_its_room_and_ignores_its_own_voice(twin: LockstepStack) -> None:
     heard = twin.space.ring_reader("heard", from_start=True)
     outcome = twin.say("say stop the music, please")
     (action,) = outcome["actions"]
@@ -21,7 +21,7 @@ def test_the_robot_speaks_in_its_room_and_does_not_heed_itself(twin: LockstepSta
 
 
 @pytest.mark.twin(speech=True)
-def test_somebody_who_speaks_is_heard_as_a_phrase(twin: LockstepStack) -> None:
+def test_a_talker_is_recognised_as_one_phrase(twin: LockstepStack) -> None:
     heard = twin.space.ring_reader("heard", from_start=True)
     spoken = twin.speak("go to the kitchen", snr_db=20.0)
     twin.lockstep.run_for(4.0)

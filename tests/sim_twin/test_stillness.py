@@ -1,4 +1,4 @@
-"""A core that does nothing for anybody is noticed from above whatever runs on it."""
+"""A stalled core is detected by a real-time thread."""
 
 import os
 import subprocess

@@ -91,7 +91,7 @@ def test_a_slow_client_backs_the_line_up_and_gets_everything_in_order(
         assert not line.is_backed_up
 
 
-def test_the_device_hears_that_its_client_has_gone(
+def test_the_device_is_notified_that_its_client_has_gone(
     line: StreamLine, device: Loudspeaker, tmp_path: Path, hang_ups: list[str]
 ) -> None:
     with connect(tmp_path):

@@ -17,7 +17,7 @@ def test_a_cup_at_rest_in_the_box_is_inside(engine: Engine) -> None:
     assert verdict["placement_error_m"] == pytest.approx(0.02, abs=0.002)
 
 
-def test_a_cup_beside_the_box_is_not_inside(engine: Engine) -> None:
+def test_a_cup_next_to_the_box_is_not_inside(engine: Engine) -> None:
     engine.place("cup", 0.0, 1.8, 0.03, 0.0)
     settle(engine)
     assert not engine.referee.inside("cup", "box")["inside"]

@@ -149,7 +149,7 @@ def test_the_end_of_a_file_is_a_lost_link(recording: Path) -> None:
         microphone.poll()
 
 
-def test_a_missing_or_foreign_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_or_foreign_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DeviceMissing, match="no such file"):
         read_wav(tmp_path / "none.wav")
     (tmp_path / "note.wav").write_text("la la la")

@@ -1,5 +1,7 @@
-"""What can go wrong with the sound system is told with what to do."""
+"""PortAudio's devices: stamps, overflows, errors that say what to do, and replugging."""
 
+import sys
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -7,27 +9,110 @@ import pytest
 
 from drivers.audio.base import AudioFormat
 from drivers.audio.open_audio import open_audio_input, open_audio_output
-from drivers.audio.portaudio import PortAudioInput, PortAudioOutput, sound_devices
+from drivers.audio.portaudio import _DEVICES, PortAudioInput, PortAudioOutput, sound_devices
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing, LinkLost
 from sim_twin.contracts.scripted import ManualClock
 
 SPEECH = AudioFormat(rate_hz=16_000)
-sounddevice = pytest.importorskip("sounddevice", reason="the extra [audio] is not installed")
+
+
+class SoundSystem(ModuleType):
+    """Stand in for sounddevice; the test plugs devices, which it lists when initialised."""
+
+    class PortAudioError(Exception):
+        """The library's own."""
+
+    def __init__(self) -> None:
+        super().__init__("sounddevice")
+        self.plugged = {"USB Audio"}
+        self.time_s = 100.0
+        self.lists = 0
+        self.rows = 160
+        self.overflowed = False
+        self.failed = False
+        self._initialize()
+        system = self
+
+        class Stream:
+            latency = 0.01
+
+            def __init__(self, device: str, **_: Any) -> None:
+                if device not in system.known:
+                    raise ValueError(f"No device matching {device!r}")
+                self.closed = False
+
+            def check(self) -> None:
+                if self.closed or system.failed:
+                    raise SoundSystem.PortAudioError("Device unavailable", -9985)
+
+            @property
+            def time(self) -> float:
+                self.check()
+                return system.time_s
+
+            @property
+            def read_available(self) -> int:
+                self.check()
+                return system.rows
+
+            write_available = read_available
+
+            def read(self, count: int) -> tuple[Any, bool]:
+                return np.zeros((count, 1), np.int16), system.overflowed
+
+            def write(self, samples: Any) -> None:
+                assert len(samples) <= system.rows
+
+            def start(self) -> None:
+                """Nothing has to move."""
+
+            def close(self) -> None:
+                self.closed = True
+
+        self.InputStream = self.OutputStream = Stream
+
+    def _terminate(self) -> None:
+        self.known: set[str] = set()
+
+    def _initialize(self) -> None:
+        self.known = set(self.plugged)
+        self.lists += 1
+
+    def query_devices(self) -> list[dict[str, Any]]:
+        channels = {"max_input_channels": 1, "max_output_channels": 1}
+        return [
+            {"name": name, "default_samplerate": 16_000.0, **channels}
+            for name in sorted(self.known)
+        ]
+
+
+@pytest.fixture(autouse=True)
+def system(monkeypatch: pytest.MonkeyPatch) -> SoundSystem:
+    _DEVICES.clear()  # what other tests have left to the garbage collector
+    system = SoundSystem()
+    monkeypatch.setitem(sys.modules, "sounddevice", system)
+    return system
+
+
+def microphone(name: str = "ReSpeaker", clock: ManualClock | None = None) -> PortAudioInput:
+    return PortAudioInput(name, clock or ManualClock(NS_PER_S), SPEECH)
+
+
+def sound(rows: int) -> Any:
+    return np.zeros((rows, 1), np.int16)
 
 
 def test_the_devices_are_listed() -> None:
-    for device in sound_devices():
-        assert device.name
-        assert device.inputs + device.outputs > 0
+    (device,) = sound_devices()
+    assert (device.name, device.inputs, device.outputs) == ("USB Audio", 1, 1)
 
 
-def test_an_unknown_device_is_told_with_those_there_are() -> None:
-    clock = ManualClock(NS_PER_S)
-    with pytest.raises(DeviceMissing, match=r"'no such mic'.*devices with inputs"):
-        open_audio_input("no such mic", clock, SPEECH)
-    with pytest.raises(DeviceMissing, match=r"'no such horn'.*devices with outputs"):
-        open_audio_output("no such horn", clock, SPEECH)
+def test_an_unknown_device_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(DeviceMissing, match=r"'no such mic'.*devices with inputs: 'USB Audio'"):
+        open_audio_input("no such mic", ManualClock(), SPEECH)
+    with pytest.raises(DeviceMissing, match=r"'no such horn'.*devices with outputs: 'USB Audio'"):
+        open_audio_output("no such horn", ManualClock(), SPEECH)
 
 
 @pytest.mark.parametrize(
@@ -37,7 +122,7 @@ def test_an_unknown_device_is_told_with_those_there_are() -> None:
         (OSError("PortAudio library not found"), "apt install libportaudio2"),
     ],
 )
-def test_a_missing_library_is_told_with_what_to_install(
+def test_a_missing_library_is_refused_with_what_to_install(
     monkeypatch: pytest.MonkeyPatch, error: Exception, remedy: str
 ) -> None:
     def missing(name: str) -> Any:
@@ -48,60 +133,14 @@ def test_a_missing_library_is_told_with_what_to_install(
         sound_devices()
 
 
-class Stream:
-    """Stand in for PortAudio's stream, which loses its device when the test says so."""
-
-    def __init__(self, **_: Any) -> None:
-        self.latency = 0.01
-        self.rows = 160
-        self.overflowed = False
-        self.gone = False
-        self.closed = False
-        self.time = 1.0
-
-    def start(self) -> None:
-        pass
-
-    def close(self) -> None:
-        self.closed = True
-
-    @property
-    def read_available(self) -> int:
-        if self.gone:
-            raise sounddevice.PortAudioError("Device unavailable", -9985)
-        return self.rows
-
-    write_available = read_available
-
-    def read(self, count: int) -> tuple[Any, bool]:
-        return np.zeros((count, 1), np.int16), self.overflowed
-
-    def write(self, samples: Any) -> bool:
-        assert len(samples) <= self.rows
-        return False
-
-
-@pytest.fixture
-def streams(monkeypatch: pytest.MonkeyPatch) -> list[Stream]:
-    made: list[Stream] = []
-
-    def make(**words: Any) -> Stream:
-        made.append(Stream(**words))
-        return made[-1]
-
-    monkeypatch.setattr(sounddevice, "InputStream", make)
-    monkeypatch.setattr(sounddevice, "OutputStream", make)
-    return made
-
-
-def test_stamps_are_of_the_first_sample_and_follow_the_rows(streams: list[Stream]) -> None:
+def test_stamps_are_of_the_first_sample_and_follow_the_rows() -> None:
     clock = ManualClock(NS_PER_S)
-    microphone = PortAudioInput("mic", clock, SPEECH)
+    device = microphone("USB Audio", clock)
     stamps = []
     for late_ms in (0, 3, 1, 7):
         clock.ns += 10_000_000
         arrived_ns, clock.ns = clock.ns, clock.ns + late_ms * 1_000_000
-        block = microphone.poll()
+        block = device.poll()
         assert block is not None
         stamps.append(block.stamp_ns)
         clock.ns = arrived_ns
@@ -109,33 +148,70 @@ def test_stamps_are_of_the_first_sample_and_follow_the_rows(streams: list[Stream
     assert stamps == [NS_PER_S + 10_000_000 * i - 10_000_000 for i in range(4)]
 
 
-def test_an_overflow_is_counted(streams: list[Stream]) -> None:
-    microphone = PortAudioInput("mic", ManualClock(NS_PER_S), SPEECH)
-    streams[0].overflowed = True
-    microphone.poll()
-    assert microphone.counters.lost_samples == 1
+def test_an_overflow_is_counted_and_nothing_to_read_is_nothing(system: SoundSystem) -> None:
+    device = microphone("USB Audio")
+    system.overflowed = True
+    device.poll()
+    assert device.counters.lost_samples == 1
+    system.rows = 0
+    assert device.poll() is None
 
 
-def test_nothing_to_read_is_nothing(streams: list[Stream]) -> None:
-    microphone = PortAudioInput("mic", ManualClock(NS_PER_S), SPEECH)
-    streams[0].rows = 0
-    assert microphone.poll() is None
-
-
-def test_an_unplugged_device_is_a_lost_link(streams: list[Stream]) -> None:
-    microphone = PortAudioInput("mic", ManualClock(NS_PER_S), SPEECH)
-    speaker = PortAudioOutput("horn", SPEECH)
-    for stream in streams:
-        stream.gone = True
+def test_an_unplugged_device_is_a_lost_link(system: SoundSystem) -> None:
+    device, speaker = microphone("USB Audio"), PortAudioOutput("USB Audio", SPEECH)
+    system.failed = True
     with pytest.raises(LinkLost, match="plug it in again"):
-        microphone.poll()
+        device.poll()
     with pytest.raises(LinkLost, match="plug it in again"):
-        speaker.write(np.zeros((10, 1), np.int16))
+        speaker.write(sound(10))
 
 
-def test_a_speaker_takes_what_it_has_room_for(streams: list[Stream]) -> None:
-    speaker = PortAudioOutput("horn", SPEECH)
-    assert speaker.write(np.zeros((400, 1), np.int16)) == 160
-    streams[0].rows = 0
-    assert speaker.write(np.zeros((400, 1), np.int16)) == 0
+def test_a_speaker_takes_what_it_has_room_for(system: SoundSystem) -> None:
+    speaker = PortAudioOutput("USB Audio", SPEECH)
+    assert speaker.write(sound(400)) == 160
+    system.rows = 0
+    assert speaker.write(sound(400)) == 0
     assert speaker.counters.samples == 160
+
+
+def test_a_microphone_plugged_in_after_the_list_was_made_is_found(system: SoundSystem) -> None:
+    with pytest.raises(DeviceMissing, match=r"devices with inputs: 'USB Audio'"):
+        microphone()
+    system.plugged.add("ReSpeaker")
+    microphone().close()
+    assert system.lists == 3, "once at first, once for each time that it was not there"
+
+
+def test_a_speaker_that_sounds_is_not_cut_off_to_look_for_a_microphone(
+    system: SoundSystem,
+) -> None:
+    system.rows = 16_000
+    speaker = PortAudioOutput("USB Audio", SPEECH)
+    speaker.write(sound(16_000))
+    system.plugged.add("ReSpeaker")
+    with pytest.raises(DeviceMissing):
+        microphone()
+    assert system.lists == 1
+    system.time_s += 1.9
+    with pytest.raises(DeviceMissing):
+        microphone()
+    system.time_s += 0.2
+    microphone().close()
+    with pytest.raises(LinkLost, match="plug it in again"):
+        speaker.write(sound(10))
+    speaker.close()
+
+
+def test_a_microphone_that_listens_is_not_interrupted_to_look_for_a_speaker(
+    system: SoundSystem,
+) -> None:
+    system.plugged = {"ReSpeaker"}
+    system._initialize()
+    listening = microphone()
+    with pytest.raises(DeviceMissing):
+        PortAudioOutput("USB Audio", SPEECH)
+    system.plugged.add("USB Audio")
+    with pytest.raises(DeviceMissing):
+        PortAudioOutput("USB Audio", SPEECH)
+    listening.close()
+    PortAudioOutput("USB Audio", SPEECH).close()

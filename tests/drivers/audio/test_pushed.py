@@ -1,4 +1,4 @@
-"""A microphone that is pushed keeps the contract of every other one."""
+"""A microphone fed by pushed samples keeps the microphone contract."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ class TestPushedMicrophone(MicrophoneContract):
         return PushingBench()
 
 
-def test_what_nobody_polls_is_lost_from_its_beginning_and_counted() -> None:
+def test_samples_that_are_not_polled_are_dropped_oldest_first_and_counted() -> None:
     clock = ManualClock(NS_PER_S)
     device = PushedInput(BROWSER, clock)
     for number in range(15):

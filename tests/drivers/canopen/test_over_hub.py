@@ -51,16 +51,14 @@ def run(bus: WheelDriveBus, duration_s: float, velocity_rad_s: float) -> DriveSt
     return state
 
 
-def test_the_wheels_turn_across_processes(bus: WheelDriveBus) -> None:
+def test_the_wheels_turn_across_processes_and_a_killed_hub_is_a_lost_link(
+    bus: WheelDriveBus, hub: subprocess.Popen[bytes]
+) -> None:
     bus.enable()
     state = run(bus, 0.8, 3.0)
     assert state.enabled
     assert state.velocity_rad_s == pytest.approx([3.0, 3.0], abs=0.1)
     assert np.all(state.position_rad > 0.5)
-
-
-def test_a_killed_hub_is_a_lost_link(bus: WheelDriveBus, hub: subprocess.Popen[bytes]) -> None:
-    run(bus, 0.02, 0.0)
     hub.kill()
     hub.wait()
     with pytest.raises(LinkLost, match="CAN hub"):

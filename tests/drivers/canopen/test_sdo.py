@@ -1,4 +1,4 @@
-"""Let the vendor-neutral library's SDO server answer our client, and break the protocol on it."""
+"""Our SDO client against the vendor-neutral library's server, and against broken replies."""
 
 from typing import Any
 
@@ -9,20 +9,10 @@ from canopen.objectdictionary import ODVariable, datatypes
 from drivers.canopen.sdo import MAX_OBJECT_BYTES, SdoAborted, SdoClient
 from drivers.canopen.sdo_words import describe_sdo_reply, describe_sdo_request
 from drivers.errors import NoReply, ProtocolError
+from sim_twin.contracts.scripted import ManualClock
 
 NODE_ID = 9
 INDEX = 0x2001
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.time_ns = 0
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
 
 
 class LibraryServer:
@@ -57,7 +47,7 @@ def server() -> LibraryServer:
 
 
 def client_of(server: LibraryServer) -> SdoClient:
-    client = SdoClient(server.take, NODE_ID, "drive left (node 9)", Clock())
+    client = SdoClient(server.take, NODE_ID, "drive left (node 9)", ManualClock())
     server.answer = client.take_reply
     return client
 
@@ -95,7 +85,7 @@ def answering(*replies: bytes) -> tuple[SdoClient, list[bytes]]:
         if waiting and data[0] & 0xE0 != 0x80:
             client.take_reply(waiting.pop(0), 0)
 
-    clock = Clock()
+    clock = ManualClock()
     client = SdoClient(send, NODE_ID, "node 9", clock)
     return client, sent
 

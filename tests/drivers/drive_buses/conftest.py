@@ -1,5 +1,6 @@
 """Build two small worlds in lock-step: CiA 402 drives and ODrive axes, each with free wheels."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -91,10 +92,14 @@ class ODriveBench(Bench):
 
 
 @pytest.fixture
-def cia402() -> Cia402Bench:
-    return Cia402Bench()
+def cia402() -> Iterator[Cia402Bench]:
+    bench = Cia402Bench()
+    yield bench
+    bench.bus.close()
 
 
 @pytest.fixture
-def odrive() -> ODriveBench:
-    return ODriveBench()
+def odrive() -> Iterator[ODriveBench]:
+    bench = ODriveBench()
+    yield bench
+    bench.bus.close()

@@ -54,7 +54,6 @@ def test_the_watchdog_is_armed_with_the_heartbeat_time(odrive: Any) -> None:
         assert axis.properties.read(ENABLE_WATCHDOG)
         assert axis.properties.read(WATCHDOG_TIMEOUT) == pytest.approx(0.1)
         assert axis.properties.read(RAMP_RATE) == pytest.approx(20.0 / 6.2831853, rel=1e-6)
-    odrive.bus.close()
 
 
 def test_a_watchdog_that_does_not_arm_is_refused(odrive: Any) -> None:
@@ -64,7 +63,6 @@ def test_a_watchdog_that_does_not_arm_is_refused(odrive: Any) -> None:
     )
     with pytest.raises(WrongDevice, match=r"right .*enable_watchdog is 0 after 1 was written"):
         odrive.bus.connect()
-    odrive.bus.close()
 
 
 def test_a_file_of_another_firmware_is_refused_before_anything_is_written(
@@ -74,7 +72,6 @@ def test_a_file_of_another_firmware_is_refused_before_anything_is_written(
     with pytest.raises(WrongDevice, match=r"firmware 0\.6\.10, but .* is of 0\.0\.0"):
         odrive.bus.connect()
     assert not odrive.axes[0].properties.read(ENABLE_WATCHDOG)
-    odrive.bus.close()
 
 
 def test_a_missing_endpoint_file_says_where_to_get_it(odrive: Any, tmp_path: Path) -> None:
@@ -117,7 +114,6 @@ def test_an_axis_that_was_never_calibrated_says_what_to_do(
     monkeypatch.setattr(ODriveMeters, "position_rev", property(lambda meters: math.nan))
     with pytest.raises(WrongDevice, match="calibrate"):
         odrive.bus.connect()
-    odrive.bus.close()
 
 
 def test_an_axis_without_an_sdo_answer_is_never_enabled(
@@ -126,7 +122,6 @@ def test_an_axis_without_an_sdo_answer_is_never_enabled(
     monkeypatch.setitem(_REACTIONS, OdriveCommand.RX_SDO, lambda *ignored: None)
     with pytest.raises(NoReply, match="the watchdog cannot be verified"):
         odrive.bus.connect()
-    odrive.bus.close()
 
 
 def test_limits_are_written_where_the_robot_file_gives_a_current(odrive: Any) -> None:
@@ -145,7 +140,6 @@ def test_an_error_that_is_the_operators_outlives_a_new_connection(odrive: Any) -
     assert odrive.run(0.5).faulted == (False, True)
     assert odrive.bus.reset_fault() == ()
     assert odrive.run(0.5).healthy
-    odrive.bus.close()
 
 
 @pytest.mark.parametrize("node_id", [-1, 0x3F])
@@ -183,7 +177,7 @@ def test_the_strictest_error_decides_who_may_clear(code: int, rule: ResetRule) -
     assert AxisFault(code=int(code)).rule is rule
 
 
-def test_errors_are_told_in_words() -> None:
+def test_errors_are_described_in_words() -> None:
     fault = AxisFault(code=int(AxisError.MOTOR_OVER_TEMP) | 1 << 31)
     assert fault.text == "0x80002000 motor over temp, undocumented bits 0x80000000"
 
@@ -192,7 +186,7 @@ def test_the_shipped_endpoints_are_of_no_real_firmware() -> None:
     assert read_endpoints(EMULATED_ENDPOINTS).firmware == "0.0.0"
 
 
-def test_an_axis_that_rebooted_in_between_is_lost_until_connected_anew(odrive: Any) -> None:
+def test_an_axis_that_rebooted_in_between_is_lost_until_reconnected(odrive: Any) -> None:
     odrive.bus.connect()
     odrive.bus.enable()
     assert odrive.run(0.3).enabled
@@ -206,7 +200,6 @@ def test_an_axis_that_rebooted_in_between_is_lost_until_connected_anew(odrive: A
     assert odrive.powered() == [False, False]
     odrive.bus.connect()
     assert odrive.run(0.2).healthy
-    odrive.bus.close()
 
 
 def test_no_axis_is_powered_before_its_watchdog_is_confirmed(odrive: Any) -> None:
@@ -221,7 +214,6 @@ def test_no_axis_is_powered_before_its_watchdog_is_confirmed(odrive: Any) -> Non
         powered = powered or odrive.powered()[1]
     assert not powered
     assert odrive.run(0.0).lost == (False, True)
-    odrive.bus.close()
 
 
 def test_an_axis_that_was_silent_too_long_stays_lost(odrive: Any) -> None:
@@ -231,7 +223,6 @@ def test_an_axis_that_was_silent_too_long_stays_lost(odrive: Any) -> None:
     odrive.run(0.2)
     odrive.axes[0].silence(on=False)
     assert odrive.run(0.2).lost == (True, False)
-    odrive.bus.close()
 
 
 def test_cutting_the_power_sends_the_emergency_stop_which_holds_until_a_reset(odrive: Any) -> None:
@@ -250,4 +241,3 @@ def test_cutting_the_power_sends_the_emergency_stop_which_holds_until_a_reset(od
     odrive.run(0.1)
     odrive.bus.enable()
     assert odrive.run(0.3).enabled
-    odrive.bus.close()

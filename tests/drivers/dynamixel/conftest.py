@@ -7,6 +7,7 @@ from drivers.clock import NS_PER_S
 from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
 from drivers.dynamixel.wire.codec import Instruction, PacketParser
 from drivers.errors import LinkLost
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 from sim_twin.servos.server import FreeServos
@@ -98,19 +99,6 @@ class Bench:
             self.bus.read_state()
 
 
-class SimulatedTime:
-    """Be the clock of paced lines; nothing happens unless somebody waits."""
-
-    def __init__(self) -> None:
-        self.time_ns = 10 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
-
-
 class PacedLine:
     """Carry bytes to emulated servos at the wire's speed; a wait passes in simulated time.
 
@@ -119,7 +107,7 @@ class PacedLine:
 
     def __init__(
         self,
-        clock: SimulatedTime,
+        clock: ManualClock,
         servos: Sequence[EmulatedServoSpec],
         *,
         baud: int = 1_000_000,
@@ -136,12 +124,12 @@ class PacedLine:
         self._chunk_bytes = chunk_bytes
         self._pending = bytearray()
         self._first_ns = 0
-        self.servos.advance_to(clock.time_ns)
+        self.servos.advance_to(clock.ns)
 
     def write(self, data: bytes) -> None:
         self._check()
-        now_ns = max(self._clock.time_ns, self._first_ns + len(self._pending) * self._byte_ns)
-        self.servos.advance_to(self._clock.time_ns)
+        now_ns = max(self._clock.ns, self._first_ns + len(self._pending) * self._byte_ns)
+        self.servos.advance_to(self._clock.ns)
         self.bank.receive(data)
         answer = self.bank.transmit()
         if not self._pending:
@@ -153,11 +141,11 @@ class PacedLine:
         self._check()
         count = min(len(self._pending), self._chunk_bytes, max_bytes)
         due_ns = self._first_ns + count * self._byte_ns
-        if not count or due_ns > max(deadline_ns, self._clock.time_ns):
+        if not count or due_ns > max(deadline_ns, self._clock.ns):
             self._clock.sleep_until(deadline_ns)
             return b""
         self._clock.sleep_until(due_ns)
-        arrived = (self._clock.time_ns - self._first_ns) // self._byte_ns
+        arrived = (self._clock.ns - self._first_ns) // self._byte_ns
         count = min(len(self._pending), arrived, max_bytes)
         self._first_ns += count * self._byte_ns
         data = bytes(self._pending[:count])
@@ -183,7 +171,7 @@ class PacedLine:
 
 
 class SleepingLine(PacedLine):
-    """Do not look at the line before all bytes should be there, as a serial port does."""
+    """Read only when all bytes are due, as a serial port does."""
 
     def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         self._clock.sleep_until(due_ns)
@@ -203,14 +191,14 @@ class PacedBench:
         self,
         count: int = 16,
         *,
-        clock: SimulatedTime | None = None,
+        clock: ManualClock | None = None,
         eeprom: Mapping[str, int] | None = None,
         bauds: tuple[int, ...] = (),
         chunk_bytes: int = 14,
         sleeping: bool = False,
         **options: Any,
     ) -> None:
-        self.clock = clock or SimulatedTime()
+        self.clock = clock or ManualClock(10 * NS_PER_S)
         self.specs = [
             ServoSpec(id=n, model_name="XM430-W350", joint=f"joint_{n}")
             for n in range(1, count + 1)
@@ -227,9 +215,9 @@ class PacedBench:
         self.bus = DynamixelBus(self.line, self.clock, self.specs, baud=1_000_000, **options)
 
     def timed_read_ns(self) -> int:
-        start_ns = self.clock.time_ns
+        start_ns = self.clock.ns
         self.bus.read_state()
-        return self.clock.time_ns - start_ns
+        return self.clock.ns - start_ns
 
 
 def make_specs(count: int) -> list[ServoSpec]:

@@ -1,4 +1,4 @@
-"""What is wrong with adapter, speed or settings is found at connect and told with its remedy."""
+"""Faults of adapter, speed or settings are found at connect and reported with their remedy."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ MakeBench = Callable[..., Any]
 BAUDS = (57_600, 1_000_000, 2_000_000)
 
 
-def test_a_servo_set_to_another_speed_is_found_there_and_the_remedy_told(
+def test_a_servo_set_to_another_speed_is_found_and_the_remedy_named(
     make_paced: MakeBench,
 ) -> None:
     bench = make_paced(2, eeprom={"baud_rate": 1}, bauds=BAUDS)
@@ -45,7 +45,7 @@ def test_a_slow_adapter_is_refused_with_what_to_do(make_paced: MakeBench) -> Non
 
 
 @pytest.mark.parametrize("fast_sync", [False, True])
-def test_an_adapter_that_hears_itself_is_noticed_and_its_echo_left_out(
+def test_an_echoing_adapter_is_detected_and_its_echo_removed(
     make_paced: MakeBench, fast_sync: bool
 ) -> None:
     bench = make_paced(16, fast_sync=fast_sync, health_every_cycles=5)
@@ -65,9 +65,11 @@ def test_an_adapter_that_hears_itself_is_noticed_and_its_echo_left_out(
     assert counters.crc_errors == counters.stuffed == counters.discarded_bytes == 0
 
 
-def test_what_was_written_to_the_eeprom_is_reported(make_bench: MakeBench) -> None:
+def test_factory_settings_are_changed_once_and_reported(make_bench: MakeBench) -> None:
     bench = make_bench(2)
     setups = bench.bus.connect()
+    assert [bench.bank.register(n, "return_delay_time") for n in (1, 2)] == [0, 0]
+    assert bench.wire.count(Instruction.WRITE) == 2
     assert [setup.written for setup in setups] == [("return_delay_time 250 -> 0",)] * 2
     assert bench.bus.notices == (
         "servo 1 (joint_1, XM540-W270): set return_delay_time 250 -> 0",
@@ -76,6 +78,7 @@ def test_what_was_written_to_the_eeprom_is_reported(make_bench: MakeBench) -> No
     bus = bench.new_bus()
     assert [setup.written for setup in bus.connect()] == [(), ()]
     assert bus.notices == ()
+    assert bench.wire.count(Instruction.WRITE) == 2
 
 
 def test_a_servo_that_would_power_its_motor_by_itself_is_refused(make_bench: MakeBench) -> None:

@@ -7,22 +7,10 @@ import pytest
 
 from drivers.dynamixel import DynamixelBus, OperatingMode, ServoSpec, WatchdogState
 from drivers.dynamixel.errors import ServoSilent, WrongServo
-from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import DriverError, NoReply, WrongDevice
 from sim_twin.servos import EmulatedServoSpec
 
 MakeBench = Callable[..., Any]
-
-
-def test_factory_settings_are_changed_once_and_only_where_they_differ(
-    make_bench: MakeBench,
-) -> None:
-    bench = make_bench()
-    bench.bus.connect()
-    assert [bench.bank.register(n, "return_delay_time") for n in (1, 2, 3, 4)] == [0, 0, 0, 0]
-    assert bench.wire.count(Instruction.WRITE) == 4
-    bench.new_bus().connect()
-    assert bench.wire.count(Instruction.WRITE) == 4
 
 
 def test_the_operating_mode_asked_for_is_set(make_bench: MakeBench) -> None:
@@ -76,7 +64,7 @@ def test_an_offset_or_direction_kept_in_the_servo_is_refused(
         make_bench(1, servos=servos).bus.connect()
 
 
-def test_a_setting_that_torque_locks_is_told_and_left(make_bench: MakeBench) -> None:
+def test_a_setting_that_torque_locks_is_reported_and_left(make_bench: MakeBench) -> None:
     bench = make_bench(1)
     bench.bus.connect()
     bench.bus.enable_torque()

@@ -83,17 +83,6 @@ def test_a_silent_servo_ages_while_the_others_are_delivered(
     assert bench.bus.counters.partial_cycles == 3
 
 
-@FAST_OR_NOT
-def test_a_servo_that_comes_back_is_polled_again(make_bench: MakeBench, fast_sync: bool) -> None:
-    bench = connected(make_bench, fast_sync=fast_sync)
-    bench.bank.silence(2)
-    bench.cycle(20)
-    bench.bank.silence(2, silent=False)
-    bench.cycle(60)
-    assert bench.bus.state.valid.all()
-    assert bench.bus.state.age_s[1] == 0.0
-
-
 def test_several_silent_servos_do_not_mute_the_rest(make_bench: MakeBench) -> None:
     bench = connected(make_bench, 16)
     for servo_id in (2, 3, 9, 16):
@@ -103,7 +92,7 @@ def test_several_silent_servos_do_not_mute_the_rest(make_bench: MakeBench) -> No
     assert missing.tolist() == [2, 3, 9, 16]
 
 
-def test_nobody_is_suspended_when_the_whole_bus_is_silent(make_bench: MakeBench) -> None:
+def test_no_servo_is_suspended_when_the_whole_bus_is_silent(make_bench: MakeBench) -> None:
     bench = connected(make_bench)
     for servo_id in (1, 2, 3, 4):
         bench.bank.silence(servo_id)
@@ -140,27 +129,6 @@ def test_a_corrupt_reply_costs_one_cycle_and_is_counted(
     bench.cycle()
     assert bench.bus.state.valid.all()
     assert bench.bus.counters.suspensions == 0
-
-
-def test_stuffed_replies_lose_nothing(make_bench: MakeBench) -> None:
-    bench = connected(make_bench, 16, fast_sync=False)
-    values = {"present_velocity": -1, "present_position": 0x1FD}
-    signs = np.array([spec.sign for spec in bench.specs])
-    pulse_rad = 2 * np.pi / 4096
-    bench.rotors._stall_nm[:] = 0.0
-    bench.rotors.position_rad[:] = (values["present_position"] + 0.2 - 2048) * pulse_rad
-    bench.rotors.velocity_rad_s[:] = values["present_velocity"] * 0.0239808
-    bench.rotors._damping[:] = 0.0
-    bench.run(0.002)
-    for _ in range(5):
-        bench.bus.read_state()
-        assert bench.bus.state.valid.all()
-    counters = bench.bus.counters
-    assert counters.stuffed == 5
-    assert counters.timeouts == counters.crc_errors == counters.partial_cycles == 0
-    offsets = np.array([spec.offset_rad for spec in bench.specs])
-    pulses = (bench.bus.state.position_rad - offsets) * signs / pulse_rad + 2048
-    assert np.rint(pulses).tolist() == [values["present_position"]] * 16
 
 
 @FAST_OR_NOT
@@ -261,17 +229,6 @@ def test_an_unplugged_bus_says_so_at_once_every_time_and_is_counted_once(
     bus = bench.new_bus()
     bus.connect()
     assert bus.read_state().valid.all()
-
-
-def test_a_rejoined_bus_starts_with_torque_as_the_servos_left_it(make_bench: MakeBench) -> None:
-    bench = connected(make_bench, 1)
-    bench.bus.enable_torque()
-    bench.line.unplug()
-    bench.run(0.2)
-    bench.line.replug()
-    bus = bench.new_bus()
-    bus.connect()
-    assert bus.watchdog_tripped == ("joint_1",)
 
 
 def test_sixteen_servos_are_read_through_the_usual_path(make_bench: MakeBench) -> None:

@@ -57,7 +57,7 @@ def test_goals_move_the_joints_there(bench: Any) -> None:
     assert np.abs(bench.bus.state.position_rad - goal).max() < 0.01
 
 
-def test_goals_beyond_the_servos_range_are_clamped_and_told(bench: Any) -> None:
+def test_goals_beyond_the_servos_range_are_clamped_and_reported(bench: Any) -> None:
     bench.bus.enable_torque()
     bench.bus.write_goals(np.array([100.0, 100.0, -100.0, -100.0]))
     written = bench.bus.sent_goals
@@ -85,7 +85,7 @@ def test_the_watchdog_is_armed_with_torque_and_fed_by_the_cycle(bench: Any) -> N
     assert watchdog_of(bench) is WatchdogState.ARMED
 
 
-def test_silence_trips_the_watchdog_which_is_told_and_cleared_by_an_act_of_its_own(
+def test_silence_trips_the_watchdog_until_it_is_cleared_explicitly(
     bench: Any,
 ) -> None:
     bench.bus.enable_torque()
@@ -184,7 +184,7 @@ def test_a_pwm_limit_goes_on_the_wire_only_when_it_changes(bench: Any) -> None:
         bench.bus.write_goal_pwm({9: 0.2})
 
 
-def test_a_pwm_limit_that_was_not_taken_is_told_and_tried_again(bench: Any) -> None:
+def test_a_pwm_limit_that_was_not_accepted_is_reported_and_sent_again(bench: Any) -> None:
     bench.bank.silence(4)
     assert list(bench.bus.write_goal_pwm({4: 0.4})) == [4]
     bench.bank.silence(4, silent=False)
@@ -228,7 +228,7 @@ def test_a_silent_servo_is_asked_again_and_then_named(bench: Any) -> None:
 
 
 def after_replies(bench: Any, count: int, act: Callable[[], None]) -> None:
-    """Do something to the bus once it has sent so many replies."""
+    """Call `act` once the bus has sent `count` replies."""
     sent = 0
 
     def pass_on(reply: bytes) -> bytes:

@@ -47,7 +47,7 @@ def test_initial_values_are_in_range_and_limits_fit_the_bytes(model: ServoDatash
         assert [register.from_bytes(register.to_bytes(value)) for value in known] == known
 
 
-def test_models_are_told_apart_by_their_numbers() -> None:
+def test_models_are_distinguished_by_their_numbers() -> None:
     numbers = {model.number: model.name for model in MODELS_BY_NUMBER.values()}
     assert len(numbers) == len(MODELS)
     assert numbers == {

@@ -4,19 +4,12 @@ from drivers.dynamixel import DynamixelBus, HardwareError
 from drivers.dynamixel.fault_policy import FaultAction, FaultPolicy
 
 
-def test_every_cycle_is_in_the_histogram(bench):
-    bench.cycle(300)
-    latency = bench.bus.telemetry()["latency"]
-    assert latency["count"] == 300
-    assert bench.bus.telemetry()["latency"]["count"] == 300
-
-
 def test_telemetry_has_counters_latency_and_budget(bench):
-    bench.cycle(5)
-    told = bench.bus.telemetry()
-    assert told["cycles"] == 5
-    assert {"crc_errors", "timeouts", "stuffed", "retries", "late"} < told.keys()
-    assert told["budget"] == {"bus": "ok", "degraded": [], "lost": []}
+    bench.cycle(300)
+    telemetry = bench.bus.telemetry()
+    assert telemetry["cycles"] == telemetry["latency"]["count"] == 300
+    assert {"crc_errors", "timeouts", "stuffed", "retries", "late"} < telemetry.keys()
+    assert telemetry["budget"] == {"bus": "ok", "degraded": [], "lost": []}
 
 
 def test_a_silent_servo_is_degraded_then_lost_and_recovers_a_second_after_it_is_back(bench):

@@ -156,7 +156,7 @@ def library_without_gpiod(name: str) -> Any:
     raise ImportError(name)
 
 
-def test_a_missing_library_is_told_with_the_extra_to_install(
+def test_a_missing_library_is_refused_with_the_extra_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("drivers.estop.gpio_contact.import_module", library_without_gpiod)
@@ -173,7 +173,7 @@ def test_a_missing_library_is_told_with_the_extra_to_install(
         (errno.EINVAL, "DeviceMissing", "line 99"),
     ],
 )
-def test_a_refused_line_is_told_with_what_to_do(
+def test_a_refused_line_is_reported_with_the_remedy(
     monkeypatch: pytest.MonkeyPatch, code: int, kind: str, remedy: str
 ) -> None:
     def refuse(*_: object, **__: object) -> SimpleNamespace:

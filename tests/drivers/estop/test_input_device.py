@@ -103,7 +103,7 @@ def test_a_device_that_hangs_up_is_a_lost_link(fifo: Path) -> None:
     device.close()
 
 
-def test_it_is_grabbed_only_on_request_and_a_grab_by_another_is_told(
+def test_it_is_grabbed_only_on_request_and_a_grab_by_another_is_reported(
     fifo: Path, sender: int
 ) -> None:
     kernel = Kernel()
@@ -116,12 +116,12 @@ def test_it_is_grabbed_only_on_request_and_a_grab_by_another_is_told(
         InputDevice(fifo, CLOCK, grab=True, ioctl=kernel.ioctl)
 
 
-def test_a_file_that_is_no_input_device_is_told(fifo: Path, sender: int) -> None:
+def test_a_file_that_is_no_input_device_is_refused(fifo: Path, sender: int) -> None:
     with pytest.raises(DeviceMissing, match=r"not an input device.*by-id"):
         InputDevice(fifo, CLOCK)
 
 
-def test_a_missing_path_is_told(tmp_path: Path) -> None:
+def test_a_missing_path_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DeviceMissing, match="plug the button in"):
         InputDevice(tmp_path / "event-kbd", CLOCK)
 

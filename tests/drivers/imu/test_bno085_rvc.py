@@ -1,8 +1,6 @@
 import struct
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
 from sim_twin.contracts.scripted import ManualClock, ScriptedLine
@@ -58,25 +56,3 @@ def test_a_frame_with_a_wrong_sum_is_dropped_and_the_next_one_is_found() -> None
     assert [s.index for s in imu.poll()] == [8]
     assert imu.counters.checksum_errors >= 1
     assert imu.counters.discarded_bytes == FRAME_BYTES
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.binary(max_size=60).filter(lambda b: 0xAA not in b), st.integers(1, 40))
-def test_frames_are_found_behind_any_garbage_without_a_header(noise: bytes, cut: int) -> None:
-    imu, line = make()
-    stream = noise + frame(1, 1234) + noise + frame(2, 1234)
-    seen = []
-    for at in range(0, len(stream), cut):
-        line.pending += stream[at : at + cut]
-        seen += imu.poll()
-    assert [s.index for s in seen] == [1, 2]
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.integers(2, FRAME_BYTES - 2), st.integers(1, 255))
-def test_a_changed_byte_never_passes_as_a_sample(at: int, flip: int) -> None:
-    imu, line = make()
-    bad = bytearray(frame(7, 1234))
-    bad[at] ^= flip
-    line.pending += bad
-    assert imu.poll() == []

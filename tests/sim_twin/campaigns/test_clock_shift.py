@@ -1,4 +1,4 @@
-"""A shifted clock must reach the processes that are started so, while they run, and nobody else."""
+"""A shifted clock must reach only the processes that are started with it, while they run."""
 
 import os
 import shutil
@@ -52,7 +52,7 @@ def test_the_clock_of_a_running_process_jumps_and_its_steady_clock_does_not(tmp_
     assert not shift.is_in(os.getpid())
 
 
-def test_without_a_compiler_the_reason_is_told(
+def test_without_a_compiler_the_reason_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)

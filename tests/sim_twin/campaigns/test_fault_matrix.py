@@ -1,6 +1,7 @@
-"""The matrix must hold every fault in every phase, and its judge must be able to say no."""
+"""The matrix holds every fault in every phase, and its judge can fail a case."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,7 @@ def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
     assert any("rest" in failure for failure in play(cell).failures)
 
 
-def test_whoever_comes_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fault_matrix, "_LEAST_GAP_M", 0.2)
     case = play(CELLS["servo.left_elbow/off/driving"])
     assert any("to furniture" in failure for failure in case.failures)
@@ -88,22 +89,25 @@ def test_a_case_that_never_stopped_has_no_way_to_rest_in_the_sum() -> None:
     json.dumps(summary, allow_nan=False)
 
 
-def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
+@pytest.fixture
+def stack(tmp_path: Path) -> Iterator[LockstepControl]:
     stack = LockstepControl(tmp_path)
     stack.add_senses()
+    yield stack
+    stack.close()
+
+
+def test_driving_ends_before_the_wall_without_any_fault(stack: LockstepControl) -> None:
     stage = PhaseStage(stack)
     stage.begin(Phase.DRIVING)
     engine = stack.lockstep.twin.engine
     separation = Separation(engine.model, engine.data)
     stage.run_for(3.5)
     separation.look()
-    stack.close()
     assert 0.005 < separation.least_m < 0.1
 
 
-def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
-    stack = LockstepControl(tmp_path)
-    stack.add_senses()
+def test_carrying_holds_the_payload_and_moves(stack: LockstepControl) -> None:
     stage = PhaseStage(stack)
     stage.begin(Phase.CARRYING)
     assert stage.holds_payload
@@ -112,7 +116,6 @@ def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
     after = stack.lockstep.truth()["robot"]
     assert abs(after["x_m"] - before_m[0]) + abs(after["y_m"] - before_m[1]) > 0.1
     assert stage.holds_payload
-    stack.close()
 
 
 def test_only_what_servos_do_themselves_excuses_a_limp_joint() -> None:

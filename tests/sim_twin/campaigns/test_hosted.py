@@ -1,4 +1,4 @@
-"""The hog must count as the process that it burdens, follow its wish and end with that process."""
+"""The hog must count as the process that it burdens, follow its settings and end with it."""
 
 import json
 import subprocess

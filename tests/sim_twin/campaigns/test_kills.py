@@ -1,9 +1,13 @@
-"""Injections must cover every process and signal; a few of them run for real."""
+"""Injections cover every process and signal; the robot must rest in time and stay at rest."""
 
+import math
+import signal
 from collections import Counter
 
 import pytest
 
+from sim_twin.campaigns.killing.failures import late, late_ready
+from sim_twin.campaigns.killing.rest import STILL_RAD, RestWatch
 from sim_twin.campaigns.killing.rules import (
     COMMANDS,
     GRAVEST,
@@ -61,6 +65,57 @@ def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
     [(text, "pick_up", None) for text in COMMANDS]
     + [(text, "place", "object") for text in PUT_DOWN],
 )
-def test_what_the_robot_is_told_is_understood_by_patterns_alone(text, skill, held):
+def test_every_command_of_the_campaign_is_planned_by_patterns_alone(text, skill, held):
     world = world_of(load_robot("butler"), {"left": held, "right": held})
     assert skill in [action.skill for action in plan_command(text, world).actions]
+
+
+def test_only_what_comes_too_late_or_never_is_a_failure() -> None:
+    assert not list(late(1.5, 1.5, "")) + list(late(None, 9.0, "")) + list(late_ready(30.0, 30.0))
+    assert "inf" in next(late(1.5, float("inf"), "left_wheel"))
+    assert "inf" in next(late_ready(30.0, float("inf")))
+
+
+KILLED = RULES["control", signal.SIGKILL]
+
+
+def seen(watch: RestWatch, *looks: tuple[float, float, float]) -> list[str]:
+    """Feed the watch one joint's position and speed over time; return its failures."""
+    for since_s, place, speed in looks:
+        if watch.wants(since_s):
+            joint = {"position": place, "velocity": speed}
+            watch.look(since_s, {"joints": {"elbow": joint}})
+    return list(watch.failures())
+
+
+def test_a_robot_that_rests_in_time_and_stays_is_well() -> None:
+    watch = RestWatch(KILLED)
+    assert not seen(watch, (0.1, 0.0, 1.0), (0.5, 0.1, 0.0), (1.7, 0.1, 0.0), (9.0, 0.1, 0.0))
+    assert watch.rest_s == 0.5
+
+
+def test_one_that_never_rests_is_late() -> None:
+    (failure,) = seen(RestWatch(KILLED), (0.1, 0.0, 1.0), (1.7, 0.4, 1.0), (9.0, 3.0, 1.0))
+    assert failure.startswith("at rest after inf s")
+    assert "elbow moves" in failure
+
+
+@pytest.mark.parametrize("jerk", [STILL_RAD + 0.01, -1.0])
+def test_a_jerk_when_the_process_comes_back_is_a_failure_though_it_ends(jerk: float) -> None:
+    looks = [(0.5, 0.1, 0.0), (6.0, 0.1 + jerk, 0.0), (7.0, 0.1, 0.0)]
+    (failure,) = seen(RestWatch(KILLED), *looks)
+    assert failure.startswith("elbow moved by")
+
+
+def test_where_no_hand_is_wanted_motion_goes_on_and_lowered_arms_lie_limp() -> None:
+    carried_on = RestWatch(RULES["planner", signal.SIGKILL])
+    assert not seen(carried_on, (0.1, 0.0, 1.0), (5.0, 2.0, 1.0))
+    assert math.isnan(carried_on.rest_s)
+    lowered = RestWatch(RULES["supervisor", signal.SIGTERM])
+    assert not seen(lowered, (9.0, 0.0, 0.0), (20.0, 1.0, 0.0))
+
+
+def test_a_limp_arm_may_slide_on_slowly_and_one_with_power_may_not() -> None:
+    slides = ((1.0, 0.0, 0.04), (20.0, 0.5, 0.0))
+    assert not seen(RestWatch(RULES["supervisor", signal.SIGTERM]), *slides)
+    assert seen(RestWatch(KILLED), *slides)

@@ -1,4 +1,4 @@
-"""The judge of load must see every way in which a busy computer may change a job."""
+"""The judge of load detects every way in which a busy computer may change a job."""
 
 from typing import Any
 

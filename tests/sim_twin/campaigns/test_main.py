@@ -9,6 +9,7 @@ import pytest
 from sim_twin.campaigns import __main__ as campaigns
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.selection import NothingChosen, chosen
 
 REPORT = CampaignReport(
     campaign="faults", cases=(CampaignCase(name="servo_bus/off/idle", failures=("fell",)),)
@@ -49,7 +50,7 @@ def test_a_figure_that_plays_nothing_is_refused_in_one_line(
     assert (ended.value.code, played) == (2, [])
 
 
-def test_a_campaign_plays_as_many_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_campaign_plays_as_many_cases_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kills, "inject_all", lambda drawn, _seed, _tell: drawn)
     for count, expected in ((None, kills.INJECTIONS), (3, 3), (0, 0)):
         options = argparse.Namespace(count=count, seed=0, only="")
@@ -76,7 +77,7 @@ def test_a_junit_file_that_cannot_be_is_refused_before_anything_is_played(
 
 
 @pytest.mark.usefixtures("played")
-def test_the_report_is_told_before_its_file_is_written(
+def test_the_report_is_printed_before_its_file_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def full(_report: CampaignReport, _path: Path) -> None:
@@ -86,3 +87,19 @@ def test_the_report_is_told_before_its_file_is_written(
     with pytest.raises(OSError, match="no space left"):
         campaigns.main(["faults", "--junit", str(tmp_path / "x.xml")])
     assert "1 cases, 1 failed" in capsys.readouterr().out
+
+
+def test_a_part_of_a_name_chooses_cases_and_one_that_chooses_none_is_refused() -> None:
+    assert chosen(["idle/off", "driving/off"], "idle", str) == ["idle/off"]
+    assert chosen(["idle/off", "driving/off"], "", str) == ["idle/off", "driving/off"]
+    assert chosen([], "", str) == []
+    with pytest.raises(NothingChosen, match="of which there are 2: idle/off, driving/off"):
+        chosen(["idle/off", "driving/off"], "typo", str)
+
+
+@pytest.mark.parametrize("campaign", ["faults", "kills", "pressure", "switches", "soak"])
+def test_every_campaign_refuses_such_a_name_before_anything_starts(
+    campaign: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert campaigns.main([campaign, "--only", "typo"]) == 2
+    assert f"validate {campaign}: --only typo" in capsys.readouterr().err

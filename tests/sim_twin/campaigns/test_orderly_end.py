@@ -61,7 +61,7 @@ def test_sigterm_ends_a_campaign_with_its_workers_and_their_folders(
 
 
 class _Closed:
-    """Stand for the robot and the watch; the campaign is ended while the arms are folded."""
+    """Stand in for the robot and the watch; the campaign ends while the arms are folded."""
 
     closed = 0
 

@@ -1,4 +1,4 @@
-"""The soak's judge must see growth, and not take noise for it."""
+"""The soak's judge detects growth and ignores noise."""
 
 import ctypes
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Whoever nobody answers for is found, by real processes with the marks of a run."""
+"""Stray processes of a run are found, tested with real processes."""
 
 import os
 import subprocess

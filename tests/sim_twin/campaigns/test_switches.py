@@ -9,6 +9,7 @@ import pytest
 
 from platforms import ProfileError, load_profile
 from sim_twin.campaigns.switching import switches
+from sim_twin.campaigns.switching.commit_second import CommitLook, commit_ns, explained, late_around
 from sim_twin.campaigns.switching.judge import (
     MOST_MIB_PER_SWITCH,
     SwitchSeen,
@@ -19,6 +20,7 @@ from sim_twin.campaigns.switching.judge import (
 )
 from sim_twin.campaigns.switching.profiles import BAD, GOOD
 from sim_twin.campaigns.ticks import TickWatch
+from sim_twin.harness.stillness import Stall
 
 KEPT = SwitchSeen(
     outcome="kept",
@@ -62,7 +64,7 @@ def test_a_switch_that_is_kept_in_motion_has_no_fault() -> None:
         ({"late_at_commit": 3, "explained_at_commit": 2}, "the computer explains 2"),
     ],
 )
-def test_what_a_switch_must_not_do_is_told(changes: dict[str, object], word: str) -> None:
+def test_what_a_switch_must_not_do_is_reported(changes: dict[str, object], word: str) -> None:
     found = list(judge(replace(KEPT, **changes), ("kept",)))  # type: ignore[arg-type]
     assert any(word in fault for fault in found), found
 
@@ -117,6 +119,34 @@ def test_the_good_profiles_are_valid_and_the_file_faults_are_faults(tmp_path: Pa
             load_profile(str(tmp_path / f"{name}.toml"))
     for name in ("process_refuses", "memory_not_kept", "computer_too_small"):
         load_profile(str(tmp_path / f"{name}.toml"))
+
+
+S = 1_000_000_000
+LOOKS = [
+    CommitLook(now_ns=n * S // 10, late=0 if n < 22 else 3, phase="watch" if n >= 20 else "prepare")
+    for n in range(60)
+]
+
+
+def test_the_commit_is_where_it_is_seen_first() -> None:
+    assert commit_ns(LOOKS) == 2 * S
+    assert commit_ns(LOOKS[:20]) is None
+
+
+def test_late_ticks_in_the_second_count_and_no_others() -> None:
+    assert late_around(LOOKS, 2 * S) == (3, 15 * S // 10, 25 * S // 10)
+    assert late_around(LOOKS, 4 * S)[0] == 0
+
+
+def test_a_stall_explains_one_late_tick_and_one_for_each_period() -> None:
+    stalls = [Stall(due_ns=S, seconds=0.017), Stall(due_ns=S, seconds=0.001)]
+    assert explained(stalls, 0, 2 * S, 0.008) == 3
+    assert explained(stalls, 2 * S, 3 * S, 0.008) == 0
+
+
+def test_a_stall_may_have_been_longer_than_it_was_seen() -> None:
+    assert explained([Stall(due_ns=S, seconds=0.0012)], 0, 2 * S, 0.008) == 0
+    assert explained([Stall(due_ns=S, seconds=0.0012, before_s=0.0005)], 0, 2 * S, 0.008) == 1
 
 
 @pytest.mark.slow

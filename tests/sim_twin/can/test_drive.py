@@ -318,7 +318,7 @@ def test_a_hot_drive_faults_again_after_each_reset_until_it_has_cooled(host: Hos
     host.pass_time(0.01)
     assert state(host) is PowerState.FAULT
     assert [code for code in emergencies(host) if code] == [0x4310]
-    host.pass_time(300.0)
+    host.drive._stage.temperature_c = 25.0  # how it cools is the power stage's test
     host.command(0x00)
     host.command(0x80)
     host.pass_time(0.01)

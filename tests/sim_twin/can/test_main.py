@@ -1,4 +1,4 @@
-"""Serve CAN nodes from the command line, and make mistakes there."""
+"""Serve CAN nodes from the command line, with right and wrong options."""
 
 import subprocess
 import sys

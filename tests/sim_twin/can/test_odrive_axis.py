@@ -30,7 +30,7 @@ from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 
 NODE_ID = 3
 ENDPOINTS = read_endpoints(EMULATED_ENDPOINTS).endpoints
-TELLING = (
+REPORTED = (
     OdriveCommand.GET_VERSION,
     OdriveCommand.HEARTBEAT,
     OdriveCommand.GET_ERROR,
@@ -66,7 +66,7 @@ class Host:
     def pass_time(self, duration_s: float) -> None:
         self.world.sleep_until(self.world.now_ns() + round(duration_s * 1e9))
 
-    def tell(self, name: str, **signals: float) -> None:
+    def command(self, name: str, **signals: float) -> None:
         message = self.dbc.get_message_by_name(name)
         data = message.encode(signals) if signals else b""
         self.send(message.frame_id, data)
@@ -81,7 +81,7 @@ class Host:
             )
         )
 
-    def heard(self, name: str) -> list[dict[str, float]]:
+    def received(self, name: str) -> list[dict[str, float]]:
         """Return, decoded, all messages of that name that have come."""
         wanted = self.dbc.get_message_by_name(name)
         frames = [
@@ -91,10 +91,10 @@ class Host:
         ]
         return [dict(wanted.decode(bytes(frame.data))) for frame in frames]
 
-    def ask(self, name: str) -> dict[str, float]:
-        self.heard(name)
+    def request(self, name: str) -> dict[str, float]:
+        self.received(name)
         self.send(self.dbc.get_message_by_name(name).frame_id, remote=True)
-        (answer,) = self.heard(name)
+        (answer,) = self.received(name)
         return answer
 
     def write(self, name: str, value: float) -> None:
@@ -103,8 +103,8 @@ class Host:
         self.send(OdriveCommand.RX_SDO, head + endpoint.encode(value))
 
     def enable(self, velocity_rev_s: float = 0.0) -> None:
-        self.tell("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
-        self.tell("Set_Input_Vel", Input_Vel=velocity_rev_s, Input_Torque_FF=0.0)
+        self.command("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
+        self.command("Set_Input_Vel", Input_Vel=velocity_rev_s, Input_Torque_FF=0.0)
         assert self.axis.axis_state is AxisState.CLOSED_LOOP_CONTROL
 
     @property
@@ -119,11 +119,11 @@ def host(dbc: Database) -> Iterator[Host]:
     host.bus.shutdown()
 
 
-@pytest.mark.parametrize("command", TELLING)
-def test_what_the_axis_tells_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
+@pytest.mark.parametrize("command", REPORTED)
+def test_every_message_of_the_axis_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
     host.enable(1.0)
     host.pass_time(0.3)
-    answer = host.ask(MESSAGES[command].name)
+    answer = host.request(MESSAGES[command].name)
     assert set(answer) == set(MESSAGES[command].signals)
     assert all(math.isfinite(value) for value in answer.values())
 
@@ -136,20 +136,20 @@ def test_our_message_table_has_the_names_of_the_dbc(dbc: Database) -> None:
 
 
 def test_heartbeats_and_estimates_come_at_their_rates(host: Host) -> None:
-    host.heard("Heartbeat")
+    host.received("Heartbeat")
     host.pass_time(1.0)
     frames = [frame.arbitration_id & 0x1F for frame in iter(host.bus.recv, None)]
     assert 10 <= frames.count(OdriveCommand.HEARTBEAT) <= 11
     assert 99 <= frames.count(OdriveCommand.GET_ENCODER_ESTIMATES) <= 101
 
 
-def test_velocity_control_follows_and_tells_position_and_speed(host: Host) -> None:
+def test_velocity_control_follows_and_reports_position_and_speed(host: Host) -> None:
     host.enable(2.0)
     host.pass_time(1.0)
     assert host.speed_rev_s == pytest.approx(2.0, abs=0.02)
-    before = host.ask("Get_Encoder_Estimates")
+    before = host.request("Get_Encoder_Estimates")
     host.pass_time(0.5)
-    after = host.ask("Get_Encoder_Estimates")
+    after = host.request("Get_Encoder_Estimates")
     assert after["Vel_Estimate"] == pytest.approx(2.0, abs=0.02)
     assert after["Pos_Estimate"] - before["Pos_Estimate"] == pytest.approx(1.0, abs=0.02)
     assert (after["Pos_Estimate"] * 16384).is_integer()
@@ -157,7 +157,7 @@ def test_velocity_control_follows_and_tells_position_and_speed(host: Host) -> No
 
 def test_the_velocity_ramp_keeps_to_its_rate(host: Host) -> None:
     host.write(RAMP_RATE, 4.0)
-    host.tell(
+    host.command(
         "Set_Controller_Mode", Control_Mode=ControlMode.VELOCITY, Input_Mode=InputMode.VEL_RAMP
     )
     host.enable(8.0)
@@ -166,32 +166,32 @@ def test_the_velocity_ramp_keeps_to_its_rate(host: Host) -> None:
 
 
 def test_position_control_arrives(host: Host) -> None:
-    host.tell(
+    host.command(
         "Set_Controller_Mode", Control_Mode=ControlMode.POSITION, Input_Mode=InputMode.PASSTHROUGH
     )
-    host.tell("Set_Pos_Gain", Pos_Gain=5.0)
+    host.command("Set_Pos_Gain", Pos_Gain=5.0)
     host.enable()
-    host.tell("Set_Input_Pos", Input_Pos=0.5, Vel_FF=0.0, Torque_FF=0.0)
+    host.command("Set_Input_Pos", Input_Pos=0.5, Vel_FF=0.0, Torque_FF=0.0)
     host.pass_time(3.0)
-    assert host.ask("Get_Encoder_Estimates")["Pos_Estimate"] == pytest.approx(0.5, abs=0.01)
+    assert host.request("Get_Encoder_Estimates")["Pos_Estimate"] == pytest.approx(0.5, abs=0.01)
 
 
 def test_torque_control_gives_the_torque_asked_for(host: Host) -> None:
-    host.tell(
+    host.command(
         "Set_Controller_Mode", Control_Mode=ControlMode.TORQUE, Input_Mode=InputMode.PASSTHROUGH
     )
     host.enable()
-    host.tell("Set_Input_Torque", Input_Torque=0.5)
+    host.command("Set_Input_Torque", Input_Torque=0.5)
     host.pass_time(0.1)
-    assert host.ask("Get_Torques")["Torque_Estimate"] == pytest.approx(0.5)
-    assert host.ask("Get_Iq")["Iq_Measured"] == pytest.approx(1.0)
+    assert host.request("Get_Torques")["Torque_Estimate"] == pytest.approx(0.5)
+    assert host.request("Get_Iq")["Iq_Measured"] == pytest.approx(1.0)
 
 
 def test_limits_hold(host: Host) -> None:
-    host.tell("Set_Limits", Velocity_Limit=1.0, Current_Limit=2.0)
+    host.command("Set_Limits", Velocity_Limit=1.0, Current_Limit=2.0)
     host.enable(5.0)
     host.pass_time(0.01)
-    assert host.ask("Get_Iq")["Iq_Measured"] == pytest.approx(2.0)
+    assert host.request("Get_Iq")["Iq_Measured"] == pytest.approx(2.0)
     host.pass_time(2.0)
     assert host.speed_rev_s == pytest.approx(1.0, abs=0.02)
 
@@ -199,18 +199,18 @@ def test_limits_hold(host: Host) -> None:
 def test_a_wheel_that_is_driven_beyond_its_limit_disarms(host: Host) -> None:
     host.enable(2.0)
     host.pass_time(1.0)
-    host.tell("Set_Limits", Velocity_Limit=1.0, Current_Limit=8.0)
+    host.command("Set_Limits", Velocity_Limit=1.0, Current_Limit=8.0)
     host.pass_time(0.01)
     assert host.axis.disarm_reason is AxisError.VELOCITY_LIMIT_VIOLATION
 
 
 def test_a_mode_that_is_not_emulated_refuses_to_arm(host: Host) -> None:
-    host.tell(
+    host.command(
         "Set_Controller_Mode", Control_Mode=ControlMode.POSITION, Input_Mode=InputMode.TRAP_TRAJ
     )
-    host.tell("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
+    host.command("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
     assert host.axis.axis_state is AxisState.IDLE
-    assert host.ask("Get_Error")["Active_Errors"] == AxisError.BAD_CONFIG
+    assert host.request("Get_Error")["Active_Errors"] == AxisError.BAD_CONFIG
 
 
 def test_the_watchdog_is_off_until_it_is_configured(host: Host) -> None:
@@ -228,28 +228,28 @@ def test_any_message_feeds_the_watchdog_and_silence_trips_it(host: Host) -> None
         host.send(OdriveCommand.GET_IQ, remote=True)
     assert host.axis.axis_state is AxisState.CLOSED_LOOP_CONTROL
     host.pass_time(0.11)
-    error = host.ask("Get_Error")
+    error = host.request("Get_Error")
     assert error["Active_Errors"] == error["Disarm_Reason"] == AxisError.WATCHDOG_TIMER_EXPIRED
-    assert host.ask("Heartbeat")["Axis_State"] == AxisState.IDLE
+    assert host.request("Heartbeat")["Axis_State"] == AxisState.IDLE
 
 
 def test_an_estop_disarms_and_only_clearing_lets_it_arm_again(host: Host) -> None:
     host.enable(1.0)
-    host.tell("Estop")
-    assert host.ask("Heartbeat")["Axis_Error"] == AxisError.ESTOP_REQUESTED
-    host.tell("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
+    host.command("Estop")
+    assert host.request("Heartbeat")["Axis_Error"] == AxisError.ESTOP_REQUESTED
+    host.command("Set_Axis_State", Axis_Requested_State=AxisState.CLOSED_LOOP_CONTROL)
     assert host.axis.axis_state is AxisState.IDLE
-    host.tell("Clear_Errors", Identify=0)
-    assert host.ask("Get_Error") == {"Active_Errors": 0, "Disarm_Reason": 0}
+    host.command("Clear_Errors", Identify=0)
+    assert host.request("Get_Error") == {"Active_Errors": 0, "Disarm_Reason": 0}
     host.enable(1.0)
 
 
 def test_a_reboot_disarms_and_forgets_what_was_not_saved(host: Host) -> None:
     host.write(WATCHDOG_TIMEOUT, 3.0)
-    host.tell("Reboot", Action=1)
+    host.command("Reboot", Action=1)
     host.write(WATCHDOG_TIMEOUT, 9.0)
     host.enable(1.0)
-    host.tell("Reboot", Action=0)
+    host.command("Reboot", Action=0)
     assert host.axis.axis_state is AxisState.IDLE
     number = ENDPOINTS[WATCHDOG_TIMEOUT].number.to_bytes(2, "little")
     host.send(OdriveCommand.RX_SDO, b"\0" + number + bytes(5))
@@ -261,16 +261,22 @@ def test_a_reboot_disarms_and_forgets_what_was_not_saved(host: Host) -> None:
     assert ENDPOINTS[WATCHDOG_TIMEOUT].decode(answer[4:]) == 3.0
 
 
+def test_reading_an_unknown_endpoint_stays_unanswered(host: Host) -> None:
+    host.received("Heartbeat")
+    host.send(OdriveCommand.RX_SDO, b"\0" + (0xFFFF).to_bytes(2, "little") + bytes(5))
+    assert host.bus.recv() is None
+
+
 def test_the_position_can_be_set(host: Host) -> None:
-    host.tell("Set_Absolute_Position", Position=7.5)
-    assert host.ask("Get_Encoder_Estimates")["Pos_Estimate"] == 7.5
+    host.command("Set_Absolute_Position", Position=7.5)
+    assert host.request("Get_Encoder_Estimates")["Pos_Estimate"] == 7.5
 
 
 def test_a_stored_address_is_changed_by_serial_number_only(host: Host) -> None:
-    serial = host.ask("Address")["Serial_Number"]
-    host.tell("Address", Node_ID=9, Serial_Number=serial + 1, Connection_ID=0)
+    serial = host.request("Address")["Serial_Number"]
+    host.command("Address", Node_ID=9, Serial_Number=serial + 1, Connection_ID=0)
     assert host.axis.node_id == NODE_ID
-    host.tell("Address", Node_ID=9, Serial_Number=serial, Connection_ID=0)
+    host.command("Address", Node_ID=9, Serial_Number=serial, Connection_ID=0)
     assert host.axis.node_id == 9
 
 
@@ -279,17 +285,17 @@ def test_an_undervoltage_disarms(host: Host) -> None:
     host.axis.set_supply_v(12.0)
     host.pass_time(0.01)
     assert host.axis.disarm_reason is AxisError.DC_BUS_UNDER_VOLTAGE
-    assert host.ask("Get_Bus_Voltage_Current")["Bus_Voltage"] == pytest.approx(12.0)
+    assert host.request("Get_Bus_Voltage_Current")["Bus_Voltage"] == pytest.approx(12.0)
 
 
 def test_an_overheated_motor_cannot_be_armed_before_it_has_cooled(host: Host) -> None:
     host.axis.overheat()
     host.pass_time(0.01)
-    host.tell("Clear_Errors", Identify=0)
+    host.command("Clear_Errors", Identify=0)
     host.pass_time(0.01)
-    assert host.ask("Get_Error")["Active_Errors"] == AxisError.MOTOR_OVER_TEMP
-    host.pass_time(300.0)
-    host.tell("Clear_Errors", Identify=0)
+    assert host.request("Get_Error")["Active_Errors"] == AxisError.MOTOR_OVER_TEMP
+    host.axis._stage.temperature_c = 25.0  # how it cools is the power stage's test
+    host.command("Clear_Errors", Identify=0)
     host.enable()
 
 
@@ -297,16 +303,16 @@ def test_frozen_values_stand_while_the_wheel_turns(host: Host) -> None:
     host.enable(1.0)
     host.pass_time(0.5)
     host.axis.freeze(True)
-    first = host.ask("Get_Encoder_Estimates")
+    first = host.request("Get_Encoder_Estimates")
     host.pass_time(0.5)
-    assert host.ask("Get_Encoder_Estimates") == first
-    assert host.ask("Heartbeat")["Axis_State"] == AxisState.CLOSED_LOOP_CONTROL
+    assert host.request("Get_Encoder_Estimates") == first
+    assert host.request("Heartbeat")["Axis_State"] == AxisState.CLOSED_LOOP_CONTROL
 
 
 def test_silence_hides_everything_but_stops_nothing(host: Host) -> None:
     host.enable(1.0)
     host.axis.silence(True)
-    host.heard("Heartbeat")
+    host.received("Heartbeat")
     host.pass_time(0.5)
     assert host.bus.recv() is None
     assert host.speed_rev_s > 0.9

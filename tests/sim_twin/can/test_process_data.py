@@ -149,8 +149,9 @@ def test_a_segmented_download_must_alternate_its_toggle_and_keep_its_size(master
     assert int.from_bytes(abort[4:], "little") == 0x06070010
 
 
-def test_a_transfer_that_nobody_began_and_a_huge_one_are_refused(master: Master) -> None:
-    abort = master.send(0x601, b"\x01\0\0\0\0\0\0\0")[0].data
-    assert int.from_bytes(abort[4:], "little") == 0x05040001
+def test_a_segment_without_a_transfer_and_a_huge_transfer_are_refused(master: Master) -> None:
+    for segment in (0x01, 0x60):  # of a download, of an upload
+        abort = master.send(0x601, bytes((segment,)) + bytes(7))[0].data
+        assert int.from_bytes(abort[4:], "little") == 0x05040001
     abort = master.send(0x601, bytes.fromhex("21002000ffff0000"))[0].data
     assert int.from_bytes(abort[4:], "little") == 0x05040005

@@ -1,4 +1,4 @@
-"""Drive a robot's wheels in the twin with the encoder, the gear and the files of its robot file."""
+"""Drive a robot's wheels with the encoder, the gear and the files of its robot file."""
 
 import configparser
 import json
@@ -10,10 +10,12 @@ import can
 import pytest
 
 from drivers.canopen import EDS_PATH
+from drivers.clock import Clock
 from drivers.errors import WrongDevice
 from drivers.odrive import EMULATED_ENDPOINTS
 from platforms import load_profile
 from sim_twin.can import (
+    CanWire,
     EmulatedDrive,
     MemoryBus,
     MotorMounting,
@@ -23,6 +25,8 @@ from sim_twin.can import (
 )
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.power_stage import MotorSpec
+from sim_twin.timing.clock import SimClock
+from sim_twin.twin import Twin
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription, load_robot
 
@@ -43,20 +47,36 @@ def robot_with(
 
 
 class Bench:
-    def __init__(self, robot: RobotDescription) -> None:
-        drives = robot_drives(robot.can_bus)
-        self.world: FreeWheelWorld[EmulatedDrive] = FreeWheelWorld(
-            [FreeWheel(drive) for drive in drives]
-        )
-        self.wheels = Wheels(robot, load_profile("desktop"), self, self.world)  # type: ignore[arg-type]
+    """Control's wheels on a wire, and the clock that moves what is at its other end."""
+
+    def __init__(self, robot: RobotDescription, clock: Clock, wire: CanWire) -> None:
+        self.clock, self.wire = clock, wire
+        self.wheels = Wheels(robot, load_profile("desktop"), self, clock)  # type: ignore[arg-type]
 
     def can(self, name: str) -> can.BusABC:
-        return MemoryBus(self.world.wire)
+        return MemoryBus(self.wire)
 
     def drive(self, ticks: int, v_m_s: float) -> None:
         for _ in range(ticks):
             self.wheels.cycle(v_m_s, 0.0)
-            self.world.sleep_until(self.world.now_ns() + TICK_NS)
+            self.clock.sleep_until(self.clock.now_ns() + TICK_NS)
+
+    def set_off(self) -> None:
+        """Enable the wheels, then drive a second at 0.3 m/s."""
+        self.wheels.open()
+        self.wheels.enable()
+        self.drive(60, 0.0)
+        self.drive(250, 0.3)
+
+
+class FreeBench(Bench):
+    """Wheels that turn freely, without any physics."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        self.world: FreeWheelWorld[EmulatedDrive] = FreeWheelWorld(
+            [FreeWheel(drive) for drive in robot_drives(robot.can_bus)]
+        )
+        super().__init__(robot, self.world, self.world.wire)
 
 
 def written_eds(tmp_path: Path, *, without: tuple[str, ...] = (), **values: str) -> Path:
@@ -91,19 +111,32 @@ def written_endpoints(tmp_path: Path, firmware: str) -> Path:
 def test_a_base_with_another_gear_and_encoder_drives_as_fast(
     protocol: str, gear_ratio: float, counts_per_rev: int
 ) -> None:
-    bench = Bench(
+    bench = FreeBench(
         robot_with(protocol, gear_ratio, counts_per_rev, endpoints_path=EMULATED_ENDPOINTS)
     )
-    bench.wheels.open()
-    bench.wheels.enable()
-    bench.drive(60, 0.0)
-    bench.drive(250, 0.3)
+    bench.set_off()
     wheel_rad_s = 0.3 / BUTLER.base.wheel_radius_m
     for wheel, drive in zip(bench.world.wheels, BUTLER.can_bus.drives, strict=True):
         assert abs(wheel.velocity_rad_s) == pytest.approx(wheel_rad_s, abs=0.1), drive.joint
     assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
     travelled_m = bench.world.wheels[0].position_rad * BUTLER.base.wheel_radius_m
     assert bench.wheels.odometry.x_m == pytest.approx(travelled_m, abs=0.01)
+    bench.wheels.close()
+
+
+@pytest.mark.parametrize(
+    ("protocol", "gear_ratio", "counts_per_rev"), [("cia402", 12.0, 4096), ("odrive", 12.0, 8192)]
+)
+def test_the_whole_robot_goes_as_far_with_other_gears(
+    protocol: str, gear_ratio: float, counts_per_rev: int
+) -> None:
+    robot = robot_with(protocol, gear_ratio, counts_per_rev, endpoints_path=EMULATED_ENDPOINTS)
+    twin = Twin(robot)
+    bench = Bench(robot, SimClock(twin), twin.can_wire)
+    bench.set_off()
+    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
+    assert bench.wheels.odometry.x_m == pytest.approx(0.27, abs=0.02)
+    assert not bench.wheels.faulted
     bench.wheels.close()
 
 
@@ -130,11 +163,8 @@ def test_a_drive_shows_the_identity_and_the_objects_of_its_eds_file(tmp_path: Pa
     path = written_eds(
         tmp_path, without=("6077", "6076", "605E"), _1018sub1="0x1234", _1018sub2="0x77"
     )
-    bench = Bench(robot_with("cia402", 2.0, 4096, eds_path=path))
-    bench.wheels.open()
-    bench.wheels.enable()
-    bench.drive(60, 0.0)
-    bench.drive(250, 0.3)
+    bench = FreeBench(robot_with("cia402", 2.0, 4096, eds_path=path))
+    bench.set_off()
     assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
     first = bench.world.wheels[0].drive
     assert isinstance(first, WheelDrive)
@@ -144,7 +174,7 @@ def test_a_drive_shows_the_identity_and_the_objects_of_its_eds_file(tmp_path: Pa
 
 
 def test_a_drive_that_is_not_the_eds_files_is_refused(tmp_path: Path) -> None:
-    bench = Bench(robot_with("cia402", 1.0, 16384))
+    bench = FreeBench(robot_with("cia402", 1.0, 16384))
     other = robot_with("cia402", 1.0, 16384, eds_path=written_eds(tmp_path, _1018sub2="0x77"))
     wheels = Wheels(other, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     with pytest.raises(WrongDevice, match="product"):
@@ -153,7 +183,7 @@ def test_a_drive_that_is_not_the_eds_files_is_refused(tmp_path: Path) -> None:
 
 def test_event_driven_process_data_of_a_vendors_file_are_made_synchronous(tmp_path: Path) -> None:
     path = written_eds(tmp_path, _1800sub2="255", _1801sub2="254")
-    bench = Bench(robot_with("cia402", 1.0, 16384, eds_path=path))
+    bench = FreeBench(robot_with("cia402", 1.0, 16384, eds_path=path))
     bench.wheels.open()
     bench.drive(20, 0.0)
     assert bench.wheels.state is not None
@@ -163,7 +193,7 @@ def test_event_driven_process_data_of_a_vendors_file_are_made_synchronous(tmp_pa
 
 def test_an_axis_has_the_firmware_and_the_numbers_of_its_endpoint_file(tmp_path: Path) -> None:
     path = written_endpoints(tmp_path, "0.6.10")
-    bench = Bench(robot_with("odrive", 4.0, 8192, endpoints_path=path))
+    bench = FreeBench(robot_with("odrive", 4.0, 8192, endpoints_path=path))
     bench.wheels.open()
     bench.wheels.enable()
     bench.drive(60, 0.0)
@@ -176,6 +206,8 @@ def test_an_axis_has_the_firmware_and_the_numbers_of_its_endpoint_file(tmp_path:
 
 
 @pytest.mark.parametrize("firmware", ["0.6", "0.6.x", "0.6.999", "-1.0.0"])
-def test_a_firmware_that_cannot_be_told_is_refused(tmp_path: Path, firmware: str) -> None:
+def test_a_firmware_version_that_cannot_be_encoded_is_refused(
+    tmp_path: Path, firmware: str
+) -> None:
     with pytest.raises(ValueError, match="three numbers"):
         ODriveAxis(1, endpoints_path=written_endpoints(tmp_path, firmware))

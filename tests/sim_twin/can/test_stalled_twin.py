@@ -1,4 +1,4 @@
-"""Stall the twin's loop on an injected clock: what waits is heard, and no drive faults."""
+"""Stall the twin's loop on an injected clock: waiting frames are received, and no drive faults."""
 
 import gc
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ TICK_NS = 4_000_000
 
 
 class Clock:
-    """Be the wall clock of both processes; only the test moves it."""
+    """The wall clock of both processes, moved only by the test."""
 
     def __init__(self) -> None:
         self.wall_ns = 1_000_000_000
@@ -54,12 +54,12 @@ class Bench:
         return [drive for drive in self.twin._twin.drives if isinstance(drive, WheelDrive)]
 
     def run_twin(self, rounds: int) -> None:
-        """Let the twin's loop go round; time stands still meanwhile."""
+        """Run rounds of the twin's loop without advancing time."""
         left = iter(range(rounds))
         self.twin.run(lambda: next(left, None) is None)
 
     def tick(self, *, twin_runs: bool = True) -> None:
-        """Let 4 ms pass, with a tick of control and, unless it is stalled, of the twin."""
+        """Advance time by 4 ms, with a tick of control and, unless it is stalled, of the twin."""
         self.clock.wall_ns += TICK_NS
         if twin_runs:
             self.run_twin(TICK_NS // STEP_NS + 1)

@@ -13,7 +13,7 @@ MS = 1_000_000
 
 
 class Node:
-    """Acknowledge, and note frames and what the own controller tells."""
+    """Acknowledge, and note frames and the error frames of its own controller."""
 
     def __init__(self) -> None:
         self.supplied = True
@@ -41,7 +41,7 @@ class Bench:
             self.now_ns += 2 * MS
             self.wire.poll(self.now_ns)
 
-    def told(self) -> list[can.Message]:
+    def error_frames(self) -> list[can.Message]:
         return [frame for frame in iter(self.bus.recv, None) if frame.is_error_frame]
 
     def state(self) -> ErrorState:
@@ -126,8 +126,8 @@ def test_when_every_frame_is_damaged_the_sender_goes_bus_off_after_32_attempts(
     assert bench.state() is ErrorState.BUS_OFF
     assert bench.wire.frames_destroyed == 32
     assert bench.wire.health(bench.node).rec == 32
-    told = bench.told()
-    assert [frame.arbitration_id & (BUS_OFF | CONTROLLER) for frame in told] == [
+    reported = bench.error_frames()
+    assert [frame.arbitration_id & (BUS_OFF | CONTROLLER) for frame in reported] == [
         CONTROLLER,
         CONTROLLER,
         BUS_OFF,
@@ -145,7 +145,7 @@ def test_a_controller_restarts_by_itself_after_the_configured_time(bench: Bench)
     assert bench.state() is ErrorState.BUS_OFF
     bench.pass_time(0.06)
     assert bench.state() is ErrorState.ACTIVE
-    assert bench.told()[-1].arbitration_id & RESTARTED
+    assert bench.error_frames()[-1].arbitration_id & RESTARTED
     bench.bus.send(message(0x77))
     bench.pass_time(0.002)
     assert bench.node.heard == [0x77]
@@ -163,7 +163,7 @@ def test_a_forced_bus_off_lasts_until_the_restart_and_128_times_11_bits(bench: B
     assert bench.state() is ErrorState.ACTIVE
 
 
-def test_opening_the_interface_anew_does_not_end_a_forced_bus_off(bench: Bench) -> None:
+def test_reopening_the_interface_does_not_end_a_forced_bus_off(bench: Bench) -> None:
     bench.wire.set_bus_off()
     with MemoryBus(bench.wire) as second:
         frame = second.recv()
@@ -222,7 +222,7 @@ def test_two_nodes_of_one_identifier_destroy_each_other_until_one_gives_way(benc
         assert bench.wire.health(other).tec > bench.wire.health(bench.node).tec
 
 
-def test_lost_frames_cost_nobody_an_error(bench: Bench) -> None:
+def test_lost_frames_are_no_error_of_any_node(bench: Bench) -> None:
     bench.wire.drop_every(3)
     for value in range(9):
         bench.bus.send(message(value))
@@ -255,7 +255,7 @@ def test_a_delayed_frame_comes_late_and_in_order(bench: Bench) -> None:
     assert bench.node.heard == [1, 2]
 
 
-def test_single_errors_are_told_only_to_who_asks() -> None:
+def test_single_errors_are_reported_only_on_request() -> None:
     frames: list[can.Message] = []
     wire = CanWire([Node()])
     wire.attach(frames.append, report_bus_errors=True)

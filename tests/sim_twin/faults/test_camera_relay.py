@@ -49,7 +49,7 @@ def test_nothing_in_force_is_an_empty_list(bench: Bench) -> None:
     assert faults_in_force(bench.twin_side) == NO_FAULTS
 
 
-def test_the_other_end_does_what_it_is_told_and_undoes_it(bench: Bench) -> None:
+def test_a_fault_is_applied_at_the_other_end_and_removed(bench: Bench) -> None:
     whole = bench.frame()
     bench.camera_side.follow(json.dumps([{"fault": "off", "seed": 0}]))
     assert bench.frame() == b""
@@ -64,9 +64,9 @@ def test_parameters_travel(bench: Bench) -> None:
 
 def test_a_fault_that_comes_and_goes_travels_as_what_it_is_while_it_is_on(bench: Bench) -> None:
     bench.twin_side.inject("camera", None, "intermittent", of="off", period_s=0.4)
-    told = []
+    reported = []
     for _ in range(4):
         bench.twin_side.step()
-        told.append([fault["fault"] for fault in json.loads(faults_in_force(bench.twin_side))])
+        reported.append([fault["fault"] for fault in json.loads(faults_in_force(bench.twin_side))])
         bench.time_ns += PERIOD_NS
-    assert told == [["off"], ["off"], [], []]
+    assert reported == [["off"], ["off"], [], []]

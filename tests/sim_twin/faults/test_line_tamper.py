@@ -4,7 +4,7 @@ import pytest
 from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsics
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
-from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck
+from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Stuck
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
@@ -48,14 +48,6 @@ def host() -> Host:
     host = Host()
     assert len(host.samples(0.5)) == 50
     return host
-
-
-def test_a_silent_line_says_nothing_and_comes_back(host: Host) -> None:
-    silence = Silence()
-    host.line.add(silence)
-    assert host.samples(0.2) == []
-    host.line.remove(silence)
-    assert len(host.samples(0.2)) == 20
 
 
 def test_a_stuck_sensor_repeats_its_last_frame_byte_by_byte_and_none_is_believed(
@@ -105,7 +97,7 @@ def test_a_bus_repeats_its_last_answer_of_the_same_length() -> None:
 
 
 class Watch:
-    """Say what time it is."""
+    """A device that reports the time it was stepped to."""
 
     def __init__(self) -> None:
         self.now_ns = 0
@@ -121,14 +113,14 @@ class Watch:
         self.now_ns = now_ns
 
 
-def test_a_device_learns_the_time_whenever_its_line_talks_to_it() -> None:
+def test_every_access_to_a_line_steps_its_device() -> None:
     watch, times_ns = Watch(), iter([3, 8])
     line = LineTamper(watch, lambda: next(times_ns))
     line.receive(b"?")
     assert (watch.asked_ns, line.transmit()) == (3, b"8")
 
 
-def test_a_line_leaves_the_time_alone_where_somebody_else_steps_the_device() -> None:
+def test_a_line_does_not_step_a_device_that_is_stepped_elsewhere() -> None:
     watch = Watch()
     line = LineTamper(watch, lambda: 3, tells_time=False)
     line.receive(b"?")

@@ -78,7 +78,7 @@ def test_a_microphone_that_is_off_gives_nothing(lockstep: Lockstep) -> None:
     assert max(ear.listen()) > 4_000
 
 
-def test_a_stuck_microphone_tells_nothing_twice(lockstep: Lockstep) -> None:
+def test_a_stuck_microphone_delivers_nothing_twice(lockstep: Lockstep) -> None:
     ear, heard = hear(lockstep, "stuck")
     assert heard == []
     assert ear.driver.counters.repeated_blocks == POLLS

@@ -2,7 +2,7 @@
 
 import copy
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ from drivers.imu.base import ImuSample
 from drivers.imu.bno085_rvc import Bno085Rvc
 from drivers.lidar.base import Scan
 from drivers.lidar.ld19 import Ld19
+from sim_twin.contracts.scripted import ScriptedLine
 from sim_twin.device import WireDevice
+from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
@@ -23,28 +25,13 @@ from sim_twin.sensors.lidar import LidarDevice
 STEP_NS = 2_000_000
 
 
-@dataclass
-class Line:
-    """Join a device and a driver; `read` polls as every sensor driver does."""
+class Line(MemoryLine):
+    """Join a device and a driver; waiting on this line steps the device."""
 
-    device: WireDevice
-    now: int = 10**9
-    pending: bytearray = field(default_factory=bytearray)
-
-    def write(self, data: bytes) -> None:
-        self.device.receive(data)
-
-    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
-        self.pending += self.device.transmit()
-        data = bytes(self.pending[:max_bytes])
-        del self.pending[:max_bytes]
-        return data
-
-    def discard_input(self) -> None:
-        self.pending.clear()
-
-    def close(self) -> None:
-        pass
+    def __init__(self, device: WireDevice) -> None:
+        super().__init__(device, self)
+        self.device = device
+        self.now = 10**9
 
     def now_ns(self) -> int:
         return self.now
@@ -285,32 +272,14 @@ def test_a_restarted_request_with_the_same_rate_keeps_the_cadence() -> None:
     assert scenery.renders == 1
 
 
-def test_requests_survive_garbage_and_pieces() -> None:
+def test_requests_are_found_in_garbage_and_in_pieces() -> None:
     scenery = Scenery()
     device = CameraDevice(scenery.render, CAMERA)
     line = Line(device)
     device.receive(b"xxVRGC\x01garbage....VR")
-    sent = bytearray()
-    recorder = RgbdCamera(_Recorder(sent), line)
-    recorder.start(10.0)
-    for byte in sent:
+    request = ScriptedLine()
+    RgbdCamera(request, line).start(10.0)
+    for byte in request.sent:
         device.receive(bytes([byte]))
     line.sleep_until(line.now + 20_000_000)
     assert scenery.renders == 1
-
-
-@dataclass
-class _Recorder:
-    sent: bytearray
-
-    def write(self, data: bytes) -> None:
-        self.sent += data
-
-    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
-        return b""
-
-    def discard_input(self) -> None:
-        pass
-
-    def close(self) -> None:
-        pass

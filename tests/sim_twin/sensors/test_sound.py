@@ -1,4 +1,4 @@
-"""The twin's room: what is played is heard, what the robot says is kept."""
+"""The twin's room: the microphone receives what is played, the speaker's sound is kept."""
 
 import numpy as np
 import pytest
@@ -53,12 +53,14 @@ def test_the_same_seed_is_the_same_room_however_it_is_read() -> None:
     assert not np.array_equal(once, other)
 
 
-def test_a_host_that_comes_late_hears_the_last_second() -> None:
+def test_a_late_host_receives_the_last_second() -> None:
     device = MicrophoneDevice(SPEECH)
     assert len(heard(device, 10_000_000_000)) == 16_000
 
 
-def test_the_robot_hears_the_room_and_the_test_hears_the_robot(lockstep: Lockstep) -> None:
+def test_the_microphone_receives_the_room_and_the_test_receives_the_speaker(
+    lockstep: Lockstep,
+) -> None:
     twin, devices, clock = lockstep.twin, lockstep.devices, lockstep.clock
     ear = PcmInput(devices.stream("microphone"), clock, twin.microphone.format)
     mouth = PcmOutput(devices.stream("speaker"), clock, twin.speaker.format)

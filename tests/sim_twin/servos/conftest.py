@@ -59,7 +59,7 @@ class Bench:
             self._step()
 
     def turn_to(self, position_rad: float) -> None:
-        """Turn all shafts by hand, and let the encoders see it."""
+        """Set the angle of all shafts, and step once so that the encoders sense it."""
         self.rotors.position_rad[:] = position_rad
         self.rotors.velocity_rad_s[:] = 0.0
         self._step()

@@ -1,4 +1,4 @@
-"""Who hears a packet: ids given twice, secondary ids, baud rates, broken packets."""
+"""Which servos receive a packet: duplicate ids, secondary ids, baud rates, broken packets."""
 
 import struct
 from collections.abc import Callable
@@ -59,7 +59,7 @@ def test_an_id_comes_before_a_secondary_id(trio: Any) -> None:
     assert leds(trio) == [0, 1, 0]
 
 
-def test_a_servo_hears_a_host_at_its_own_rate_only(trio: Any) -> None:
+def test_a_servo_receives_at_its_own_rate_only(trio: Any) -> None:
     trio.bank.set_host_baud(57_600)
     assert len(trio.sync_read(65, 1, [1, 2, 3])) == 3
     assert trio.write("baud_rate", 3, 2) == 0
@@ -106,7 +106,9 @@ def test_a_broken_packet_is_answered_with_a_crc_error_by_the_servo_it_names(trio
 
 
 @pytest.mark.parametrize("servo_id", [BROADCAST_ID, 9])
-def test_a_broken_packet_to_all_or_nobody_stays_unanswered(trio: Any, servo_id: int) -> None:
+def test_a_broken_packet_to_all_or_to_an_unused_id_stays_unanswered(
+    trio: Any, servo_id: int
+) -> None:
     trio.bank.receive(broken(encode_instruction(servo_id, Instruction.PING)))
     assert trio.bank.transmit() == b""
 
@@ -119,7 +121,7 @@ def test_a_broken_packet_is_answered_as_far_as_the_status_return_level_goes(trio
     assert trio.bank.transmit()
 
 
-def test_a_broken_answer_of_another_servo_is_nobodys_business(trio: Any) -> None:
+def test_a_broken_answer_of_another_servo_is_ignored(trio: Any) -> None:
     trio.bank.receive(broken(encode_instruction(1, Instruction.STATUS, b"\0")))
     assert trio.bank.transmit() == b""
 

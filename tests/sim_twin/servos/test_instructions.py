@@ -21,7 +21,7 @@ from sim_twin.servos import EmulatedServoSpec, ServoBank
 from sim_twin.servos.protocol.instructions import BrokenPacket, InstructionParser
 
 PING = encode_instruction(1, Instruction.PING)
-STREAMS, CAMPAIGN_STREAMS = 20_000, 1_000_000
+STREAMS, CAMPAIGN_STREAMS = 5_000, 1_000_000
 INSTRUCTIONS = [*Instruction, 0x00, 0x21, 0xFF]
 
 
@@ -129,7 +129,7 @@ def fuzz(count: int, seed: int) -> None:
         bank.step(now_ns)
         bank.receive(stream)
         bank.transmit()
-        if number % 500 == 499:  # whatever ids they have by now
+        if number % 50 == 49:  # whatever ids they have by now
             now_ns += 1_000_000_000
             bank.step(now_ns)
             bank.receive(encode_instruction(BROADCAST_ID, Instruction.PING))

@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 
 from drivers.dynamixel.tables.control_table import OperatingMode
-from sim_twin.servos import FirmwareOptions
 
 CENTRE = 2048
 QUARTER_TURN = 1024
@@ -23,18 +22,6 @@ def test_a_step_runs_at_no_load_speed_and_then_settles_as_the_gain_says(bench: A
     bench.run(saturated_rad / model.no_load_speed_rad_s - 0.2 + 0.25)
     assert bench.read("present_position") == pytest.approx(CENTRE + QUARTER_TURN, abs=2)
     assert bench.read("moving") == 0
-
-
-def test_a_load_bends_a_p_only_servo_by_torque_over_stiffness(bench: Any) -> None:
-    """Full duty at 142 pulses of error: holding 20 % of stall torque takes 28 pulses."""
-    bench.arm()
-    bench.write("goal_position", CENTRE)
-    bench.blocked = True
-    bench.turn_to(-28.3 / 4096 * 2 * pi)
-    bench.run(0.01)
-    assert bench.duty[0] == pytest.approx(0.2, abs=0.01)
-    unit_ratio = bench.models[0].effort_unit_ratio
-    assert bench.read("present_current") * unit_ratio == pytest.approx(0.2, abs=0.01)
 
 
 def test_an_integral_gain_takes_the_remaining_error_away(bench: Any) -> None:
@@ -110,27 +97,6 @@ def test_velocity_mode_reaches_its_goal_and_ramps_with_the_profile(bench: Any) -
     assert asked < bench.read("present_velocity") < asked / 2
     bench.run(2.0)
     assert bench.read("present_velocity") == pytest.approx(-100, abs=2)
-
-
-def test_pwm_mode_puts_the_goal_on_the_motor(make_bench: Callable[..., Any]) -> None:
-    bench = make_bench(options=FirmwareOptions(supply_ohm=0.0))
-    bench.arm(OperatingMode.PWM)
-    bench.write("goal_pwm", -443)
-    bench.run(0.004)
-    assert bench.duty[0] == pytest.approx(-443 / 885)
-
-
-def test_current_mode_gives_its_torque_at_rest_and_at_speed(
-    make_bench: Callable[..., Any],
-) -> None:
-    bench = make_bench(inertia_kg_m2=0.1)
-    bench.arm(OperatingMode.CURRENT)
-    bench.write("goal_current", 100)
-    expected = 100 * bench.models[0].effort_unit_ratio * bench.models[0].stall_torque_nm
-    for _ in range(3):
-        bench.run(0.1)
-        assert bench.rotors.torque_nm[0] == pytest.approx(expected, rel=0.03)
-    assert bench.rotors.velocity_rad_s[0] == pytest.approx(expected / 0.1 * 0.3, rel=0.05)
 
 
 def test_current_based_position_mode_pushes_no_harder_than_its_goal_current(bench: Any) -> None:

@@ -161,7 +161,7 @@ def test_current_mode_keeps_its_torque_at_any_voltage_and_speed(
 
 
 def test_voltage_falls_with_the_current_of_all_servos(make_bench: Callable[..., Any]) -> None:
-    """A stalled XM430-W350 is 12 V / 2.3 A: beside 0.5 ohm each of two takes its share."""
+    """A stalled XM430-W350 is 12 V / 2.3 A: in series with 0.5 ohm each of two takes its share."""
     bench = make_bench(["XM430-W350"] * 2, options=FirmwareOptions(supply_ohm=0.5))
     bench.blocked = True
     expected_v = []

@@ -3,8 +3,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.dynamixel.wire.codec import (
     ALERT,
@@ -31,7 +29,7 @@ def ids(packets: Any) -> list[int]:
     return [packet.servo_id for packet in packets]
 
 
-def test_ping_tells_model_and_firmware(trio: Any) -> None:
+def test_ping_returns_model_and_firmware(trio: Any) -> None:
     assert trio.send(2, Instruction.PING)[0].params == struct.pack("<HB", 1060, 48)
     assert trio.send(7, Instruction.PING) == []
 
@@ -105,12 +103,12 @@ def test_a_fast_sync_read_longer_than_any_packet_stays_unanswered(trio: Any) -> 
 @pytest.mark.parametrize(
     "instruction", [Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ, Instruction.SYNC_READ]
 )
-def test_a_group_read_of_nobody_stays_unanswered(trio: Any, instruction: Instruction) -> None:
+def test_a_group_read_without_ids_stays_unanswered(trio: Any, instruction: Instruction) -> None:
     assert trio.send(BROADCAST_ID, instruction) == []
     assert trio.send(BROADCAST_ID, instruction, POSITION) == []
 
 
-def test_a_fast_sync_read_past_the_table_tells_the_error_of_every_servo(trio: Any) -> None:
+def test_a_fast_sync_read_past_the_table_returns_the_error_of_every_servo(trio: Any) -> None:
     params = struct.pack("<HH", 662, 2) + b"\1\2"
     trio.bank.receive(encode_instruction(BROADCAST_ID, Instruction.FAST_SYNC_READ, params))
     entries = decode_fast_entries(trio.bank.transmit(), 2)
@@ -212,7 +210,7 @@ def test_clear_forgets_turns_at_standstill_only(bench: Any) -> None:
     assert abs(bench.rotors.velocity_rad_s[0]) < 0.02
 
 
-def test_a_status_packet_on_the_bus_is_nobodys_instruction(trio: Any) -> None:
+def test_a_status_packet_on_the_bus_is_no_instruction(trio: Any) -> None:
     assert trio.send(1, Instruction.STATUS, b"\x00") == []
     assert trio.send(BROADCAST_ID, Instruction.STATUS, b"\x00") == []
 
@@ -259,37 +257,6 @@ def test_a_packet_may_arrive_in_pieces_but_not_with_a_pause(bench: Any) -> None:
     bench.bank.receive(packet[6:])
     assert bench.bank.transmit() == b""
     assert bench.send(1, Instruction.PING)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.binary(max_size=40) | st.just(b"\xff\xff\xfd\x00"), max_size=8))
-def test_noise_never_stops_the_bus_from_answering(noise: list[bytes]) -> None:
-    bank = ServoBank([EmulatedServoSpec(id=1, model_name="XM430-W350")])
-    for piece in noise:
-        bank.receive(piece)
-    bank.transmit()
-    bank.step(10_000_000)
-    bank.receive(encode_instruction(1, Instruction.PING))
-    parser = PacketParser()
-    parser.feed(bank.transmit())
-    assert ids(parser.packets()) == [1]
-
-
-@settings(max_examples=300, deadline=None)
-@given(
-    st.sampled_from([0, 1, 2, 252, BROADCAST_ID]),
-    st.integers(0, 255),
-    st.binary(max_size=24),
-)
-def test_no_well_framed_nonsense_breaks_a_servo(
-    servo_id: int, instruction: int, params: bytes
-) -> None:
-    bank = ServoBank([EmulatedServoSpec(id=n, model_name="XL430-W250") for n in (1, 2)])
-    bank.receive(encode_instruction(servo_id, instruction, params))
-    bank.transmit()
-    bank.step(10**9)
-    bank.receive(encode_instruction(BROADCAST_ID, Instruction.PING))
-    assert bank.transmit()  # two servos that were given one id answer with garbage
 
 
 @pytest.mark.parametrize("wrong", [[], [4, 4]])

@@ -1,179 +1,342 @@
-"""The vendor's own host library judges the emulated servos, over a real terminal."""
+"""The servo server on a terminal, in whole sessions of two third-party host libraries.
 
-import os
+The bus is paced at 1 Mbps and receives at the speed at which the library opens the terminal.
+"""
+
 import signal
 import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
+import dynamixel_sdk as sdk
+import psutil
 import pytest
-from dynamixel_sdk import (
-    COMM_SUCCESS,
-    GroupBulkRead,
-    GroupSyncRead,
-    GroupSyncWrite,
-    PacketHandler,
-    PortHandler,
-)
+import rustypot
 
 from sim_twin.servos.__main__ import main
 
 pytestmark = pytest.mark.stack
 
-TORQUE, LED, GOAL, POSITION, P_GAIN, MODE = 64, 65, 116, 132, 84, 11
-IDS = range(1, 17)
-ACCESS_ERROR = 7
-RANGE_ERROR = 4
-LIMIT_ERROR = 6
+BAUD, OTHER_BAUD, OTHER_BAUD_VALUE = 1_000_000, 2_000_000, 4
+IDS = (1, 2, 3, 4)
+NUMBERS = {1: 1020, 2: 1120, 3: 1060, 4: 1070}
+BAUD_RATE, MODE, TEMPERATURE_LIMIT, TORQUE, ERRORS = (8, 1), (11, 1), (31, 1), (64, 1), (70, 1)
+P_GAIN, WATCHDOG = (84, 2), (98, 1)
+GOAL_PWM, GOAL_CURRENT, GOAL_VELOCITY, GOAL_POSITION = (100, 2), (102, 2), (104, 4), (116, 4)
+PWM, CURRENT, VELOCITY, POSITION = (124, 2), (126, 2), (128, 4), (132, 4)
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, PWM_MODE = 0, 1, 3, 16
+ALERT, OVERHEATING = 0x80, 0x04
+RANGE_ERROR, LIMIT_ERROR, ACCESS_ERROR = 4, 6, 7
+
+Register = tuple[int, int]
 
 
-def start_server(link: Path, *extra: str) -> subprocess.Popen[bytes]:
-    server = subprocess.Popen(
-        [sys.executable, "-m", "sim_twin.servos", "--link", str(link), "--servos", "16", *extra]
-    )
-    until(lambda: link.is_symlink() or server.poll() is not None, timeout_s=20.0)
-    assert link.is_symlink(), "the server ended before it served"
-    return server
+class Host(Protocol):
+    """What a session needs of a library; errors are the status packet's byte."""
+
+    def open(self, baud: int) -> None: ...
+    def close(self) -> None: ...
+    def scan(self) -> dict[int, int]: ...
+    def pings(self, servo_id: int) -> bool: ...
+    def read(self, servo_id: int, register: Register) -> tuple[int, int]: ...
+    def write(self, servo_id: int, register: Register, value: int) -> int: ...
+    def read_all(self, register: Register, *, fast: bool) -> list[int]: ...
+    def write_all(self, register: Register, values: Sequence[int]) -> None: ...
+    def reboot(self, servo_id: int) -> None: ...
+
+
+def signed(value: int, size: int) -> int:
+    return value - (1 << 8 * size) if value >> (8 * size - 1) else value
+
+
+def to_bytes(value: int, size: int) -> list[int]:
+    return list(value.to_bytes(size, "little", signed=value < 0))
+
+
+class SdkHost:
+    def __init__(self, link: Path) -> None:
+        self.port = sdk.PortHandler(str(link))
+        self.packets = sdk.PacketHandler(2.0)
+
+    def open(self, baud: int) -> None:
+        assert self.port.openPort()
+        assert self.port.setBaudRate(baud)
+
+    def close(self) -> None:
+        self.port.closePort()
+
+    def scan(self) -> dict[int, int]:
+        found, _ = self.packets.broadcastPing(self.port)
+        return {servo_id: model for servo_id, (model, _) in found.items()}
+
+    def pings(self, servo_id: int) -> bool:
+        return bool(self.packets.ping(self.port, servo_id)[1] == sdk.COMM_SUCCESS)
+
+    def read(self, servo_id: int, register: Register) -> tuple[int, int]:
+        data, result, error = self.packets.readTxRx(self.port, servo_id, *register)
+        assert result == sdk.COMM_SUCCESS
+        return int.from_bytes(data, "little"), error
+
+    def write(self, servo_id: int, register: Register, value: int) -> int:
+        address, size = register
+        result, error = self.packets.writeTxRx(
+            self.port, servo_id, address, size, to_bytes(value, size)
+        )
+        assert result == sdk.COMM_SUCCESS
+        return int(error)
+
+    def read_all(self, register: Register, *, fast: bool) -> list[int]:
+        group = sdk.GroupSyncRead(self.port, self.packets, *register)
+        for servo_id in IDS:
+            group.addParam(servo_id)
+        assert (group.fastSyncRead() if fast else group.txRxPacket()) == sdk.COMM_SUCCESS
+        return [group.getData(servo_id, *register) for servo_id in IDS]
+
+    def write_all(self, register: Register, values: Sequence[int]) -> None:
+        group = sdk.GroupSyncWrite(self.port, self.packets, *register)
+        for servo_id, value in zip(IDS, values, strict=True):
+            group.addParam(servo_id, to_bytes(value, register[1]))
+        assert group.txPacket() == sdk.COMM_SUCCESS
+
+    def reboot(self, servo_id: int) -> None:
+        assert self.packets.reboot(self.port, servo_id)[0] == sdk.COMM_SUCCESS
+
+
+class RustypotHost:
+    def __init__(self, link: Path) -> None:
+        self.link = link
+
+    def open(self, baud: int) -> None:
+        self.bus: Any = rustypot.Xl430PyController(str(self.link), baud, 0.2)
+
+    def close(self) -> None:
+        self.bus.close()
+
+    def scan(self) -> dict[int, int]:
+        return dict(self.bus.broadcast_scan(list(IDS)))
+
+    def pings(self, servo_id: int) -> bool:
+        return bool(self.bus.ping(servo_id))
+
+    def read(self, servo_id: int, register: Register) -> tuple[int, int]:
+        data, error = self.bus.read_raw_data_with_error(servo_id, *register)
+        return int.from_bytes(bytes(data), "little"), error
+
+    def write(self, servo_id: int, register: Register, value: int) -> int:
+        address, size = register
+        return int(self.bus.write_raw_data_with_error(servo_id, address, to_bytes(value, size)))
+
+    def read_all(self, register: Register, *, fast: bool) -> list[int]:
+        self.bus.set_fast_sync_read(fast)
+        blocks = self.bus.sync_read_raw_data(list(IDS), *register)
+        return [int.from_bytes(bytes(block), "little") for block in blocks]
+
+    def write_all(self, register: Register, values: Sequence[int]) -> None:
+        address, size = register
+        self.bus.sync_write_raw_data(list(IDS), address, [to_bytes(v, size) for v in values])
+
+    def reboot(self, servo_id: int) -> None:
+        assert self.bus.reboot(servo_id)
+
+
+LIBRARIES: dict[str, Callable[[Path], Host]] = {
+    "dynamixel-sdk": SdkHost,
+    "rustypot": RustypotHost,
+}
 
 
 def until(reached: Callable[[], bool], timeout_s: float = 10.0) -> None:
-    deadline = time.monotonic() + timeout_s
+    deadline_s = time.monotonic() + timeout_s
     while not reached():
-        assert time.monotonic() < deadline, "not reached in time"
+        assert time.monotonic() < deadline_s, "not reached in time"
         time.sleep(0.02)
 
 
-@pytest.fixture(scope="module")
-def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    path = tmp_path_factory.mktemp("bus") / "servos"
-    server = start_server(path, "--models", "XM430-W350", "XM540-W270", "XL430-W250", "XC430-W150")
-    yield path
-    server.send_signal(signal.SIGTERM)
-    assert server.wait(timeout=10) == 0
+@contextmanager
+def served(path: Path, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """Serve a bus until SIGTERM, or until the server ends by itself."""
+    command = [sys.executable, "-m", "sim_twin.servos", "--link", str(path), *words]
+    with subprocess.Popen(command) as server:
+        until(lambda: path.is_symlink() or server.poll() is not None, timeout_s=20.0)
+        assert path.is_symlink(), "the server ended before it served"
+        yield server
+        server.send_signal(signal.SIGTERM)
+        assert server.wait(timeout=10) == 0
     assert not path.is_symlink()
 
 
 @pytest.fixture
-def port(link: Path) -> Iterator[Any]:
-    port = PortHandler(str(link))
-    assert port.openPort()
-    assert port.setBaudRate(1_000_000)
-    yield port
-    port.closePort()
+def link(tmp_path: Path) -> Iterator[Path]:
+    models = ("XM430-W350", "XM540-W270", "XL430-W250", "XC430-W150")
+    words = ("--servos", "4", "--models", *models, "--baud", str(BAUD), "--return-delay-us", "20")
+    with served(tmp_path / "servos", *words):
+        yield tmp_path / "servos"
 
 
-@pytest.fixture
-def host(port: Any) -> Iterator[Any]:
-    host = PacketHandler(2.0)
+@pytest.fixture(params=LIBRARIES)
+def host(request: pytest.FixtureRequest, link: Path) -> Iterator[Host]:
+    host = LIBRARIES[request.param](link)
+    host.open(BAUD)
     yield host
+    host.close()
+
+
+def value(host: Host, servo_id: int, register: Register) -> int:
+    data, _ = host.read(servo_id, register)
+    return signed(data, register[1])
+
+
+def change_mode(host: Host, servo_id: int, mode: int) -> None:
+    assert host.write(servo_id, TORQUE, 0) & ~ALERT == 0
+    assert host.write(servo_id, MODE, mode) == 0
+    assert host.write(servo_id, TORQUE, 1) == 0
+
+
+def move_all(host: Host, goals: Sequence[int], *, fast: bool) -> None:
+    host.write_all(GOAL_POSITION, goals)
+
+    def arrived() -> bool:
+        there = host.read_all(POSITION, fast=fast)
+        return all(abs(a - b) <= 5 for a, b in zip(there, goals, strict=True))
+
+    until(arrived)
+
+
+def test_a_whole_session(host: Host) -> None:
+    assert host.scan() == NUMBERS
+    assert not host.pings(9)
+    assert host.write(1, P_GAIN, 850) == 0
+    assert host.read(1, P_GAIN) == (850, 0)
+    drive_in_every_mode(host)
     for servo_id in IDS:
-        assert host.write1ByteTxRx(port, servo_id, TORQUE, 0)[0] == COMM_SUCCESS
+        change_mode(host, servo_id, POSITION_MODE)
+    move_all(host, [2200, 2300, 2400, 2500], fast=False)
+    move_all(host, [1900, 1800, 1700, 1600], fast=True)
+    overheat(host, 2)
+    bring_back(host, 2)
+    move_all(host, [2048] * 4, fast=True)
+    trip_the_watchdog(host, 4)
 
 
-def test_ping_and_broadcast_ping_find_every_servo(port: Any, host: Any) -> None:
-    assert host.ping(port, 3) == (1060, COMM_SUCCESS, 0)
-    found, result = host.broadcastPing(port)
-    assert result == COMM_SUCCESS
-    assert {servo_id: model for servo_id, (model, _) in found.items()} == {
-        servo_id: (1070, 1020, 1120, 1060)[servo_id % 4] for servo_id in IDS
-    }
+def drive_in_every_mode(host: Host) -> None:
+    assert host.write(1, TORQUE, 1) == 0
+    assert host.write(1, MODE, VELOCITY_MODE) == ACCESS_ERROR
+    change_mode(host, 1, VELOCITY_MODE)
+    assert host.write(1, GOAL_VELOCITY, -60) == 0
+    until(lambda: abs(value(host, 1, VELOCITY) + 60) <= 2)
+    change_mode(host, 1, CURRENT_MODE)
+    assert host.write(1, GOAL_CURRENT, 40) == 0
+    until(lambda: value(host, 1, VELOCITY) > 20 and value(host, 1, CURRENT) >= 0)
+    change_mode(host, 3, PWM_MODE)
+    assert host.write(3, GOAL_PWM, 300) == 0
+    until(lambda: value(host, 3, VELOCITY) > 40 and value(host, 3, PWM) == 300)
 
 
-def test_registers_of_all_sizes_are_written_and_read(port: Any, host: Any) -> None:
-    assert host.write1ByteTxRx(port, 1, LED, 1) == (COMM_SUCCESS, 0)
-    assert host.write2ByteTxRx(port, 1, P_GAIN, 850) == (COMM_SUCCESS, 0)
-    assert host.write4ByteTxRx(port, 1, GOAL, 1_000) == (COMM_SUCCESS, 0)
-    assert host.read1ByteTxRx(port, 1, LED) == (1, COMM_SUCCESS, 0)
-    assert host.read2ByteTxRx(port, 1, P_GAIN) == (850, COMM_SUCCESS, 0)
-    assert host.read4ByteTxRx(port, 1, GOAL) == (1_000, COMM_SUCCESS, 0)
+def trip_the_watchdog(host: Host, servo_id: int) -> None:
+    assert host.write(servo_id, GOAL_POSITION, 5_000) == LIMIT_ERROR
+    assert host.write(servo_id, TORQUE, 5) == RANGE_ERROR
+    assert host.write(servo_id, WATCHDOG, 5) == 0
+    time.sleep(0.3)  # any packet would feed it
+    assert host.read(servo_id, WATCHDOG) == (255, 0)
+    assert host.write(servo_id, GOAL_POSITION, 2_000) == RANGE_ERROR
+    assert host.write(servo_id, WATCHDOG, 0) == 0
+    assert host.write(servo_id, GOAL_POSITION, 2_000) == 0
 
 
-def test_refusals_carry_the_vendors_error_numbers(port: Any, host: Any) -> None:
-    assert host.write1ByteTxRx(port, 2, TORQUE, 5) == (COMM_SUCCESS, RANGE_ERROR)
-    assert host.write4ByteTxRx(port, 2, GOAL, 5_000) == (COMM_SUCCESS, LIMIT_ERROR)
-    assert host.write1ByteTxRx(port, 2, TORQUE, 1) == (COMM_SUCCESS, 0)
-    assert host.write1ByteTxRx(port, 2, MODE, 1) == (COMM_SUCCESS, ACCESS_ERROR)
+def overheat(host: Host, servo_id: int) -> None:
+    """Lower the limit below room temperature: the servo switches off and raises the alert."""
+    assert host.write(servo_id, TORQUE, 0) == 0
+    assert host.write(servo_id, TEMPERATURE_LIMIT, 10) == 0
+    assert host.write(servo_id, TORQUE, 1) & ~ALERT == 0
+    until(lambda: value(host, servo_id, TORQUE) == 0)
+    assert host.read(servo_id, ERRORS) == (OVERHEATING, ALERT)
+    assert host.write(servo_id, TORQUE, 1) == ALERT
+    assert host.read(servo_id, TORQUE) == (0, ALERT)
+    assert host.read(1, ERRORS) == (0, 0)
+
+
+def bring_back(host: Host, servo_id: int) -> None:
+    assert host.write(servo_id, TEMPERATURE_LIMIT, 80) == ALERT
+    host.reboot(servo_id)
+    time.sleep(0.5)
+    assert host.read(servo_id, ERRORS) == (0, 0)
+    assert host.write(servo_id, TORQUE, 1) == 0
+
+
+def test_a_servo_is_found_at_the_rate_it_was_set_to(host: Host) -> None:
+    assert host.write(4, BAUD_RATE, OTHER_BAUD_VALUE) == 0
+    assert not host.pings(4)
+    host.close()
+    host.open(OTHER_BAUD)
+    assert [servo_id for servo_id in (1, 4) if host.pings(servo_id)] == [4]
+    assert host.write(4, BAUD_RATE, 3) == 0
+    host.close()
+    host.open(BAUD)
+    assert all(host.pings(servo_id) for servo_id in IDS)
 
 
 @pytest.mark.parametrize("fast", [False, True])
-def test_a_group_moves_and_is_read_back(port: Any, host: Any, fast: bool) -> None:
-    goals = {servo_id: 2_000 + 10 * servo_id + (100 if fast else 0) for servo_id in IDS}
-    write = GroupSyncWrite(port, host, GOAL, 4)
-    read = GroupSyncRead(port, host, POSITION, 4)
-    for servo_id in IDS:
-        assert host.write1ByteTxRx(port, servo_id, TORQUE, 1) == (COMM_SUCCESS, 0)
-        assert write.addParam(servo_id, list(struct.pack("<i", goals[servo_id])))
-        assert read.addParam(servo_id)
-    assert write.txPacket() == COMM_SUCCESS
-
-    def all_arrived() -> bool:
-        assert (read.fastSyncRead() if fast else read.txRxPacket()) == COMM_SUCCESS
-        errors = [read.getData(servo_id, POSITION, 4) - goals[servo_id] for servo_id in IDS]
-        return all(abs(error) <= 3 for error in errors)
-
-    until(all_arrived)
+def test_the_sdk_reads_and_writes_in_bulk(link: Path, fast: bool) -> None:
+    host = SdkHost(link)
+    host.open(BAUD)
+    write = sdk.GroupBulkWrite(host.port, host.packets)
+    write.addParam(1, 65, 1, [1])
+    write.addParam(3, *GOAL_POSITION, list(struct.pack("<i", 1234)))
+    assert write.txPacket() == sdk.COMM_SUCCESS
+    read = sdk.GroupBulkRead(host.port, host.packets)
+    read.addParam(1, 65, 1)
+    read.addParam(3, *GOAL_POSITION)
+    assert (read.fastBulkRead() if fast else read.txRxPacket()) == sdk.COMM_SUCCESS
+    assert (read.getData(1, 65, 1), read.getData(3, *GOAL_POSITION)) == (1, 1234)
+    host.close()
 
 
-def test_bulk_read_takes_different_registers(port: Any, host: Any) -> None:
-    bulk = GroupBulkRead(port, host)
-    bulk.addParam(1, 0, 2)
-    bulk.addParam(2, 144, 2)
-    assert bulk.txRxPacket() == COMM_SUCCESS
-    assert (bulk.getData(1, 0, 2), bulk.getData(2, 144, 2)) == (1020, 120)
-
-
-def test_reboot_brings_a_servo_back_without_torque(port: Any, host: Any) -> None:
-    assert host.write1ByteTxRx(port, 4, TORQUE, 1) == (COMM_SUCCESS, 0)
-    assert host.reboot(port, 4) == (COMM_SUCCESS, 0)
-    until(lambda: host.read1ByteTxRx(port, 4, TORQUE) == (0, COMM_SUCCESS, 0))
-
-
-def test_an_armed_watchdog_trips_and_is_cleared_by_zero(port: Any, host: Any) -> None:
-    assert host.write1ByteTxRx(port, 5, 98, 50) == (COMM_SUCCESS, 0)
-    assert host.write1ByteTxRx(port, 5, TORQUE, 1) == (COMM_SUCCESS, 0)
-    time.sleep(1.2)  # any packet would feed it
-    assert host.read1ByteTxRx(port, 5, 98) == (255, COMM_SUCCESS, 0)
-    assert host.write4ByteTxRx(port, 5, GOAL, 2_000) == (COMM_SUCCESS, RANGE_ERROR)
-    assert host.write1ByteTxRx(port, 5, 98, 0) == (COMM_SUCCESS, 0)
-    assert host.write4ByteTxRx(port, 5, GOAL, 2_000) == (COMM_SUCCESS, 0)
+def test_rustypot_names_models_and_registers_on_a_mixed_bus(link: Path) -> None:
+    definition = rustypot.Xl430PyController.definition()
+    with rustypot.Bus(str(link), BAUD, 0.2, dict.fromkeys(IDS, definition)) as bus:
+        assert bus.scan(definition, list(IDS)) == NUMBERS
+        assert bus.set_torque(list(IDS), True) == {}
+        bus.sync_write_register(list(IDS), "goal_position", [2100, 2150, 2200, 2250])
+        until(
+            lambda: all(
+                abs(there - goal) <= 5
+                for there, goal in zip(
+                    bus.sync_read_register(list(IDS), "present_position"),
+                    (2100, 2150, 2200, 2250),
+                    strict=True,
+                )
+            )
+        )
 
 
 def test_the_server_ends_by_itself_and_sleeps_meanwhile(tmp_path: Path) -> None:
-    server = start_server(tmp_path / "servos", "--seconds", "1.5")
-    before = cpu_s(server.pid)
-    time.sleep(1.0)
-    assert cpu_s(server.pid) - before < 0.5
-    assert server.wait(timeout=10) == 0
-    assert not (tmp_path / "servos").is_symlink()
-
-
-def cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    with served(tmp_path / "servos", "--servos", "16", "--seconds", "1.5") as server:
+        before_s = sum(psutil.Process(server.pid).cpu_times()[:2])
+        time.sleep(1.0)
+        assert sum(psutil.Process(server.pid).cpu_times()[:2]) - before_s < 0.5
+        assert server.wait(timeout=10) == 0
 
 
 def test_a_paced_bus_is_never_faster_than_its_wire(tmp_path: Path) -> None:
-    baud, wire_bytes = 1_000_000, 30 + 16 * 15
-    server = start_server(tmp_path / "servos", "--baud", str(baud), "--return-delay-us", "100")
-    port = PortHandler(str(tmp_path / "servos"))
-    assert port.openPort()
-    assert port.setBaudRate(baud)
-    read = GroupSyncRead(port, PacketHandler(2.0), POSITION, 4)
-    for servo_id in IDS:
-        read.addParam(servo_id)
-    times_s = []
-    for _ in range(20):
-        start_s = time.monotonic()
-        assert read.txRxPacket() == COMM_SUCCESS
-        times_s.append(time.monotonic() - start_s)
-    assert min(times_s) > wire_bytes * 10 / baud + 16 * 100e-6
-    port.closePort()
-    server.send_signal(signal.SIGTERM)
-    assert server.wait(timeout=10) == 0
+    ids, path, times_s = range(1, 17), tmp_path / "servos", []
+    words = ("--servos", "16", "--baud", str(BAUD), "--return-delay-us", "100")
+    with served(path, *words):
+        host = SdkHost(path)
+        host.open(BAUD)
+        read = sdk.GroupSyncRead(host.port, host.packets, *POSITION)
+        for servo_id in ids:
+            read.addParam(servo_id)
+        for _ in range(20):
+            start_s = time.monotonic()
+            assert read.txRxPacket() == sdk.COMM_SUCCESS
+            times_s.append(time.monotonic() - start_s)
+        host.close()
+    assert min(times_s) > (30 + 16 * 15) * 10 / BAUD + 16 * 100e-6
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ def test_a_write_before_the_read_occupies_the_wire(baud: int = 1_000_000) -> Non
     assert bus.ask(FAST_READ)[1][-1] == 3_560 * US
 
 
-def test_whoever_waits_for_a_missing_servo_waits_until_the_deadline() -> None:
+def test_a_read_of_a_missing_servo_waits_until_the_deadline() -> None:
     bus = PacedBus(WireTiming(baud=1_000_000))
     bus.bank.silence(3)
     start_ns = bus.time_ns

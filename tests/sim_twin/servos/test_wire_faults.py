@@ -1,4 +1,4 @@
-"""Each fault of the bus does what it says to the servo it names, and ends when taken back."""
+"""Each bus fault affects only the servo it names, and ends when it is cleared."""
 
 import struct
 from collections.abc import Callable
@@ -85,7 +85,7 @@ def test_two_banks_with_the_same_fault_say_the_same_bytes(
     assert said[0] == said[1]
 
 
-def test_a_servo_that_is_cut_off_obeys_nobody_and_one_that_is_garbled_does(trio: Any) -> None:
+def test_a_silenced_servo_does_not_obey_and_a_garbled_one_does(trio: Any) -> None:
     trio.bank.garble(2)
     trio.bank.silence(3)
     for servo_id in ALL:
@@ -174,7 +174,7 @@ def test_behind_a_late_servo_the_rest_of_a_fast_read_is_late_too(trio: Any) -> N
     assert first + trio.bank.transmit() == whole
 
 
-def test_an_adapter_that_echoes_hears_itself_first(trio: Any) -> None:
+def test_an_echoing_adapter_returns_the_request_first(trio: Any) -> None:
     clean = hear(trio)
     trio.bank.set_echo()
     assert hear(trio) == SYNC_READ + clean

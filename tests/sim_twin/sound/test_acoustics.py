@@ -1,4 +1,4 @@
-"""Paths through a room: delay, distance, and how long the walls answer."""
+"""Paths through a room: delay, attenuation and reverberation."""
 
 import numpy as np
 import pytest

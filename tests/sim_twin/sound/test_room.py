@@ -41,7 +41,7 @@ def test_what_the_speaker_plays_reaches_the_microphone_late_and_rings_out(
     assert silence < 2 * NOISE_SIGMA
 
 
-def test_the_way_from_mouth_to_ear_takes_as_long_each_time_whatever_holds_the_bytes_up() -> None:
+def test_the_delay_from_speaker_to_microphone_is_constant_whatever_delays_the_bytes() -> None:
     ear = MicrophoneDevice(FORMAT)
     mouth = SpeakerDevice(FORMAT, ear.room)
     parser = PcmParser()
@@ -69,7 +69,7 @@ def test_the_way_from_mouth_to_ear_takes_as_long_each_time_whatever_holds_the_by
     assert len(set(began[2:])) == 1
 
 
-def test_sound_that_nobody_listens_to_is_forgotten() -> None:
+def test_sound_that_is_not_read_is_forgotten() -> None:
     room = Room(RATE_HZ)
     for second in range(0, 400, 10):
         room.lay(np.ones(RATE_HZ, np.float32), second * RATE_HZ)

@@ -11,7 +11,7 @@ def wire(make_wire, make_specs):
     return make_wire(make_specs(2, 6))
 
 
-def test_a_servo_tells_its_model_and_is_then_read_by_name(wire):
+def test_a_servo_reports_its_model_and_is_then_read_by_name(wire):
     link = wire.open()
     servo = link.servo(6)
     assert servo.model_name == "XM430-W350"
@@ -57,7 +57,7 @@ def test_a_servo_that_does_not_come_back_is_an_error(wire):
     ("keep", "servo_id", "baud_code"),
     [(Keep.ID_AND_BAUD, 6, 3), (Keep.ID, 6, 1), (Keep.NOTHING, 1, 1)],
 )
-def test_a_factory_reset_keeps_what_it_is_told_to(make_wire, keep, servo_id, baud_code):
+def test_a_factory_reset_keeps_what_its_option_says(make_wire, keep, servo_id, baud_code):
     eeprom = {"baud_rate": 3, "temperature_limit": 60}
     wire = make_wire([EmulatedServoSpec(id=6, model_name="XM430-W350", eeprom=eeprom)])
     link = wire.open()
@@ -76,7 +76,7 @@ def test_a_factory_reset_with_torque_on_is_refused(wire):
         link.factory_reset(servo, Keep.ID)
 
 
-def test_an_adapter_that_hears_itself_is_noticed_and_its_echo_left_out(wire):
+def test_an_echoing_adapter_is_detected_and_its_echo_removed(wire):
     heard = wire.receive
 
     def echoing(data):

@@ -29,7 +29,7 @@ def test_only_the_ids_that_were_named_are_asked(make_wire, make_specs):
 
 @pytest.mark.parametrize("one_after_another", [False, True])
 @pytest.mark.parametrize("ids", [None, range(1, 10)])
-def test_servos_that_share_an_id_are_told_and_the_others_are_still_found(
+def test_servos_that_share_an_id_are_reported_and_the_others_are_still_found(
     make_wire, make_specs, one_after_another, ids
 ):
     wire = make_wire(make_specs(1, 5), make_specs(5))
@@ -58,7 +58,7 @@ def silent_wire(make_wire):
     return wire
 
 
-def test_bytes_that_make_no_packet_are_told_as_noise(make_wire):
+def test_bytes_that_make_no_packet_are_reported_as_noise(make_wire):
     wire = silent_wire(make_wire)
     wire.receive = lambda data: setattr(wire, "extra", b"\x80\xf8\x00")
     report = scan_speed(wire.open())
@@ -80,7 +80,7 @@ def test_a_servo_of_protocol_1_is_recognised(make_wire, ids):
     assert scan_speed(wire.open()).protocol_1_ids == ids
 
 
-def test_progress_is_told_for_every_question(make_wire, make_specs):
-    told = []
-    scan_speed(make_wire(make_specs(4)).open(57_600), [3, 4], told.append)
-    assert told == ["57600 baud: id 3", "57600 baud: id 4"]
+def test_progress_is_reported_for_every_request(make_wire, make_specs):
+    reported = []
+    scan_speed(make_wire(make_specs(4)).open(57_600), [3, 4], reported.append)
+    assert reported == ["57600 baud: id 3", "57600 baud: id 4"]
