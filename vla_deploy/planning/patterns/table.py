@@ -83,6 +83,8 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"{_PUT} {_THING} down|put down {_THINGS}|drop {_THING}|"
      rf"(?:put|tidy|clear) {_THINGS} away|put away {_THINGS}", "put", {}),
     (rf"{_CARRY} {_THING} back", "put", {"where": "back"}),
+    # It may know no more than that there is something.
+    (r"(?:free|empty) (?:your|the)(?: (?P<arm>left|right))? (?:hand|gripper)", "put", {}),
     # --- give, bring
     (rf"(?:give|hand|pass|bring|fetch|get) me {_THINGS}|(?:give|hand) {_THINGS} to me|"
      rf"(?:bring|take|carry) {_THINGS} (?:over )?(?:to me|here)|(?:fetch|bring) {_THINGS}|"
