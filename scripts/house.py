@@ -61,7 +61,7 @@ def banned_words(modules: dict[str, ast.Module]) -> Iterator[str]:
         for node in ast.walk(module):
             if not isinstance(node, Definition):
                 continue
-            where, text = f"{path}:{node.lineno}", ast.get_docstring(node) or ""
+            where, text = f"{path}:{node.lineno}", ast.get_docstring(node, clean=False) or ""
             for pattern, instead in BANNED.items():
                 if found := re.search(pattern, text):
                     yield f'{where}: "{found[0]}" in the docstring of {node.name}: {instead}'

@@ -6,8 +6,7 @@ The patterns and commands are those of CiA 402-2 (IEC 61800-7-201), state contro
 from enum import IntEnum
 from typing import Final
 
-from drivers.wheel_drives.bus import DriveGoal as DriveGoal
-from drivers.wheel_drives.bus import PowerState as PowerState
+from drivers.wheel_drives.bus import DriveGoal, PowerState
 
 
 class ControlCommand(IntEnum):

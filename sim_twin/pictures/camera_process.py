@@ -69,7 +69,7 @@ class Studio:
         bench.plugs[robot.camera.device].add_socket(self._stream)
         self._faults = CameraFaults(bench)
         self._film = FilmServer(self._model, self._data, camera=robot.camera.site)
-        self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._film.answer)
+        self._film_requests = JsonLineServer(devices_dir / FILM_SOCKET, self._film.answer)
 
     def run(self, mirror: socket.socket) -> None:
         """Serve until the mirror's other end closes."""
@@ -81,10 +81,10 @@ class Studio:
 
     def _run_on_wall_clock(self, mirror: socket.socket) -> None:
         while True:
-            readable = [mirror.fileno(), *self._stream.filenos(), *self._film_server.filenos()]
+            readable = [mirror.fileno(), *self._stream.filenos(), *self._film_requests.filenos()]
             select.select(readable, self._stream.output_filenos(), [], _IDLE_S)
             self._stream.poll_once()
-            self._film_server.poll_once()
+            self._film_requests.poll_once()
             state = newest_state(mirror)
             if state is not None:
                 self._show(state)
@@ -122,16 +122,16 @@ class Studio:
     def _wait(self, line: TimeLine, until_ns: int) -> None:
         """Wait in the twin's time; what is asked about the film meanwhile takes none."""
         line.send(Op.WAIT, until_ns, DEFAULT_HOLD)
-        asked = [line.fileno(), *self._film_server.filenos()]
+        asked = [line.fileno(), *self._film_requests.filenos()]
         while line.fileno() not in select.select(asked, [], [])[0]:
-            self._film_server.poll_once()
-            asked = [line.fileno(), *self._film_server.filenos()]
+            self._film_requests.poll_once()
+            asked = [line.fileno(), *self._film_requests.filenos()]
         line.granted()
 
     def close(self) -> None:
         """Finish the film and take the sockets away."""
         self._film.close()
-        self._film_server.close()
+        self._film_requests.close()
         self._stream.close()
         self._camera.close()
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
-from drivers.canopen.cia402 import FAULT_STATES, PowerState
+from drivers.canopen.cia402 import FAULT_STATES
 from drivers.canopen.objects import (
     ABORT_CONNECTION_OPTION,
     CONTROLWORD,
@@ -29,6 +29,7 @@ from drivers.canopen.objects import (
     AbortConnection,
     DriveMode,
 )
+from drivers.wheel_drives.bus import PowerState
 from sim_twin.can.cia402.object_dictionary import VALUE_RANGE, ObjectDictionary, SdoAbort
 from sim_twin.can.cia402.power_state_machine import (
     POWERED,

@@ -5,7 +5,6 @@ from typing import Final
 
 import can
 
-from drivers.canopen.cia402 import PowerState
 from drivers.canopen.objects import (
     CONTROLWORD,
     EDS_PATH,
@@ -26,6 +25,7 @@ from drivers.canopen.objects import (
     NmtCommand,
     NmtState,
 )
+from drivers.wheel_drives.bus import PowerState
 from sim_twin.can.bus.error_frames import is_restart
 from sim_twin.can.cia402.axis import Cia402Axis
 from sim_twin.can.cia402.heartbeat import HeartbeatConsumer, HeartbeatProducer

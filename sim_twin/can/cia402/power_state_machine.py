@@ -3,7 +3,7 @@
 from enum import Enum
 from typing import Final
 
-from drivers.canopen.cia402 import PowerState
+from drivers.wheel_drives.bus import PowerState
 
 
 class ControlwordCommand(Enum):

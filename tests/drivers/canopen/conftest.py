@@ -56,7 +56,7 @@ class Bench(FreeWheelWorld[WheelDrive]):
             outsider.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
 
     def put(self, can_id: int, data: bytes) -> None:
-        """Let a frame wait in the host's queue."""
+        """Queue a frame for the host to receive."""
         self.memory_bus.port(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.cia402 import PowerState
 from drivers.canopen.objects import RPDO1, AbortConnection, NmtState
+from drivers.wheel_drives.bus import PowerState
 from sim_twin.can import CanWire, MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import STEP_NS, FreeWheel
 

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from drivers.canopen.cia402 import PowerState
+from drivers.wheel_drives.bus import PowerState
 from sim_twin.can import CanWire, MemoryBus, WheelDrive
 
 INVALID = 1 << 31

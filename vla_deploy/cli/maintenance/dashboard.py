@@ -71,6 +71,19 @@ def register_acts(acts: Any) -> None:
         json_help="print JSON",
     )
     users.add_argument("--remove", metavar="USER", help="whose account to remove")
+    _register_token_acts(acts)
+    audit = _add(
+        acts,
+        "audit",
+        "show who did what",
+        show_audit,
+        "audit --count 50",
+        json_help="print JSON lines",
+    )
+    audit.add_argument("--count", type=int, default=20, metavar="N", help="the last N (20)")
+
+
+def _register_token_acts(acts: Any) -> None:
     token = _add(acts, "token", "make, list and revoke tokens", None, "token list")
     token_acts = token.add_subparsers(dest="token_act", required=True, metavar="ACT")
     add = _add(
@@ -99,15 +112,6 @@ def register_acts(acts: Any) -> None:
         "token revoke prometheus",
     )
     revoke.add_argument("name", metavar="NAME")
-    audit = _add(
-        acts,
-        "audit",
-        "show who did what",
-        show_audit,
-        "audit --count 50",
-        json_help="print JSON lines",
-    )
-    audit.add_argument("--count", type=int, default=20, metavar="N", help="the last N (20)")
 
 
 def _add(

@@ -199,7 +199,7 @@ class TurnConnection:
 
 @router.websocket("/microphone")
 async def microphone(websocket: WebSocket, who: Operator) -> None:
-    """Let a user speak to the robot."""
+    """Take what a user says into the browser's microphone."""
     microphones: PageMicrophones = websocket.app.state.microphones
     await websocket.accept()
     try:
