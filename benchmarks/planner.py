@@ -2,7 +2,7 @@
 
 Each part is a module of its own and may be run alone. `commands`, `off_domain` and `attacks` play
 the corpora of `benchmarks/corpora` with the robot's own planner node and judge its plans in a world
-of symbols that shares no code with the robot; docs/planner-bench.md says how. `live` is measured on
+of symbols that shares no code with the robot; docs/validation.md says how. `live` is measured on
 the real processes and the twin.
 """
 

@@ -32,8 +32,8 @@ def shown(*pages: str) -> list[tuple[str, dict[str, Any]]]:
 
 
 def test_dashboard_toml() -> None:
-    files = shown("dashboard", "dashboard-access")
-    assert len(files) == 3
+    files = shown("dashboard")
+    assert len(files) == 2
     assert [fault for _, document in files for fault in faults_of(document)] == []
 
 
@@ -43,14 +43,14 @@ def test_recording_toml() -> None:
 
 
 def test_servers_toml(tmp_path: Path) -> None:
-    ((text, _),) = shown("model-servers")
+    ((text, _),) = [one for one in shown("language-models") if "servers" in one[1]]
     (tmp_path / "servers.toml").write_text(text)
     assert set(read_servers(tmp_path / "servers.toml")) == {"bench", "cloud"}
 
 
 @pytest.mark.parametrize("page", ["profiles", "planning", "models", "language-models", "budgets"])
 def test_profiles(page: str, tmp_path: Path) -> None:
-    files = [text for text, document in shown(page) if "role" not in document]
+    files = [text for text, document in shown(page) if not document.keys() & {"role", "servers"}]
     assert files
     for text in files:
         inherits = "" if "inherits" in text else 'inherits = "desktop"\n'
@@ -58,15 +58,13 @@ def test_profiles(page: str, tmp_path: Path) -> None:
         assert load_profile(tmp_path / "mine.toml").name == "mine"
 
 
-@pytest.mark.parametrize(("page", "name"), [("models", "mugs"), ("speech", "mine")])
-def test_manifests(page: str, name: str) -> None:
-    ((text, _),) = [one for one in shown(page) if one[1].get("name") == name]
+def test_manifest() -> None:
+    ((text, _),) = [one for one in shown("models") if one[1].get("name") == "mugs"]
     whole = tomllib.loads(text.replace('sha256 = "..."', f'sha256 = "{"0" * 64}"'))
-    faults = [one for one in manifest_faults(whole, name) if one.key != "parts"]  # shows one file
-    assert faults == []
+    assert list(manifest_faults(whole, "mugs")) == []
 
 
-@pytest.mark.parametrize("page", ["sensors", "voice", "zones", "can", "ros"])
+@pytest.mark.parametrize("page", ["sensors", "speech", "safety", "can", "ros"])
 def test_tables_of_robot_toml(page: str) -> None:
     files = shown(page)
     assert files

@@ -203,7 +203,7 @@ def chosen_server(
     lines = "\n".join(f"  {line}" for line in server_lines(given, provider, model, declared))
     fault = (
         f"{name}: expected a server that {file} declares with model {model!r}, got none; "
-        f"add, and change as needed (docs/model-servers.md):\n{lines}"
+        f"add, and change as needed (docs/language-models.md):\n{lines}"
     )
     return ServerChoice(fault=fault, notes=notes)
 

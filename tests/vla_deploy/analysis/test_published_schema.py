@@ -18,6 +18,6 @@ def test_an_analysis_has_no_field_that_could_be_an_action():
 
 
 def test_the_example_in_the_documentation_is_an_analysis():
-    text = (PUBLISHED.parent / "scene-analysis.md").read_text(encoding="utf-8")
+    text = (PUBLISHED.parent / "world-model.md").read_text(encoding="utf-8")
     example = text.split("```json\n")[1].split("```")[0]
     assert SceneAnalysis.model_validate_json(example).task is not None
