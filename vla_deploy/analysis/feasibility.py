@@ -8,7 +8,7 @@ from vla_deploy.analysis.document import Feasible, Task
 from vla_deploy.analysis.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
 from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.analysis.steps import judge_step
-from vla_deploy.planning.plan import Action
+from vla_deploy.plans.plan import Action
 
 _DIGITS: Final = 3
 

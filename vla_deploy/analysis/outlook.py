@@ -11,7 +11,7 @@ import numpy as np
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.question import SceneQuestion
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Query, Thing, access_to, find
 from vla_deploy.world.memory import still_there, where_to_look
 

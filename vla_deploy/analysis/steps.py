@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from vla_deploy.analysis.outlook import CannotBe, Outlook
 from vla_deploy.manipulation.grasps import grasps_from_above
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.knowledge import match_place
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.knowledge import match_place
 from vla_deploy.world import Query, Thing, UnknownWord, access_to, parse_query
 from vla_deploy.world.access import Bar, GraspAccess, Obstacle
 from vla_deploy.world.memory import still_there

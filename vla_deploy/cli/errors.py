@@ -30,7 +30,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.model_servers.errors": "ModelServerError",
     "vla_deploy.navigation.errors": "NavigationError",
     "vla_deploy.perception.camera_tools.errors": "CalibrationError",
-    "vla_deploy.planning.errors": "PlanningError",
+    "vla_deploy.plans.errors": "PlanError",
     "platforms.errors": "ProfileError",
     "vla_deploy.robots.errors": "RobotFileError",
     "vla_deploy.speech.errors": "SpeechError",

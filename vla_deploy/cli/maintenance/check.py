@@ -13,9 +13,9 @@ from vla_deploy.cli.operation.say import read_json
 from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot
 
 SCHEMAS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {

@@ -17,10 +17,11 @@ from vla_deploy.planning.command_parser.certainty import Oddities
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
 from vla_deploy.planning.command_parser.wording import plain_words
-from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
+from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Forbidden, PlanRequest, Prohibition, StandingOrder
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {})
@@ -178,7 +179,7 @@ def test_a_plan_is_no_surer_than_its_words_were_heard(parser: CommandParser) -> 
     ],
 )
 def test_other_talk_gives_no_plan(parser: CommandParser, text: str) -> None:
-    with pytest.raises(PlanningError):
+    with pytest.raises(PlanError):
         parser.propose(request(text), soon())
 
 

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
-from vla_deploy.planning.knowledge import World, match_place
-from vla_deploy.planning.symbolic.state import Point, Subject, SymbolicState, subject_or_none
+from vla_deploy.plans.knowledge import World, match_place
+from vla_deploy.plans.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.footprint import polygon_depth_m

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.knowledge import World, object_or_none, parse_object
+from vla_deploy.plans.knowledge import World, object_or_none, parse_object
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.thing import Rest
 

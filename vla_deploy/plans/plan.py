@@ -60,6 +60,14 @@ class Plan(BaseModel):
     keeps_out: tuple[str, ...] = ()
 
 
+class FailureCause(StrEnum):
+    """Say by what an action failed: the skill itself, or the world before or after it."""
+
+    PRECONDITION = "precondition"
+    SKILL = "skill"
+    EFFECT = "effect"
+
+
 def plan_schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, as published in `docs/plan.schema.json`."""
     return Plan.model_json_schema()

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from vla_deploy.planning.catalogue import ARMS, SKILLS
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import Action, execution_order
-from vla_deploy.planning.symbolic.conditions import Setting
-from vla_deploy.planning.symbolic.state import Pose, SymbolicState, state_of
-from vla_deploy.planning.symbolic.table import LOGIC
+from vla_deploy.plans.catalogue import ARMS, SKILLS
+from vla_deploy.plans.knowledge import World
+from vla_deploy.plans.plan import Action, execution_order
+from vla_deploy.plans.symbolic.conditions import Setting
+from vla_deploy.plans.symbolic.state import Pose, SymbolicState, state_of
+from vla_deploy.plans.symbolic.table import LOGIC
 from vla_deploy.world import Snapshot
 
 

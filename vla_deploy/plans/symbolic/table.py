@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.symbolic import conditions
-from vla_deploy.planning.symbolic.conditions import (
+from vla_deploy.plans.symbolic import conditions
+from vla_deploy.plans.symbolic.conditions import (
     SMALL_MOVE_M,
     Condition,
     Setting,
     rest_of_subject,
 )
-from vla_deploy.planning.symbolic.state import HeldSymbol, SymbolicState
+from vla_deploy.plans.symbolic.state import HeldSymbol, SymbolicState
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import ON
 from vla_deploy.world.thing import Rest

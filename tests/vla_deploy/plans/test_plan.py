@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.planning.plan import (
+from vla_deploy.plans.plan import (
     Action,
     ActionPriority,
     Plan,

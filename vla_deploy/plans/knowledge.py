@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from vla_deploy.planning.errors import DependsOnView, UnknownObject
+from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds

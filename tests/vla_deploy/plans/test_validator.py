@@ -1,9 +1,9 @@
 import pytest
 
-from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.validator import check_plan
+from vla_deploy.plans.errors import PlanInvalid
+from vla_deploy.plans.knowledge import World
+from vla_deploy.plans.plan import Action, Plan
+from vla_deploy.plans.validator import check_plan
 
 WORLD = World(
     places={"kitchen": "kitchen", "galley": "kitchen"}, poses=frozenset({"tuck"}), holding={}

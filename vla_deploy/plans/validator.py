@@ -3,15 +3,15 @@
 import math
 from typing import Any
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
-from vla_deploy.planning.errors import PlanInvalid, UnknownObject
-from vla_deploy.planning.knowledge import World, match_place, parse_object
-from vla_deploy.planning.plan import Action, Plan, dependency_faults
-from vla_deploy.planning.symbolic.simulation import (
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
+from vla_deploy.plans.errors import PlanInvalid, UnknownObject
+from vla_deploy.plans.knowledge import World, match_place, parse_object
+from vla_deploy.plans.plan import Action, Plan, dependency_faults
+from vla_deploy.plans.symbolic.simulation import (
     bounds_faults,
     symbolic_faults,
 )
-from vla_deploy.planning.symbolic.state import Pose
+from vla_deploy.plans.symbolic.state import Pose
 from vla_deploy.world import Snapshot
 
 

@@ -5,16 +5,16 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.knowledge import World, world_of
-from vla_deploy.planning.plan import Action, ActionPriority
-from vla_deploy.planning.symbolic.simulation import (
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.knowledge import World, world_of
+from vla_deploy.plans.plan import Action, ActionPriority
+from vla_deploy.plans.symbolic.simulation import (
     bounds_faults,
     end_state,
     in_turn,
     symbolic_faults,
 )
-from vla_deploy.planning.symbolic.table import LOGIC
+from vla_deploy.plans.symbolic.table import LOGIC
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest
