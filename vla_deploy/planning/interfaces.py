@@ -7,12 +7,12 @@ from typing import Any, Protocol
 
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.calls.picture import Image
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.errors import Ambiguous, NotAble
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.plans.knowledge import World
 from vla_deploy.plans.plan import Plan
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.world import Snapshot
 
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Ambiguous, Declined, NotUnderstood
@@ -32,6 +31,7 @@ from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.plans.errors import PlanError, PlanInvalid
 from vla_deploy.plans.plan import Plan
 from vla_deploy.plans.validator import check_plan
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
 WITHIN_S: Final = 20.0

@@ -14,7 +14,6 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
@@ -22,6 +21,7 @@ from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, PlanRequest, Proposal
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
 from vla_deploy.plans.errors import PlanError
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
 SURE: Final = 0.75

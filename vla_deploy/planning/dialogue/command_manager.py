@@ -10,7 +10,6 @@ from threading import Event
 from typing import Any, Final
 
 from drivers.clock import Clock
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
@@ -35,6 +34,7 @@ from vla_deploy.planning.understanding.conversation import mentions_of
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.plans.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.executors import InlineExecutor
 
 MOST_WAITING: Final = 8

@@ -4,7 +4,6 @@ from string import digits
 from typing import Final
 
 from vla_deploy.client.action_words import skill_words
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood
@@ -18,6 +17,7 @@ from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.plans.errors import UnknownPlace
 from vla_deploy.plans.knowledge import World, match_place
 from vla_deploy.plans.plan import Plan, chained
+from vla_deploy.runtime.deadline import Deadline
 
 NAME: Final = "patterns"
 _THERE: Final = frozenset({"here", "there", "over there", "back there"})

@@ -12,7 +12,6 @@ from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, ModelStore, StoredModel
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import Oddities
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
@@ -23,6 +22,7 @@ from vla_deploy.planning.planner import checked
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.deadline import Deadline
 
 WORLD = world_of(load_robot("butler"), {})
 CLOCK = MonotonicClock()

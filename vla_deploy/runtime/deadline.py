@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from threading import Event
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.model_servers.errors import TimedOut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,16 +52,3 @@ class Deadline:
         if self.is_recalled:
             return 0.0
         return max(0.0, (self.end_ns - self.clock.now_ns()) / NS_PER_S)
-
-    def bound_s(self, wanted_s: float | None = None) -> float:
-        """Return the time that one wait may take: what is wanted, at most what is left.
-
-        Raises:
-            TimedOut: nothing is left, or nobody waits any more.
-        """
-        left_s = self.left_s
-        if self.is_recalled:
-            raise TimedOut("nobody waits for the answer any more")
-        if left_s <= 0.0:
-            raise TimedOut(f"no whole answer within {self.given_s:g} s")
-        return left_s if wanted_s is None else min(wanted_s, left_s)
