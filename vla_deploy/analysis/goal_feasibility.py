@@ -1,10 +1,10 @@
 """Judge whether a goal in words can be reached: plan it with patterns, and judge the steps."""
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import Feasible, Task
-from vla_deploy.analysis.feasibility import judge_actions, outlook_of, task_of
-from vla_deploy.analysis.outlook import Outlook
-from vla_deploy.analysis.question import SceneQuestion
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.actions import judge_actions, outlook_of, task_of
+from vla_deploy.feasibility.outlook import Outlook
+from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.verdict import Feasible, Task
 from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.patterns.backend import plan_command
 from vla_deploy.plans.errors import PlanError

@@ -70,8 +70,8 @@ class Analyst:
 
 
 def _geometric_analyser(robot: str) -> Analyser:
-    from vla_deploy.analysis.abilities import Abilities  # takes pinocchio with it
     from vla_deploy.analysis.geometric import GeometricAnalyser
+    from vla_deploy.feasibility.abilities import Abilities  # takes pinocchio with it
 
     return GeometricAnalyser(Abilities.of(load_robot(robot)))
 

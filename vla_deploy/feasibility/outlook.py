@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.question import SceneQuestion
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.question import SceneQuestion
 from vla_deploy.navigation.errors import NoPath
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Query, Thing, access_to, find

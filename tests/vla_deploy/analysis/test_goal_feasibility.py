@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.analysis.document import Feasible
+from vla_deploy.feasibility.verdict import Feasible
 
 
 @pytest.fixture
@@ -154,3 +154,10 @@ def test_what_is_held_is_put_down_without_being_taken_again(judge, thing):
 @pytest.mark.parametrize("goal", ["wait 5 s", "say hello", "turn left", "open the gripper"])
 def test_what_the_world_cannot_refuse_is_feasible(judge, goal):
     assert judge(goal).feasible is Feasible.YES
+
+
+def test_what_stands_too_high_is_no_destination(judge, cup, thing):
+    shelf = thing("box_1", "brown", 4.2, 0.5, bottom_m=1.2)
+    task = judge("put the red cup in the box", cup, shelf)
+    assert task.feasible is Feasible.NO
+    assert "hand does not reach above the brown box" in task.reason

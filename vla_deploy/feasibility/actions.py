@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Final
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import Feasible, Task
-from vla_deploy.analysis.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
-from vla_deploy.analysis.question import SceneQuestion
-from vla_deploy.analysis.steps import judge_step
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
+from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.steps import judge_step
+from vla_deploy.feasibility.verdict import Feasible, Task
 from vla_deploy.plans.plan import Action
 
 _DIGITS: Final = 3

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from vla_deploy.analysis.outlook import CannotBe, Outlook
+from vla_deploy.feasibility.outlook import CannotBe, Outlook
 from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.plans.knowledge import match_place
