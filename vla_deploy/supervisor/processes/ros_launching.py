@@ -1,14 +1,14 @@
-"""Decide how the gateway's process is started: by which interpreter, in which environment."""
+"""Decide how the ROS gateway's process is started: by which interpreter, in which environment."""
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.gateways.ros.environment import find_environment, link_packages
-from vla_deploy.gateways.ros.errors import RosNotFound
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
+from vla_deploy.supervisor.errors import RosNotFound
+from vla_deploy.supervisor.processes.ros_environment import find_environment, link_packages
 
 DOMAIN: Final = "ROS_DOMAIN_ID"
 DISCOVERY: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.gateways.ros.environment import (
+from vla_deploy.supervisor.errors import RosNotFound
+from vla_deploy.supervisor.processes.ros_environment import (
     PACKAGES,
     SYSTEM_PYTHON,
     VARIABLE,
@@ -14,7 +15,6 @@ from vla_deploy.gateways.ros.environment import (
     find_environment,
     link_packages,
 )
-from vla_deploy.gateways.ros.errors import RosNotFound
 
 INHERITED = {"PATH": os.environ["PATH"], "HOME": "/home/robot", "PYTHONPATH": "/ours"}
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.gateways.ros.errors import RosNotFound
+from vla_deploy.supervisor.errors import RosNotFound
 
 VARIABLE: Final = "VLA_DEPLOY_ROS_PYTHON"
 WORKSPACE_VARIABLE: Final = "VLA_DEPLOY_ROS_WORKSPACE"

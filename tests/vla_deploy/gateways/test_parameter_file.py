@@ -9,6 +9,12 @@ import yaml
 
 from platforms import load_profile
 from vla_deploy.cli.main import main
+from vla_deploy.gateways.parameter_file import (
+    ServerChoice,
+    chosen_server,
+    server_lines,
+    with_parameters,
+)
 from vla_deploy.gateways.ros.errors import ParametersUnusable
 from vla_deploy.gateways.ros.parameters import (
     API_KEY_VARIABLE,
@@ -20,12 +26,6 @@ from vla_deploy.model_servers.servers_file import read_servers
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.supervisor.errors import AlreadyRunning
-from vla_deploy.supervisor.parameter_file import (
-    ServerChoice,
-    chosen_server,
-    server_lines,
-    with_parameters,
-)
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import Runtime
 
