@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
+from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.faults.scenario import NO_CAUSE, Expectation
-from sim_twin.faults.witness import FaultWitness
 
 
 def failures(expect: Expectation, seen: FaultWitness, before: Mapping[str, int]) -> Iterator[str]:

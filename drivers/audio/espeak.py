@@ -5,9 +5,8 @@ import subprocess
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.runtime.one_line import one_line
-from vla_deploy.speech.errors import VoiceError
-from vla_deploy.speech.voice.clip import Clip, read_wav_stream
+from drivers.audio.clip import Clip, read_wav_stream
+from drivers.errors import VoiceError
 
 TIMEOUT_S: Final = 10.0
 ESPEAK: Final = "espeak-ng"
@@ -48,6 +47,6 @@ class EspeakEngine:
         except OSError as error:
             raise VoiceError(f"{self.program}: {error.strerror}; {_REMEDY}") from error
         if ran.returncode:
-            told = one_line(ran.stderr.decode(errors="replace")) or "it says nothing"
+            told = " ".join(ran.stderr.decode(errors="replace").split()) or "it says nothing"
             raise VoiceError(f"{self.program} ended with {ran.returncode}: {told}")
         return read_wav_stream(ran.stdout)

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from sim_twin.campaigns.faulting.verdict import failures
+from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.faults.scenario import Meanwhile, Scenario
-from sim_twin.faults.verdict import failures
-from sim_twin.faults.witness import FaultWitness
 from sim_twin.harness.stack import LockstepControl, LockstepStack
 
 _SAMPLE_S: Final = 0.004

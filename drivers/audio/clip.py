@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
-from vla_deploy.speech.errors import VoiceError
+from drivers.errors import VoiceError
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""

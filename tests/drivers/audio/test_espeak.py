@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
-from vla_deploy.speech.errors import VoiceError
-from vla_deploy.speech.voice.clip import Clip, read_wav_stream
-from vla_deploy.speech.voice.tts import EspeakEngine
+from drivers.audio.clip import Clip, read_wav_stream
+from drivers.audio.espeak import EspeakEngine
+from drivers.errors import VoiceError
 
 
 def wav(rows: bytes, *, channels: int = 1, bits: int = 16, told_bytes: int = 0x7FFFF000) -> bytes:
