@@ -6,8 +6,8 @@ from typing import Any, Final, Protocol
 
 from drivers.clock import Clock
 from vla_deploy.analysis.document import SceneAnalysis
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.feasibility.question import FloorPlanBystander, Image, SceneQuestion
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.world import Viewpoint, read_snapshot
 from vla_deploy.world.resting import rest_of
 

@@ -32,7 +32,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.perception.camera_tools.errors": "CalibrationError",
     "vla_deploy.plans.errors": "PlanError",
     "platforms.errors": "ProfileError",
-    "vla_deploy.robots.errors": "RobotFileError",
+    "vla_deploy.robots.errors": "RobotError",
     "vla_deploy.speech.errors": "SpeechError",
     "vla_deploy.supervisor.errors": "SupervisorError",
     "vla_deploy.telemetry.errors": "TelemetryError",

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.maps.grid_map import load_map
+from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.maps.grid_map import load_map
 
 YAML = """# a flat
 image: flat.pgm

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.maps.map_file import MapFile, MapMode, read_map_file
+from vla_deploy.robots.maps.map_file import MapFile, MapMode, read_map_file
 
 # Black crosses the plane of the lidar; dark grey stands above or below it, like a table top.
 LIDAR_THRESH = 0.95

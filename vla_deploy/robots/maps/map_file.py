@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.errors import MapInvalid
+from vla_deploy.robots.errors import MapInvalid
 
 Shades = NDArray[np.uint8]
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.maps.grid_map import grid_of
-from vla_deploy.navigation.maps.map_file import (
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.maps.grid_map import grid_of
+from vla_deploy.robots.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
     OCCUPIED_SHADE,
@@ -21,7 +22,6 @@ from vla_deploy.navigation.maps.map_file import (
     read_map_file,
     write_map_file,
 )
-from vla_deploy.robots import load_robot
 
 # As map_saver of ROS 1 and of Nav2, and a YAML library, write them.
 ROS_1 = """image: map.pgm
@@ -213,8 +213,8 @@ import subprocess
 import sys
 from pathlib import Path
 sys.modules["cv2"] = None
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.maps.map_file import read_map_file
+from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.maps.map_file import read_map_file
 try:
     print(read_map_file(Path(sys.argv[1])).shades.tolist())
 except MapInvalid as error:
