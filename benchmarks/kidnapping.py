@@ -6,12 +6,12 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.pushed_robot import PushedReading, PushedRobot
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.maps.grid_map import GridMap
 
 CLEARANCE_M: Final = 0.27
 WRONG_M: Final = 0.3

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from vla_deploy.navigation.maps.grid_map import LIDAR_THRESH
-from vla_deploy.navigation.maps.map_file import UNKNOWN_SHADE, MapFile, Shades
+from vla_deploy.robots.maps.grid_map import LIDAR_THRESH
+from vla_deploy.robots.maps.map_file import UNKNOWN_SHADE, MapFile, Shades
 
 
 def compare_maps(drawn: MapFile, truth: MapFile) -> dict[str, Any]:

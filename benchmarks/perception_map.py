@@ -28,17 +28,17 @@ from benchmarks.kidnapping import CLEARANCE_M, kidnap
 from benchmarks.map_truth import compare_maps
 from benchmarks.pushed_robot import PushedRobot, tour
 from drivers.lidar.base import Scan
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.follower import DriveLimits
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.navigation.maps.grid_map import GridMap, load_map
-from vla_deploy.navigation.maps.map_file import read_map_file
 from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.maps.grid_map import GridMap, load_map
+from vla_deploy.robots.maps.map_file import read_map_file
 
 SLIP_RATIO: Final = 0.02
 LIDAR_SIGMA_M: Final = 0.02

@@ -30,7 +30,7 @@ from benchmarks.planner_corpus import (
 )
 from benchmarks.planner_play import CaseVerdict, TurnJudgement, play_afresh
 from benchmarks.planner_session import PROFILE, PlannerAnswer, opened
-from vla_deploy.planning.plan import Plan
+from vla_deploy.plans.plan import Plan
 
 
 def measure(

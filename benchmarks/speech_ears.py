@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.percentiles import spread_s
+from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
 from sim_twin.sound.acoustics import Acoustics
@@ -25,7 +26,6 @@ from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing
 from vla_deploy.speech.sound import RATE_HZ, Sound, duration_ns
-from vla_deploy.speech.voice.tts import EspeakEngine
 from vla_deploy.supervisor.runs.runtime import default_base
 
 VOICES: Final = ("en-gb", "en-us", "en-gb-scotland", "en-gb-x-rp", "en-029")

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.command import parser, show
-from sim_twin.sound.speech_room import SpeechRoom
+from drivers.audio.espeak import EspeakEngine
+from sim_twin.harness.speech_room import SpeechRoom
 from sim_twin.sound.talker import Talker
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 SENTENCES: Final = (
     "I have put the red cup into the box",

@@ -8,7 +8,8 @@ DriverError
 ├── ProtocolError    bytes arrived that break the protocol
 ├── DeviceFault      the device reports a fault of its own
 ├── WrongDevice      the device is not what the robot file declares
-└── UnknownModel     no driver here knows the model: correct the name
+├── UnknownModel     no driver here knows the model: correct the name
+└── VoiceError       a text became no sound: the program's own words are in the message
 """
 
 
@@ -46,3 +47,7 @@ class WrongDevice(DriverError):
 
 class UnknownModel(DriverError):
     """Say that no driver knows a model."""
+
+
+class VoiceError(DriverError):
+    """Say why a text did not become sound."""

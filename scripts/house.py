@@ -87,10 +87,18 @@ def crowded_folders(modules: dict[str, ast.Module]) -> Iterator[str]:
             yield f"{folder} has {counts[folder]} modules: it needs no exception in {__file__}"
 
 
+def folders_without_init(modules: dict[str, ast.Module]) -> Iterator[str]:
+    """Yield each folder of modules that is no package: the import linter does not see it."""
+    for folder in sorted({path.rpartition("/")[0] for path in modules}):
+        if f"{folder}/__init__.py" not in modules:
+            yield f"{folder} has no __init__.py: add one, or lint-imports overlooks its modules"
+
+
 def main() -> int:
     """Print what is wrong, and return whether anything is."""
     modules = sources()
-    wrong = [*doubled_names(modules), *banned_words(modules), *crowded_folders(modules)]
+    rules = (doubled_names, banned_words, crowded_folders, folders_without_init)
+    wrong = [line for rule in rules for line in rule(modules)]
     for line in wrong:
         print(line)
     return 1 if wrong else 0

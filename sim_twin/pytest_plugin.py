@@ -24,9 +24,9 @@ import pytest
 if TYPE_CHECKING:
     from sim_twin.contracts.hardware import Hardware
     from sim_twin.faults import FaultInjector
-    from sim_twin.faults.remote import RemoteFaults
     from sim_twin.harness.lockstep import Lockstep
     from sim_twin.harness.process_stack import ProcessStack
+    from sim_twin.harness.remote_faults import RemoteFaults
     from sim_twin.harness.stack import LockstepStack
 
 MARKERS = (

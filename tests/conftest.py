@@ -17,9 +17,13 @@ from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
-from vla_deploy.gateways.ros.environment import RosEnvironment, find_environment, link_packages
-from vla_deploy.gateways.ros.errors import RosNotFound
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
+from vla_deploy.supervisor.errors import RosNotFound
+from vla_deploy.supervisor.processes.ros_environment import (
+    RosEnvironment,
+    find_environment,
+    link_packages,
+)
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(

@@ -16,7 +16,7 @@ import psutil
 from drivers.audio.base import Samples
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from drivers.twin_clock import clock_of
-from sim_twin.faults.remote import RemoteFaults
+from sim_twin.harness.remote_faults import RemoteFaults
 from sim_twin.physics.truth import fastest_joint
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk

@@ -7,10 +7,10 @@ from typing import Any
 from drivers.audio.base import Samples
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
+from sim_twin.harness.audio_streams import streamed_microphone, streamed_speaker
 from sim_twin.harness.lockstep import Lockstep
 from sim_twin.harness.senses_node import SensesNode
 from sim_twin.sound.hearing import Spoken, let_arrive
-from sim_twin.sound.streams import streamed_microphone, streamed_speaker
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace

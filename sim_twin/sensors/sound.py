@@ -5,11 +5,11 @@ from typing import Final
 import numpy as np
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples, check_samples
+from drivers.audio.clip import Clip, Wave
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
 from drivers.clock import NS_PER_S
 from drivers.device_clock import DeviceClock
 from sim_twin.sound.room import Room
-from vla_deploy.speech.voice.clip import Clip, Wave
 
 LATENCY_NS: Final = 30 * NS_PER_S // 1000
 """Of the speaker; longer than bytes are usually held up."""

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.speech.voice.clip import Wave
+from drivers.audio.clip import Wave
 
 SPEED_OF_SOUND_M_S: Final = 343.0
 NEAREST_M: Final = 0.1

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, Samples
+from drivers.audio.clip import Wave
 from drivers.clock import NS_PER_S
 from sim_twin.sound.acoustics import Acoustics, path, through
-from vla_deploy.speech.voice.clip import Wave
 
 NOISE_SIGMA: Final = 12.0
 """Of the quiet room and the microphone, in steps of 16 bits."""

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from drivers.audio.base import FULL_SCALE
+from drivers.audio.clip import Clip
 from drivers.audio.wav import WavOutput, read_wav
 from drivers.errors import DriverError
 from sim_twin.errors import RefereeRefusal
 from sim_twin.sound.hearing import ear_position_m, let_arrive
 from sim_twin.sound.talker import Arrival
 from sim_twin.twin import Twin
-from vla_deploy.speech.voice.clip import Clip
 
 Answer = dict[str, Any]
 

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.audio.base import AudioFormat, Samples
+from drivers.audio.espeak import EspeakEngine
 from drivers.audio.wav import WavOutput, read_wav
+from drivers.errors import VoiceError
 from sim_twin.errors import TwinError
 from sim_twin.referee import ask
 from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import USUAL_DISTANCE_M, Talker, arrival
-from vla_deploy.speech.errors import VoiceError
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 _MOUTH_HEIGHT_M: Final = 1.5
 _EXAMPLE: Final = """example:

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from drivers.audio.clip import Clip, Wave
+from drivers.audio.espeak import EspeakEngine
 from sim_twin.sound.acoustics import Acoustics, path, through
-from vla_deploy.speech.voice.clip import Clip, Wave
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 USUAL_DISTANCE_M: Final = 1.5
 NOISE_AROUND_S: Final = 0.5

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from sim_twin.campaigns.faulting.rehearsal import Rehearsal
 from sim_twin.faults import Fault
-from sim_twin.faults.rehearsal import Rehearsal
 from sim_twin.faults.scenario import Scenario, load_scenario, scenario_paths
 from vla_deploy.robots import load_robot
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from sim_twin.harness.stack import LockstepStack
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import Feasible
 from vla_deploy.analysis.geometric import GeometricAnalyser
 from vla_deploy.cli.observation.analyse import ask
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.verdict import Feasible
 
 pytestmark = pytest.mark.gl
 

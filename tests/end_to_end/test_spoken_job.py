@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S
 from sim_twin.harness.stack import LockstepStack
 from sim_twin.sound.talker import Talker
 from vla_deploy import speech
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 MODEL = Path(speech.__path__[0]).parent / "models" / "commands-whisper"
 pytestmark = pytest.mark.skipif(not MODEL.exists(), reason="no embedded recogniser is here")

@@ -18,10 +18,10 @@ from training.planner.sentences.composing import Composer, Example
 from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.inference.manifest import Certainty, Language, LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import confidence_of
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step
 from vla_deploy.planning.command_parser.rung import CommandParser, known_words
+from vla_deploy.runtime.deadline import Deadline
 
 MOST_TOKENS: Final = 160
 _DEADLINE_S: Final = 10.0

@@ -5,7 +5,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from vla_deploy.analysis.document import Distance, Ratio, Side, SizeClass
+from vla_deploy.analysis.document import Distance, Side, SizeClass
+from vla_deploy.feasibility.verdict import Ratio
 
 MOST_OBJECTS: Final = 60
 MOST_RELATIONS: Final = 120

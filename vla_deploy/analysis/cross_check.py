@@ -13,11 +13,10 @@ from vla_deploy.analysis.document import (
     AnalysedRelation,
     Distance,
     EvidenceSource,
-    Feasible,
     SceneAnalysis,
     Side,
-    Task,
 )
+from vla_deploy.feasibility.verdict import Feasible, Task
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES, SYNONYMS
 
 # How much a claim alone can be worth.

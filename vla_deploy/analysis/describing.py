@@ -12,7 +12,7 @@ from vla_deploy.analysis.document import (
     Side,
     SizeClass,
 )
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Body, Snapshot, Thing, Viewpoint, access_to, relations_of
 from vla_deploy.world.memory import still_there
 from vla_deploy.world.words import distance_word, size_word

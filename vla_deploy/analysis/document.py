@@ -1,11 +1,11 @@
 """Define the analysis of a scene, as every analyser gives it: `docs/analysis.schema.json`."""
 
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
-Ratio = Annotated[float, Field(ge=0.0, le=1.0)]
+from vla_deploy.feasibility.verdict import Ratio, Task
 
 
 class Side(StrEnum):
@@ -41,15 +41,6 @@ class EvidenceSource(StrEnum):
     BOTH = "both"
 
 
-class Feasible(StrEnum):
-    """Say whether a goal can be reached."""
-
-    YES = "yes"
-    AFTER_PREREQUISITES = "after_prerequisites"
-    NO = "no"
-    UNKNOWN = "unknown"
-
-
 class _Value(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -76,22 +67,6 @@ class AnalysedRelation(_Value):
     relation: str
     other: str
     source: EvidenceSource = EvidenceSource.GEOMETRY
-
-
-class Task(_Value):
-    """Judge a goal: `confidence` says how sure the verdict is, 0 for an unknown one.
-
-    `prerequisites` must be done before, `obstacles` are in the way, `alternatives` could be done
-    instead.
-    """
-
-    goal: str
-    feasible: Feasible
-    confidence: Ratio
-    reason: str
-    prerequisites: tuple[str, ...] = ()
-    obstacles: tuple[str, ...] = ()
-    alternatives: tuple[str, ...] = ()
 
 
 class SceneAnalysis(_Value):

@@ -2,11 +2,11 @@
 
 from typing import Final
 
-from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.describing import objects_of, relations_between
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.goal_feasibility import judge_goal
-from vla_deploy.analysis.question import SceneQuestion
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.question import SceneQuestion
 
 GEOMETRIC: Final = "geometric"
 NO_POSE: Final = "the robot's pose is not known: no sides, no distances, no ways"

@@ -1,14 +1,15 @@
 """Judge whether a goal in words can be reached: plan it with patterns, and judge the steps."""
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import Feasible, Task
-from vla_deploy.analysis.feasibility import judge_actions, outlook_of, task_of
-from vla_deploy.analysis.outlook import Outlook
-from vla_deploy.analysis.question import SceneQuestion
-from vla_deploy.planning.errors import NotUnderstood, PlanningError
-from vla_deploy.planning.knowledge import World
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.actions import judge_actions, outlook_of, task_of
+from vla_deploy.feasibility.outlook import Outlook
+from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.verdict import Feasible, Task
+from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.patterns.backend import plan_command
-from vla_deploy.planning.plan import Plan
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.knowledge import World
+from vla_deploy.plans.plan import Plan
 
 
 def judge_goal(question: SceneQuestion, abilities: Abilities) -> Task:
@@ -18,7 +19,7 @@ def judge_goal(question: SceneQuestion, abilities: Abilities) -> Task:
         plan = _plan(question, abilities, outlook)
     except NotUnderstood as error:
         return task_of(question, outlook, Feasible.UNKNOWN, 0.0, str(error))
-    except PlanningError as error:
+    except PlanError as error:
         return task_of(question, outlook, Feasible.NO, 1.0, str(error))
     return judge_actions(plan.actions, question, outlook)
 

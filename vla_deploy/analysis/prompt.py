@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.question import SceneQuestion
+from vla_deploy.feasibility.question import SceneQuestion
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 
 TEMPLATE: Final = Path(__file__).parent / "prompts" / "scene_analysis.md"

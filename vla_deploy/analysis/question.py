@@ -1,46 +1,19 @@
 """Hold what an analyser is asked, and say what an analyser is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, Final, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.world import Snapshot, Viewpoint, read_snapshot
+from vla_deploy.client.place_state import PlaceState
+from vla_deploy.feasibility.question import FloorPlanBystander, Image, SceneQuestion
+from vla_deploy.world import Viewpoint, read_snapshot
 from vla_deploy.world.resting import rest_of
 
-Image = NDArray[np.uint8]
 FRESH_S: Final = 5.0
 """How old a scene may be that is analysed."""
 _POSE_AGE_S: Final = 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FloorPlanBystander:
-    """Place a person or a chair on the floor plan; `width_m` is what is seen of it."""
-
-    kind: str
-    x_m: float
-    y_m: float
-    width_m: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SceneQuestion:
-    """Hold the world as it is known, an image (rows, columns, RGB) or none, and a goal or none.
-
-    `holding` tells which kind of thing each hand holds.
-    """
-
-    world: Snapshot
-    bystanders: tuple[FloorPlanBystander, ...] = ()
-    holding: Mapping[str, str | None] = field(default_factory=dict)
-    image: Image | None = None
-    goal: str = ""
 
 
 class Analyser(Protocol):

@@ -7,7 +7,8 @@ from vla_deploy.analysis.claims import SceneClaims
 from vla_deploy.analysis.cross_check import weighed
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.prompt import chat_about
-from vla_deploy.analysis.question import Analyser, SceneQuestion
+from vla_deploy.analysis.question import Analyser
+from vla_deploy.feasibility.question import SceneQuestion
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.errors import ModelServerError

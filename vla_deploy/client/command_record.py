@@ -9,6 +9,8 @@ from typing import Any, Final
 from vla_deploy.client.following import Event
 
 MOST_EVENTS: Final = 400
+MOST_CHARACTERS: Final = 1000
+"""Of one command in words."""
 _CANCELLED: Final = "cancelled on request"
 
 

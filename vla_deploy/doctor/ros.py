@@ -9,11 +9,11 @@ from typing import Any, Final
 from platforms.tree import ValueMissing
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
-from vla_deploy.gateways.ros.environment import find_environment
-from vla_deploy.gateways.ros.errors import RosNotFound
 from vla_deploy.gateways.ros.imports import IMPORTS, remedy
 from vla_deploy.gateways.ros.shared_memory import find_leftovers
 from vla_deploy.robots.ros_settings import Accepts, RosSettings
+from vla_deploy.supervisor.errors import RosNotFound
+from vla_deploy.supervisor.processes.ros_environment import find_environment
 
 TESTED_RMW: Final = "rmw_fastrtps_cpp"
 HIGHEST_DOMAIN: Final = 101

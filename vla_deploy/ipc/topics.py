@@ -217,7 +217,7 @@ TOPICS: tuple[Topic, ...] = (
             PackedField("match_ratio", "f8", unit="share of lidar points on the map"),
             PackedField("covariance", "f8", 9, "x, y, yaw by rows, m and rad"),
             PackedField("state", "u1", unit="0 tracking, 1 unsure, 2 lost"),
-            PackedField("doubt", "u1", unit="why, see vla_deploy/navigation.place_judge.py"),
+            PackedField("doubt", "u1", unit="why, see vla_deploy/client/place_state.py"),
         ),
     ),
     Topic(

@@ -8,7 +8,6 @@ from typing import Any, Final, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole, Completion
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerInvalid,
     AnswerMalformed,
@@ -18,6 +17,7 @@ from vla_deploy.model_servers.errors import (
 )
 from vla_deploy.model_servers.json_answer import objects_in
 from vla_deploy.model_servers.server import ModelServer
+from vla_deploy.runtime.deadline import Deadline
 
 Shape = TypeVar("Shape", bound=BaseModel)
 # How servers say that they know no schema; one fails with 500 instead.

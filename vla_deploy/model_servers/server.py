@@ -14,7 +14,6 @@ from vla_deploy.model_servers.calls.rate import CallRate
 from vla_deploy.model_servers.calls.replies import document_of
 from vla_deploy.model_servers.chat import Chat, Completion
 from vla_deploy.model_servers.credentials import Secret
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerUnusable,
     ModelServerError,
@@ -27,6 +26,7 @@ from vla_deploy.model_servers.formats.base import Format, Json, ModelFacts, Wire
 from vla_deploy.model_servers.formats.table import FORMATS
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.deadline import Deadline
 
 
 class ModelServer:

@@ -21,8 +21,8 @@ from vla_deploy.inference.manifest import Language, LanguageUse, Manifest
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import ModelStore, StoredModel
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
+from vla_deploy.runtime.deadline import Deadline
 
 _PARTS: Final = (GENAI_CONFIG, TOKENIZER, CONFIG, TEMPLATE)
 _WEIGHTS: Final = (".onnx", ".onnx.data", ".onnx_data")

@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.maps.grid_map import load_map
 
 CLEARANCE_MARGIN_M: Final = 0.03
 """Air between the footprint and what stands on the map."""

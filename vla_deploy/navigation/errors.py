@@ -1,8 +1,7 @@
 """Group navigation errors by what the caller can do.
 
 NavigationError
-├── NoPath       another goal, or clear the way
-└── MapInvalid   mend the map's files
+└── NoPath       another goal, or clear the way
 """
 
 
@@ -12,7 +11,3 @@ class NavigationError(Exception):
 
 class NoPath(NavigationError):
     """Say that no way with enough clearance leads to the goal."""
-
-
-class MapInvalid(NavigationError):
-    """Say what is wrong with a map file."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.navigation.maps.grid_map import GridMap
+from vla_deploy.robots.maps.grid_map import GridMap
 
 Cell = tuple[int, int]
 

@@ -7,6 +7,7 @@ from typing import Final
 from drivers.opener import PathOpener
 from drivers.recording.opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
+from vla_deploy.inference.errors import InferenceError
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
@@ -32,4 +33,4 @@ def build(context: NodeContext) -> PerceptionNode:
 
 
 if __name__ == "__main__":
-    sys.exit(main("perception", build))
+    sys.exit(main("perception", build, mendable=(InferenceError,)))

@@ -6,10 +6,10 @@ import numpy as np
 
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.depth_band import depth_band
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid

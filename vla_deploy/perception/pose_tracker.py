@@ -5,10 +5,10 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+from vla_deploy.robots.maps.grid_map import load_map
 
 # Without a new yaw for this long, the wheels give the turn.
 FRESH_YAW_NS = NS_PER_S // 25

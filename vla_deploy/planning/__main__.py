@@ -4,6 +4,7 @@ import sys
 from typing import Final
 
 from platforms import load_profile
+from vla_deploy.inference.errors import InferenceError
 from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.prohibitions import Prohibitions
@@ -27,4 +28,4 @@ def build(context: NodeContext) -> PlannerNode:
 
 
 if __name__ == "__main__":
-    sys.exit(main("planner", build))
+    sys.exit(main("planner", build, mendable=(InferenceError,)))

@@ -7,12 +7,12 @@ to it. What leads up to taking and putting a thing is left out, and so is what m
 from collections.abc import Iterator
 from typing import Any, Final
 
-from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import match_place
-from vla_deploy.planning.plan import Action, Plan, execution_order
-from vla_deploy.planning.symbolic.simulation import end_state
-from vla_deploy.planning.symbolic.state import subject_of
+from vla_deploy.plans.catalogue import MOTIONLESS
+from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.plan import Action, Plan, execution_order
+from vla_deploy.plans.symbolic.simulation import end_state
+from vla_deploy.plans.symbolic.state import subject_of
 
 _HANDLING: Final = frozenset({"pick_up", "place"})
 _LEADING_UP: Final = frozenset({"find_object", "navigate_to"})

@@ -14,9 +14,9 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.plan import Plan
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.errors import PlanInvalid
+from vla_deploy.plans.plan import Plan
 
 Json = dict[str, Any]
 

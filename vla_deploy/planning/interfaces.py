@@ -7,11 +7,12 @@ from typing import Any, Protocol
 
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.calls.picture import Image
-from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.errors import Ambiguous, NotAble
 from vla_deploy.planning.understanding.conversation import Conversation
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.knowledge import World
+from vla_deploy.plans.plan import Plan
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.world import Snapshot
 
 
@@ -155,7 +156,7 @@ class PlanningResult:
     attempts: tuple[Attempt, ...] = ()
     plan: Plan | None = None
     proposal: Proposal | None = None
-    error: PlanningError | None = None
+    error: PlanError | None = None
     is_unchecked: bool = False
 
     @property
@@ -165,7 +166,7 @@ class PlanningResult:
 
 
 Check = Callable[[Plan, PlanRequest], Plan]
-"""Return a proposed plan grounded and checked, or raise the PlanningError that says why it may not
+"""Return a proposed plan grounded and checked, or raise the PlanError that says why it may not
 run."""
 
 
@@ -187,7 +188,7 @@ class BackEnd(Protocol):
         Raises:
             Declined: this back end has no plan for it.
             Ambiguous: only the person knows what is meant, and is asked.
-            PlanningError: this back end cannot plan it; any of the others may.
+            PlanError: this back end cannot plan it; any of the others may.
         """
         ...
 

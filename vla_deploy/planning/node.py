@@ -22,9 +22,10 @@ from vla_deploy.planning.dialogue.command import (
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.errors import NotReadyToMove, PlanningError
+from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.node import NodeContext
@@ -155,7 +156,7 @@ class PlannerNode:
         try:
             self._check_age(event)
             self._manager.take(read_command(event))
-        except PlanningError as error:
+        except PlanError as error:
             self._manager.metrics.refused += 1
             self._refuse(command_id_of(event), str(error))
 

@@ -11,16 +11,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
-from vla_deploy.planning.errors import (
-    Ambiguous,
-    Declined,
-    NotUnderstood,
-    PlanInvalid,
-    PlanningError,
-)
+from vla_deploy.planning.errors import Ambiguous, Declined, NotUnderstood
 from vla_deploy.planning.interfaces import (
     Aid,
     Attempt,
@@ -32,11 +25,13 @@ from vla_deploy.planning.interfaces import (
     Proposal,
 )
 from vla_deploy.planning.patterns.backend import Patterns
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prohibitions import held_to
 from vla_deploy.planning.scope import guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
-from vla_deploy.planning.validator import check_plan
+from vla_deploy.plans.errors import PlanError, PlanInvalid
+from vla_deploy.plans.plan import Plan
+from vla_deploy.plans.validator import check_plan
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
 WITHIN_S: Final = 20.0
@@ -49,7 +44,7 @@ _ERRORS: Final = (
     (PlanInvalid, AttemptOutcome.INVALID, 2),
     (NotUnderstood, AttemptOutcome.DECLINED, 3),
     (Declined, AttemptOutcome.DECLINED, 4),
-    (PlanningError, AttemptOutcome.REFUSED, 1),
+    (PlanError, AttemptOutcome.REFUSED, 1),
 )
 
 # Outcomes of a back end that leave open what it would have planned.
@@ -62,7 +57,7 @@ def checked(plan: Plan, request: PlanRequest) -> Plan:
     Raises:
         PlanInvalid: it may not run; carries every fault.
         Ambiguous: only the person knows what is meant.
-        PlanningError: it speaks of what the robot does not know.
+        PlanError: it speaks of what the robot does not know.
     """
     grounded = ground_plan(plan, request)
     check_plan(grounded, request.world, request.scene, request.here)
@@ -211,7 +206,7 @@ class Planner:
             plan = self.check(proposal.plan, request)
             if whole.left_s <= 0.0:
                 raise Declined("its plan came too late")
-        except PlanningError as error:
+        except PlanError as error:
             return PlanningResult(error=error)
         return PlanningResult(plan=plan, proposal=proposal)
 
@@ -229,11 +224,11 @@ class _GivenPlan(BackEnd):
         return Proposal(plan=parse_plan(self._given), back_end=self.name, confidence=1.0)
 
 
-def _rank(error: PlanningError) -> int:
+def _rank(error: PlanError) -> int:
     return next(rank for kind, _, rank in _ERRORS if isinstance(error, kind))
 
 
-def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
+def _outcome(error: PlanError | None, share: Deadline) -> AttemptOutcome:
     if error is None:
         return AttemptOutcome.PLANNED
     outcome = next(outcome for kind, outcome, _ in _ERRORS if isinstance(error, kind))

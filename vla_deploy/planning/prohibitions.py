@@ -22,11 +22,11 @@ from vla_deploy.planning.interfaces import (
     Proposal,
     StandingOrder,
 )
-from vla_deploy.planning.knowledge import World, match_place, object_or_none
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.table import WORDS
-from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import thing_of
+from vla_deploy.plans.knowledge import World, match_place, object_or_none
+from vla_deploy.plans.plan import Action, Plan
+from vla_deploy.plans.symbolic.state import thing_of
 from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS

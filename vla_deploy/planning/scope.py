@@ -11,10 +11,10 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
-from vla_deploy.planning.plan import Plan
+from vla_deploy.plans.catalogue import MOTIONLESS
+from vla_deploy.plans.plan import Plan
 
 
 class ScopeGroup(StrEnum):

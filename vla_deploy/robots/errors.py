@@ -1,6 +1,8 @@
-"""Say what is wrong with a robot file.
+"""Say what is wrong with the files that describe a robot and its home.
 
-RobotFileError    the robot file, or a file it names, cannot be used: fix every fault it lists
+RobotError
+├── RobotFileError    the robot file, or a file it names, cannot be used: fix every fault it lists
+└── MapInvalid        the map of its home cannot be used, or not be written: mend its files
 """
 
 from pathlib import Path
@@ -8,7 +10,11 @@ from pathlib import Path
 from vla_deploy.robots.schema import RobotFileFault
 
 
-class RobotFileError(ValueError):
+class RobotError(Exception):
+    """Base of what a person has to mend in a robot's files."""
+
+
+class RobotFileError(RobotError, ValueError):
     """Report every fault of one robot file at once."""
 
     def __init__(self, file: Path, faults: tuple[RobotFileFault, ...]) -> None:
@@ -19,3 +25,7 @@ class RobotFileError(ValueError):
             return
         lines = "\n".join(f"  {fault}" for fault in faults)
         super().__init__(f"{file}: {len(faults)} faults\n{lines}")
+
+
+class MapInvalid(RobotError):
+    """Say what is wrong with a map file."""

@@ -12,10 +12,8 @@ from drivers.clock import Clock
 from drivers.errors import DeviceBusy, DeviceMissing, DriverError, LinkLost, NoReply
 from drivers.twin_clock import TwinClock, clock_of
 from platforms import ProfileError, load_profile
-from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc import IpcError
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.robots import RobotFileError
+from vla_deploy.robots.errors import RobotError
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.exit_codes import (
     EXIT_CONFIGURATION,
@@ -34,14 +32,7 @@ READY_DIR = "ready"
 # An adapter may be slow to appear at boot, a supply be switched on later, a dying holder let go.
 ABSENCES = (DeviceMissing, DeviceBusy, LinkLost, NoReply)
 # Starting again mends none of the others: a person has to.
-CONFIGURATION_ERRORS = (
-    DriverError,
-    RobotFileError,
-    ProfileError,
-    IpcError,
-    MapInvalid,
-    InferenceError,
-)
+CONFIGURATION_ERRORS = (DriverError, RobotError, ProfileError, IpcError)
 _PR_SET_NAME = 15
 _log = logging.getLogger(__name__)
 

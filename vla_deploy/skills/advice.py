@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import Task
-from vla_deploy.analysis.feasibility import judge_action
-from vla_deploy.analysis.question import SceneQuestion
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.planning.plan import Action
+from vla_deploy.client.place_state import PlaceState
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.actions import judge_action
+from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.verdict import Task
+from vla_deploy.plans.plan import Action
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.world import Viewpoint

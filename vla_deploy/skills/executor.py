@@ -9,10 +9,9 @@ from vla_deploy.client.action_status import ActionStatus
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
-from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.plan import Action, Plan, execution_order
-from vla_deploy.planning.recovery.setback import FailureCause
-from vla_deploy.planning.symbolic.state import SymbolicState
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.plan import Action, FailureCause, Plan, execution_order
+from vla_deploy.plans.symbolic.state import SymbolicState
 from vla_deploy.skills.context import Rest, Skill, SkillContext
 from vla_deploy.skills.errors import (
     EffectMissing,

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.client.place_state import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.motion_ids import motion_ids
 from vla_deploy.navigation.follower import AT_REST, Twist
-from vla_deploy.navigation.localising.place_judge import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.safety import Direction

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
-from vla_deploy.planning.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
-from vla_deploy.planning.plan import Action, ActionPriority
+from vla_deploy.plans.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
+from vla_deploy.plans.plan import Action, ActionPriority
 from vla_deploy.robots import RobotDescription
 
 ARMS: Final = "arms"

@@ -10,12 +10,12 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import parse_object, world_of
-from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
-from vla_deploy.planning.symbolic.state import Pose, SymbolicState, state_of
-from vla_deploy.planning.symbolic.table import LOGIC
+from vla_deploy.plans.errors import UnknownObject
+from vla_deploy.plans.knowledge import parse_object, world_of
+from vla_deploy.plans.plan import Action
+from vla_deploy.plans.symbolic.conditions import MET, Answer, Setting
+from vla_deploy.plans.symbolic.state import Pose, SymbolicState, state_of
+from vla_deploy.plans.symbolic.table import LOGIC
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.world import Query

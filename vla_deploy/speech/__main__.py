@@ -5,6 +5,7 @@ from typing import Final
 
 from drivers.audio.open_audio import open_audio_input, open_audio_output
 from platforms import load_profile
+from vla_deploy.inference.errors import InferenceError
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.runtime.executors import worker_thread
@@ -43,4 +44,4 @@ def build(context: NodeContext) -> SpeechNode:
 
 
 if __name__ == "__main__":
-    sys.exit(main("speech", build))
+    sys.exit(main("speech", build, mendable=(InferenceError,)))

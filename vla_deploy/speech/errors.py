@@ -1,9 +1,8 @@
-"""Group the errors of hearing and speaking by what the caller can do about them.
+"""Group the errors of hearing by what the caller can do about them.
 
 SpeechError
 ├── SpeechMissing         the `speech` extra is not installed: install it
-├── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
-└── VoiceError            a text became no sound: the program's own words are in the message
+└── RecordingsInvalid     recordings to learn from cannot be used: mend the folder
 """
 
 from importlib import import_module
@@ -11,7 +10,7 @@ from typing import Any
 
 
 class SpeechError(Exception):
-    """Base of everything that hearing and speaking raise."""
+    """Base of everything that hearing raises."""
 
 
 class SpeechMissing(SpeechError):
@@ -20,10 +19,6 @@ class SpeechMissing(SpeechError):
 
 class RecordingsInvalid(SpeechError):
     """Say what is wrong with a folder of recordings."""
-
-
-class VoiceError(SpeechError):
-    """Say why a text did not become sound."""
 
 
 def import_extra(module: str, purpose: str) -> Any:

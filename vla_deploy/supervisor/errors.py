@@ -3,6 +3,7 @@
 SupervisorError
 ├── AlreadyRunning      another supervisor holds the runtime directory: stop it or choose another
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
+├── RosNotFound         no environment of ROS 2, or none as it was named: install it, or name it
 ├── ProcessGivenUp      the robot cannot go on without that process: the run ends
 └── StartFailed         a process did not become ready: its last log lines are in the message
     ├── StartCrashed    it crashed or hung on its way: another try may help
@@ -20,6 +21,10 @@ class AlreadyRunning(SupervisorError):
 
 class RuntimeUnavailable(SupervisorError):
     """Give the reason why the runtime directory cannot be used."""
+
+
+class RosNotFound(SupervisorError):
+    """Name where an environment of ROS 2 was looked for, or why it cannot be used."""
 
 
 class StartFailed(SupervisorError):

@@ -8,7 +8,6 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
-from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
@@ -31,6 +30,7 @@ from vla_deploy.supervisor.processes.lifecycle import (
     wind_down,
 )
 from vla_deploy.supervisor.processes.liveness import Vital
+from vla_deploy.supervisor.processes.ros_launching import require_environment
 from vla_deploy.supervisor.profiles.profile_change import Member
 from vla_deploy.supervisor.runs.log_files import complaint, last_words
 from vla_deploy.supervisor.runs.options import RunOptions

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from vla_deploy.client.link import RobotLink
+from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import Sample
-from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
 
 
 def collect(link: RobotLink) -> dict[str, Any]:

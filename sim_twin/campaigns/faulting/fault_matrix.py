@@ -14,6 +14,7 @@ import numpy as np
 
 from sim_twin.campaigns.faulting.phases import PAYLOAD, NotSet, Phase, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
+from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
@@ -21,7 +22,6 @@ from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.table import faults_of
-from sim_twin.faults.witness import FaultWitness
 from sim_twin.harness.stack import LockstepControl, LockstepStack, StackNotReady
 from sim_twin.physics.hazards import Hazard
 from sim_twin.physics.truth import STANDSTILL_RAD_S

@@ -24,13 +24,13 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
+from drivers.audio.espeak import EspeakEngine
 from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
 from vla_deploy.client.access.passwords import hash_password
 from vla_deploy.dashboard.access import UserRole
 from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 CHROMIUM: Final = "/usr/bin/chromium"
 DESKTOP: Final = ViewportSize(width=1440, height=900)

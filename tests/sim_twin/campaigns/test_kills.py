@@ -18,8 +18,8 @@ from sim_twin.campaigns.killing.rules import (
     KillMoment,
     injections,
 )
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.patterns.backend import plan_command
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
+from drivers.audio.clip import Clip
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from sim_twin.harness.lockstep import Lockstep
@@ -11,7 +12,6 @@ from sim_twin.sensors.sound import LATENCY_NS, MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.hearing import let_arrive
 from sim_twin.sound.room import NOISE_SIGMA, Room
 from sim_twin.sound.talker import Talker, arrival, loudness
-from vla_deploy.speech.voice.clip import Clip
 
 RATE_HZ = 16_000
 FORMAT = AudioFormat(rate_hz=RATE_HZ)

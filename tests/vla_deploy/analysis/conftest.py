@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import SceneQuestion, question_of
+from vla_deploy.analysis.question import question_of
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.question import SceneQuestion
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Viewpoint
 

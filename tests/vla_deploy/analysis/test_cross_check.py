@@ -4,7 +4,8 @@ import pytest
 
 from vla_deploy.analysis.claims import ClaimedObject, ClaimedRelation, ClaimedTask, SceneClaims
 from vla_deploy.analysis.cross_check import weighed
-from vla_deploy.analysis.document import EvidenceSource, Feasible
+from vla_deploy.analysis.document import EvidenceSource
+from vla_deploy.feasibility.verdict import Feasible
 
 
 def claim(name: str, **changes) -> ClaimedObject:

@@ -5,7 +5,7 @@ import pytest
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import GRASP_RULES, grasps_from_above, hand_down
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 
 CENTRE = (0.4, 0.1, 0.5)
 

@@ -8,10 +8,10 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.model_servers.calls.admission import Admission
 from vla_deploy.model_servers.calls.backoff import Backoff, may_pass
 from vla_deploy.model_servers.calls.breaker import BreakerState, CircuitBreaker
+from vla_deploy.model_servers.calls.connection import bounded_s
 from vla_deploy.model_servers.calls.privacy import check_privacy
 from vla_deploy.model_servers.calls.rate import CallRate
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerInvalid,
     Busy,
@@ -22,6 +22,7 @@ from vla_deploy.model_servers.errors import (
     TimedOut,
 )
 from vla_deploy.model_servers.metrics import CallMetrics
+from vla_deploy.runtime.deadline import Deadline
 
 TEXT = Chat(messages=(ChatMessage(text="hello"),))
 IMAGE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))
@@ -125,10 +126,10 @@ def test_a_place_that_comes_too_late_is_none():
 
 def test_a_deadline_bounds_every_wait_by_what_is_left(clock):
     ends = Deadline.within(clock, 2.0)
-    assert (ends.bound_s(), ends.bound_s(0.5), ends.bound_s(9.0)) == (2.0, 0.5, 2.0)
+    assert (bounded_s(ends), bounded_s(ends, 0.5), bounded_s(ends, 9.0)) == (2.0, 0.5, 2.0)
     clock.time_ns += 2 * NS_PER_S
     with pytest.raises(TimedOut, match="within 2 s"):
-        ends.bound_s(0.5)
+        bounded_s(ends, 0.5)
 
 
 REMOTE = {"location": "remote", "vision": True}

@@ -11,7 +11,6 @@ import traceback
 import pytest
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
     AnswerTooLarge,
@@ -23,6 +22,7 @@ from vla_deploy.model_servers.errors import (
     ServerUnreachable,
     TimedOut,
 )
+from vla_deploy.runtime.deadline import Deadline
 
 CHAT = Chat(messages=(ChatMessage(text="hello"),))
 PICTURE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))

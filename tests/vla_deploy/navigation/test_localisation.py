@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.localising.place_judge import LOST_SIGMA_M, Doubt, PlaceState
+from vla_deploy.navigation.localising.place_judge import LOST_SIGMA_M
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 
 if TYPE_CHECKING:

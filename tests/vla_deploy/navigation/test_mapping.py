@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.navigation.localising.scan_match import ScanPoints
-from vla_deploy.navigation.maps.map_file import (
+from vla_deploy.navigation.maps.mapping import Mapper
+from vla_deploy.navigation.maps.occupancy import OccupancyGrid
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
     OCCUPIED_SHADE,
     UNKNOWN_SHADE,
     MapFile,
 )
-from vla_deploy.navigation.maps.mapping import Mapper
-from vla_deploy.navigation.maps.occupancy import OccupancyGrid
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 
 if TYPE_CHECKING:
     from conftest import TracedFlat

@@ -6,8 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner, clearance_of
+from vla_deploy.robots.maps.grid_map import GridMap
 
 RADIUS_M = 0.2
 

@@ -1,16 +1,14 @@
 import pytest
 
+from vla_deploy.client.place_state import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.navigation.localising.place_judge import (
-    DOUBT_TEXT,
     LOST_AFTER_SCANS,
     LOST_SIGMA_M,
     SILENT_NS,
     SURE_AFTER_SCANS,
     UNSURE_AFTER_SCANS,
     UNSURE_SIGMA_M,
-    Doubt,
     PlaceJudge,
-    PlaceState,
     ScanVerdict,
 )
 

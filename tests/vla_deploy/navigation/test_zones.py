@@ -2,10 +2,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots.description import KeepOutZone
+from vla_deploy.robots.maps.grid_map import GridMap
 
 ZONE = KeepOutZone(
     name="stairs", reason="a drop", polygon_m=((2.0, 1.0), (3.0, 1.0), (3.0, 4.0), (2.0, 4.0))

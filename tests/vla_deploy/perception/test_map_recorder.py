@@ -12,15 +12,15 @@ from benchmarks.map_truth import compare_maps
 from benchmarks.pushed_robot import PushedRobot
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.follower import Twist
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.navigation.maps.map_file import LOW_SHADE, read_map_file
 from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.map_recorder import MapRecorder
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import LensCalibration
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+from vla_deploy.robots.maps.map_file import LOW_SHADE, read_map_file
 
 ROBOT = load_robot("butler")
 BENT = replace(ROBOT.camera.pinhole, distortion=(-0.31, 0.11, 0.0009, -0.0013, -0.02))

@@ -12,13 +12,13 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner, checked
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import Plan
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world import Snapshot, Thing

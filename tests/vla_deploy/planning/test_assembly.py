@@ -9,7 +9,7 @@ from platforms import load_profile
 from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.planning.assembly import open_planner, planner_for
 from vla_deploy.planning.interfaces import Aid
-from vla_deploy.planning.knowledge import world_of
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
 SERVERS = """

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.planning.dialects import parse_plan
-from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.plans.errors import PlanInvalid
 
 TYPED = {
     "goal": "tidy",

@@ -2,9 +2,10 @@
 
 from threading import Event
 
-from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.errors import Ambiguous, Declined, UnknownPlace
+from vla_deploy.planning.errors import Ambiguous, Declined
 from vla_deploy.planning.planner import Planner
+from vla_deploy.plans.errors import UnknownPlace
+from vla_deploy.runtime.deadline import Deadline
 
 GO = ("navigate_to", {"place": "kitchen"})
 NOWHERE = ("navigate_to", {"place": "narnia"})

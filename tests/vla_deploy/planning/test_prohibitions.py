@@ -12,10 +12,10 @@ from benchmarks.planner_session import PlannerSession, fresh_session
 from drivers.clock import MonotonicClock
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, StandingOrder
-from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, held_to, read_order
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot
 

@@ -10,9 +10,9 @@ from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_session import PlannerAnswer, fresh_session
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
-from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.scope import guarded, scope_words
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots import load_robot
 
 PLAIN: Final = ("go to the kitchen", "bring me the red cup", "put the ball in the box")

@@ -15,7 +15,7 @@ from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.speech.words import STOPS
 
 PACKAGE: Final = Path(vla_deploy.__file__).parent
-SPEAKERS: Final = ("planning", "memory", "world", "speech/event_publisher.py")
+SPEAKERS: Final = ("planning", "plans", "memory", "world", "speech/event_publisher.py")
 """Where sentences stand that are said aloud."""
 NOT_SAID: Final = frozenset(
     {

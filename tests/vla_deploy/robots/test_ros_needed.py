@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.gateways.ros.errors import RosNotFound
-from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.robots import RobotFileError, load_robot
 from vla_deploy.robots.loader import ROBOT_FILE, ROBOTS_DIR
+from vla_deploy.supervisor.errors import RosNotFound
+from vla_deploy.supervisor.processes.ros_launching import require_environment
 
 
 def with_ros(folder: Path, table: str) -> Path:

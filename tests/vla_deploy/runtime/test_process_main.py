@@ -11,7 +11,7 @@ NODE = """
 import sys
 from pathlib import Path
 from drivers import errors
-from vla_deploy.inference.errors import ModelFileSpoiled
+from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.runtime.process_main import main
 
 TROUBLES = {kind.__name__: kind for kind in errors.DriverError.__subclasses__()}
@@ -35,7 +35,7 @@ class Node:
     def stop(self):
         print("stop", flush=True)
 
-sys.exit(main("planner", Node))
+sys.exit(main("planner", Node, mendable=(InferenceError,)))
 """
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.maps.grid_map import GridMap
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.link import SkillLink

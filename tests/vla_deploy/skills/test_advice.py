@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.analysis.document import Feasible, Task
-from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.planning.plan import Action
+from vla_deploy.client.place_state import PlaceState
+from vla_deploy.feasibility.verdict import Feasible, Task
+from vla_deploy.plans.plan import Action
 from vla_deploy.skills.advice import in_words
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import Announcer, CellReader, ClaimBook, SharedSpace
-from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.maps.grid_map import GridMap
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.link import SkillLink

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.client.place_state import PlaceState
 
 if TYPE_CHECKING:
     from conftest import Executor

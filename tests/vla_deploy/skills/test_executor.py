@@ -10,7 +10,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots import load_robot
 from vla_deploy.skills import executor
 from vla_deploy.skills.context import Skill, SkillContext

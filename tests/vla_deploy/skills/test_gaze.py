@@ -1,7 +1,7 @@
 from typing import TYPE_CHECKING, Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.movements.gaze import MEMORY_S, SURE_CONFIDENCE, remembered
 

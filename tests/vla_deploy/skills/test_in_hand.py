@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from vla_deploy.planning.plan import Action
-from vla_deploy.planning.symbolic.state import SymbolicState
+from vla_deploy.plans.plan import Action
+from vla_deploy.plans.symbolic.state import SymbolicState
 from vla_deploy.skills.actions.pick import pick_up
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.errors import NotPossible

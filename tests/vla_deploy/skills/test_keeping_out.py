@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.actions import find
 from vla_deploy.skills.actions.navigate import reach

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S
 from vla_deploy.skills.movements.drive import BLOCKED_TIMEOUT_S
 

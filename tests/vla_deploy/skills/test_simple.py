@@ -7,6 +7,7 @@ from typing import cast
 import pytest
 
 from drivers.audio.base import AudioFormat, AudioOutput
+from drivers.audio.espeak import EspeakEngine
 from drivers.audio.wav import WavOutput
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
@@ -19,7 +20,6 @@ from vla_deploy.skills.actions.simple import speak
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.link import SkillLink
 from vla_deploy.speech.voice.robot_voice import RobotVoice
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 TEXT = "The red cup is in the box"
 

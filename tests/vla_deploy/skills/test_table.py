@@ -1,4 +1,4 @@
-from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.skills.table import SKILL_FUNCTIONS
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat, AudioInput, Samples
+from drivers.audio.espeak import EspeakEngine
 from drivers.audio.pushed import PushedInput
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import DeviceMissing
@@ -27,7 +28,6 @@ from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import FRAME, Playing, SoundBlock
 from vla_deploy.speech.stop_words.listener import StopWords
 from vla_deploy.speech.voice.robot_voice import RobotVoice
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 
 class Listener:

@@ -11,7 +11,7 @@ from typing import Any, cast
 import pytest
 
 from platforms import SpeechSettings
-from sim_twin.sound.speech_room import SpeechRoom
+from sim_twin.harness.speech_room import SpeechRoom
 from sim_twin.sound.talker import Talker
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock

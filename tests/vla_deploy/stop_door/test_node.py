@@ -17,7 +17,7 @@ PRESS = b"POST /stop HTTP/1.1\r\n\r\n"
 FORBIDDEN = (
     *("fastapi", "starlette", "uvicorn", "pydantic", "asyncio", "cv2", "onnxruntime", "mujoco"),
     *(
-        "vla_deploy.planning.plan",
+        "vla_deploy.plans.plan",
         "vla_deploy.skills",
         "vla_deploy.cli",
         "vla_deploy.dashboard.app",

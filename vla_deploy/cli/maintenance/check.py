@@ -10,13 +10,13 @@ from platforms import load_profile
 from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.operation.say import read_json
-from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.processes.ros_launching import require_environment
 
 SCHEMAS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {
     "plan": plan_schema,

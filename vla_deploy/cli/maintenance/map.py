@@ -11,14 +11,14 @@ from vla_deploy.cli.commands import add_command, add_top_command, emit, number_a
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.navigation.maps.map_check import as_characters, check_for_robot, describe
-from vla_deploy.navigation.maps.map_file import (
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.maps.map_file import (
     files_of,
     image_of,
     read_map_file,
     require_free,
     write_map_file,
 )
-from vla_deploy.robots import load_robot
 
 if TYPE_CHECKING:
     from vla_deploy.perception.map_recorder import MapRecorder

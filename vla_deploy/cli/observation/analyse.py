@@ -4,13 +4,15 @@ import argparse
 from collections.abc import Iterator
 from typing import Any, Final
 
-from vla_deploy.analysis.abilities import Abilities
-from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
+from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Analyser, SceneQuestion, question_about
+from vla_deploy.analysis.question import Analyser, question_about
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
+from vla_deploy.feasibility.abilities import Abilities
+from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.verdict import Task
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
 

@@ -19,8 +19,8 @@ from vla_deploy.planning.dialogue.confirmation import confirmation_of
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Snapshot, read_snapshot
 from vla_deploy.world.report import read_report

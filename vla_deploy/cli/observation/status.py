@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.session import attach
-from vla_deploy.navigation.localising.place_judge import DOUBT_TEXT, Doubt
+from vla_deploy.client.place_state import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome
 from vla_deploy.telemetry.robot_state import collect
 

@@ -30,7 +30,7 @@ from vla_deploy.cli.operation.say import line_of
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.cli.twin import SteppingClock, ask_referee
 from vla_deploy.client.action_words import action_words
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 

@@ -11,10 +11,10 @@ from typing import Any
 from drivers.twin_page import TwinPace
 from vla_deploy.cli.commands import add_top_command, whole_number
 from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.gateways.parameter_file import with_parameters
 from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.runtime.logs import journal_stream
 from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
-from vla_deploy.supervisor.parameter_file import with_parameters
 from vla_deploy.supervisor.profiles.profile_choice import start_profile
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor

@@ -5,9 +5,9 @@ from functools import partial
 from typing import Final
 
 from drivers.twin_page import TwinPace
+from vla_deploy.client.place_state import DOUBT_TEXT, Doubt
 from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
 from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
-from vla_deploy.navigation.localising.place_judge import DOUBT_TEXT, Doubt
 
 _LOADING_S: Final = 30.0
 """Models may load for this long after a start without an alarm."""

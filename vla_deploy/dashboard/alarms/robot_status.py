@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
+from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import BY_NAME, TOPICS, Sample, TopicKind
-from vla_deploy.navigation.localising.place_judge import Doubt, PlaceState
 
 Document = Mapping[str, Any]
 DOCUMENTS: Final = frozenset(

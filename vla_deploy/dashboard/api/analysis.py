@@ -15,8 +15,8 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.access.rates import TokenBuckets
 from vla_deploy.dashboard.errors import ApiError
-from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.errors import MapInvalid
 from vla_deploy.world import SceneUnreadable
 
 # Threads that wait for their turn are missing for other answers.
@@ -70,8 +70,8 @@ class Analyst:
 
 
 def _geometric_analyser(robot: str) -> Analyser:
-    from vla_deploy.analysis.abilities import Abilities  # takes pinocchio with it
     from vla_deploy.analysis.geometric import GeometricAnalyser
+    from vla_deploy.feasibility.abilities import Abilities  # takes pinocchio with it
 
     return GeometricAnalyser(Abilities.of(load_robot(robot)))
 

@@ -7,10 +7,9 @@ from fastapi import APIRouter, Depends, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
-from vla_deploy.client.command_record import CommandRecord
+from vla_deploy.client.command_record import MOST_CHARACTERS, CommandRecord
 from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.errors import ApiError
-from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 

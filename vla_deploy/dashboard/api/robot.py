@@ -11,11 +11,11 @@ from fastapi import APIRouter, Depends, Request, Response
 from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.dashboard.live.camera import CameraFeed
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.maps.map_file import MapFile, read_map_file
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.errors import MapInvalid
 from vla_deploy.robots.kinematics.kinematic_tree import KinematicTree
 from vla_deploy.robots.kinematics.tree_reader import read_tree
+from vla_deploy.robots.maps.map_file import MapFile, read_map_file
 
 _DIGITS: Final = 6
 router = APIRouter(tags=["robot"], dependencies=[Depends(require(UserRole.VIEWER))])

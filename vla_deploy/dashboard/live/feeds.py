@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.dashboard.live.message import (
     LiveFeed,
     LiveMessage,
@@ -28,7 +29,6 @@ from vla_deploy.ipc import (
     TopicKind,
 )
 from vla_deploy.ipc.memory.layout import is_document
-from vla_deploy.navigation.localising.place_judge import PlaceState
 
 FASTEST_S: Final = 0.1
 ON_CHANGE_S: Final = 0.5

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from platforms import Profile
 from vla_deploy.gateways.ros.parameters import PARAMETERS
-from vla_deploy.planning.knowledge import spoken_places, words_of
+from vla_deploy.plans.knowledge import spoken_places, words_of
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
 from vla_deploy.robots.plan_bounds import Confirm

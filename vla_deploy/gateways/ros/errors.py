@@ -1,7 +1,7 @@
 """Declare what can go wrong with the ROS 2 gateway.
 
 RosGatewayError
-├── RosNotFound          no environment of ROS 2, or one that lacks a part: install it, or name it
+├── RosIncomplete        the environment of ROS 2 lacks a part: install it, or name another one
 └── ParametersUnusable   the node's parameter file cannot be used: mend it, or leave it out
 """
 
@@ -10,8 +10,8 @@ class RosGatewayError(Exception):
     """Report what keeps the robot out of the ROS graph; a person has to mend it."""
 
 
-class RosNotFound(RosGatewayError):
-    """Report that no environment of ROS 2 was found, or one that lacks a part."""
+class RosIncomplete(RosGatewayError):
+    """Report what the interpreter of ROS 2 cannot import."""
 
 
 class ParametersUnusable(RosGatewayError):

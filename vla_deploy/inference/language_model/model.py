@@ -21,7 +21,7 @@ from vla_deploy.inference.language_model.model_folder import (
 )
 from vla_deploy.inference.manifest import Language
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.runtime.deadline import Deadline
 
 # Tokens of one run. Exports score every token that they read: 3000 of a prompt at once would be
 # gigabytes of scores, of which the last is wanted, and seconds that nothing can break off.

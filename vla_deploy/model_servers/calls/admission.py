@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import Busy, TimedOut
+from vla_deploy.runtime.deadline import Deadline
 
 
 class Admission:

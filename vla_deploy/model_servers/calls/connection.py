@@ -11,9 +11,9 @@ from typing import Any, Final
 import httpcore2
 
 from vla_deploy.model_servers.calls.addresses import Resolve, check_address
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ServerUnreachable, TimedOut
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.deadline import Deadline
 
 # The client sends a buffer in a loop with one time-out for each turn: small buffers, few turns.
 _CHUNK_BYTES: Final = 16_384
@@ -45,14 +45,14 @@ class GuardedBackend(httpcore2.NetworkBackend):
             Unreachable: none of them answers.
             TimedOut: no time is left.
         """
-        addresses = self._resolve(host, port, self._deadline.bound_s(timeout))
+        addresses = self._resolve(host, port, bounded_s(self._deadline, timeout))
         for address in addresses:
             check_address(self._settings, address)
         reasons = []
         for address in addresses:
             try:
                 stream = self._inner.connect_tcp(
-                    address, port, self._deadline.bound_s(timeout), local_address, ()
+                    address, port, bounded_s(self._deadline, timeout), local_address, ()
                 )
             except (httpcore2.ConnectError, httpcore2.ConnectTimeout) as error:
                 reasons.append(f"{address}: {error}")
@@ -80,13 +80,13 @@ class _DeadlineStream(httpcore2.NetworkStream):
         self._deadline = deadline
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        silence_s = self._deadline.bound_s(timeout)
+        silence_s = bounded_s(self._deadline, timeout)
         if self._deadline.recall is None:
             return self._stream.read(max_bytes, silence_s)
         silence = Deadline.within(self._deadline.clock, silence_s)
         while True:
             try:
-                return self._stream.read(max_bytes, self._deadline.bound_s(_LOOK_S))
+                return self._stream.read(max_bytes, bounded_s(self._deadline, _LOOK_S))
             except httpcore2.ReadTimeout:
                 if silence.left_s <= 0.0:
                     raise
@@ -94,7 +94,7 @@ class _DeadlineStream(httpcore2.NetworkStream):
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         for start in range(0, len(buffer), _CHUNK_BYTES):
             chunk = buffer[start : start + _CHUNK_BYTES]
-            self._stream.write(chunk, self._deadline.bound_s(timeout))
+            self._stream.write(chunk, bounded_s(self._deadline, timeout))
 
     def close(self) -> None:
         self._stream.close()
@@ -105,12 +105,26 @@ class _DeadlineStream(httpcore2.NetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.NetworkStream:
-        bound_s = self._deadline.bound_s(timeout)
+        bound_s = bounded_s(self._deadline, timeout)
         secured = self._stream.start_tls(ssl_context, server_hostname, bound_s)
         return _DeadlineStream(secured, self._deadline)
 
     def get_extra_info(self, info: str) -> Any:
         return self._stream.get_extra_info(info)
+
+
+def bounded_s(deadline: Deadline, wanted_s: float | None = None) -> float:
+    """Return the time that one wait may take: what is wanted, at most what is left.
+
+    Raises:
+        TimedOut: nothing is left, or nobody waits any more.
+    """
+    left_s = deadline.left_s
+    if deadline.is_recalled:
+        raise TimedOut("nobody waits for the answer any more")
+    if left_s <= 0.0:
+        raise TimedOut(f"no whole answer within {deadline.given_s:g} s")
+    return left_s if wanted_s is None else min(wanted_s, left_s)
 
 
 @contextlib.contextmanager

@@ -8,7 +8,6 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from vla_deploy.model_servers.calls.addresses import Resolve, resolve
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
     AnswerTooLarge,
@@ -16,6 +15,7 @@ from vla_deploy.model_servers.errors import (
 )
 from vla_deploy.model_servers.formats.base import WireRequest
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.deadline import Deadline
 
 _BYTES_PER_KB: Final = 1024
 

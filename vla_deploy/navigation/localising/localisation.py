@@ -10,22 +10,21 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.navigation.localising.beams import placed_beams
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.hypotheses import Relocaliser
 from vla_deploy.navigation.localising.place_judge import (
     MATCH_RATIO,
     THROUGH_RATIO,
-    Doubt,
     PlaceJudge,
-    PlaceState,
     ScanVerdict,
 )
 from vla_deploy.navigation.localising.pose_filter import GATE, PoseFilter
 from vla_deploy.navigation.localising.scan_match import MIN_POINTS, Match, ScanPoints, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.maps.grid_map import GridMap
 
 # However often it is measured, no pose is better known than the map is drawn.
 MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))

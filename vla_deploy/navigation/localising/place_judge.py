@@ -4,10 +4,10 @@ The judge is pure: it takes one fact at a time and has no clock of its own.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import Doubt, PlaceState
 
 # A scan fits with MATCH_RATIO of its points on the map; a place is sure from SURE_RATIO on.
 MATCH_RATIO: Final = 0.6
@@ -20,41 +20,6 @@ SILENT_NS: Final = NS_PER_S
 UNSURE_SIGMA_M: Final = 0.15
 UNSURE_SIGMA_RAD: Final = 0.15
 LOST_SIGMA_M: Final = 0.6
-
-
-class PlaceState(IntEnum):
-    """Say what the pose is worth; the numbers are those of topic `pose`."""
-
-    TRACKING = 0
-    UNSURE = 1
-    LOST = 2
-
-
-class Doubt(IntEnum):
-    """Say why the pose is in doubt; the numbers are those of topic `pose`."""
-
-    NONE = 0
-    STARTING = 1
-    NO_SCAN = 2
-    POOR_MATCH = 3
-    THROUGH_WALLS = 4
-    INCONSISTENT = 5
-    UNCERTAIN = 6
-    AMBIGUOUS = 7
-    FOUND_AGAIN = 8
-
-
-DOUBT_TEXT: Final = {
-    Doubt.NONE: "",
-    Doubt.STARTING: "it has just started",
-    Doubt.NO_SCAN: "the lidar tells nothing of use",
-    Doubt.POOR_MATCH: "what the lidar sees does not fit the map",
-    Doubt.THROUGH_WALLS: "the lidar sees through walls of the map",
-    Doubt.INCONSISTENT: "scans contradict wheels and IMU",
-    Doubt.UNCERTAIN: "it has gone too far without a scan that fits",
-    Doubt.AMBIGUOUS: "several places of the map look like this one",
-    Doubt.FOUND_AGAIN: "it was lost and has just found a place that fits",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.maps.grid_map import GridMap
 
 Floats = NDArray[np.float64]
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.localising.scan_match import ScanPoints
 from vla_deploy.navigation.maps.cell_window import CellWindow
-from vla_deploy.navigation.maps.map_file import (
+from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
     OCCUPIED_SHADE,
     UNKNOWN_SHADE,
     MapFile,
 )
-from vla_deploy.navigation.pose import Points
 
 Floats = NDArray[np.float64]
 

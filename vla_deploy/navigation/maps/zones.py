@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
-from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.robots.description import KeepOutZone
+from vla_deploy.robots.maps.grid_map import GridMap
 
 
 def with_zones(grid: GridMap, zones: Iterable[KeepOutZone]) -> GridMap:

@@ -7,8 +7,8 @@ import numpy as np
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.geometry.rotation import angle_rad

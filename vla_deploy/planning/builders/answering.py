@@ -8,10 +8,10 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import match_place
-from vla_deploy.planning.plan import Skill
-from vla_deploy.planning.symbolic.state import Point
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
+from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.plan import Skill
+from vla_deploy.plans.symbolic.state import Point
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.memory import place_of, seen_words
 from vla_deploy.world.thing import FLOOR

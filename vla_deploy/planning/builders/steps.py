@@ -14,20 +14,14 @@ from vla_deploy.planning.builders import answering
 from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
-from vla_deploy.planning.errors import (
-    CannotBeDone,
-    Declined,
-    NotAble,
-    PlanInvalid,
-    UnknownObject,
-    UnknownPlace,
-)
+from vla_deploy.planning.errors import CannotBeDone, Declined, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import match_place
-from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
+from vla_deploy.plans.errors import PlanInvalid, UnknownObject, UnknownPlace
+from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.plan import Skill
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 

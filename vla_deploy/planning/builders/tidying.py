@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from typing import Final
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.errors import NotAble, UnknownPlace
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import match_place, words_of
-from vla_deploy.planning.plan import Skill
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.errors import UnknownPlace
+from vla_deploy.plans.knowledge import match_place, words_of
+from vla_deploy.plans.plan import Skill
 from vla_deploy.world import Thing
 
 STORE: Final = "box"

@@ -14,13 +14,14 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
-from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
+from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, PlanRequest, Proposal
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
 SURE: Final = 0.75
@@ -61,7 +62,7 @@ class ChatModel(BackEnd):
             Declined: it gives no answer in time, or none that can be read.
             CannotBeDone: the model sees no way, and says why.
             Ambiguous: the model asks something, or what it names is not clear.
-            PlanningError: what it plans may not run, also after it was sent the reason.
+            PlanError: what it plans may not run, also after it was sent the reason.
         """
         image = request.image if Aid.IMAGE in self.uses else None
         jpeg = None if image is None else small_jpeg(image)
@@ -71,7 +72,7 @@ class ChatModel(BackEnd):
             return self._proposal(answer, request)
         except (Ambiguous, CannotBeDone):
             raise
-        except PlanningError as error:
+        except PlanError as error:
             if deadline.left_s <= 0.0:
                 raise
             return self._proposal(self.ask(_refused(chat, answer, error), deadline), request)
@@ -155,7 +156,7 @@ class ServedModel(ChatModel):
         return self._server.document()
 
 
-def _refused(chat: Chat, answer: PlanAnswer, error: PlanningError) -> Chat:
+def _refused(chat: Chat, answer: PlanAnswer, error: PlanError) -> Chat:
     """Return the conversation that says why a model's plan was refused, without images."""
     before = tuple(replace(message, images=()) for message in chat.messages)
     said = ChatMessage(role=ChatRole.ASSISTANT, text=answer.model_dump_json())

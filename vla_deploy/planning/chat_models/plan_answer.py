@@ -5,10 +5,10 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
-from vla_deploy.planning.catalogue import SKILLS, SkillParameter, SkillSpec, Type
 from vla_deploy.planning.dialects import PLAN_LISTS, parse_plan
-from vla_deploy.planning.plan import MOST_ACTIONS, Plan
 from vla_deploy.planning.prompts.composing import plain
+from vla_deploy.plans.catalogue import SKILLS, SkillParameter, SkillSpec, Type
+from vla_deploy.plans.plan import MOST_ACTIONS, Plan
 
 _REASON_CHARACTERS: Final = 400
 _QUESTION_CHARACTERS: Final = 160

@@ -17,7 +17,6 @@ from vla_deploy.inference.language_model import AnswerBounds, LanguageModel, ope
 from vla_deploy.inference.manifest import Certainty, LanguageUse
 from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
@@ -35,9 +34,10 @@ from vla_deploy.planning.command_parser.wording import (
 )
 from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
-from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import order_of, proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
+from vla_deploy.plans.plan import Plan, chained
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
 NAME: Final = "command_parser"
@@ -83,7 +83,7 @@ class CommandParser(BackEnd):
 
         Raises:
             Declined: it is no command, none that can be planned, or too unsure.
-            PlanningError: what it asks for cannot be done; says why.
+            PlanError: what it asks for cannot be done; says why.
         """
         if request.failed:
             raise Declined("I read words, not what was done of them: I would begin anew")

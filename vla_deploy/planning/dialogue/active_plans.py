@@ -5,14 +5,14 @@ from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Any, Final
 
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import Carried, read_setback
 from vla_deploy.planning.recovery.strategies import RECOVERY
+from vla_deploy.plans.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+from vla_deploy.runtime.deadline import Deadline
 
 RESTARTED: Final = "the planner was started again meanwhile"
 _MOST_REMEMBERED: Final = 16

@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
+from vla_deploy.runtime.deadline import Deadline
 
 PATIENCE_S: Final = 1.0
 """So long other readings are tried."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Final
 
+from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.ipc import Event
-from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.steering import awaiting, is_stop

@@ -10,7 +10,6 @@ from threading import Event
 from typing import Any, Final
 
 from drivers.clock import Clock
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
@@ -19,7 +18,7 @@ from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.errors import CannotBeDone, PlanningError
+from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.follow_up import (
     asked_for,
@@ -27,13 +26,15 @@ from vla_deploy.planning.patterns.follow_up import (
     last_done,
 )
 from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.planning.recovery.strategies import recover
 from vla_deploy.planning.understanding import AnswerVerdict, Candidate, TurnOutcome, judge_answer
 from vla_deploy.planning.understanding.conversation import mentions_of
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.executors import InlineExecutor
 
 MOST_WAITING: Final = 8
@@ -402,7 +403,7 @@ class CommandManager:
         try:
             self._situation.check_ready()
             checked = self.planner.check(plan, request)
-        except PlanningError as error:
+        except PlanError as error:
             self.dialogue.refuse(pending.command, error, pending.answer)
             return
         proposal = pending.answer.proposal

@@ -7,12 +7,12 @@ is unsure is always asked, since it may not be what was asked for.
 from collections.abc import Iterator, Set
 from typing import Final
 
-from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.dialogue.phrasing import Says, first_part, listed, steps_in_words
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import quoted
-from vla_deploy.planning.symbolic.state import subject_of
+from vla_deploy.plans.catalogue import MOTIONLESS
+from vla_deploy.plans.plan import Plan
+from vla_deploy.plans.symbolic.state import subject_of
 from vla_deploy.robots.plan_bounds import Confirm
 
 # Below that the words may mean something else, or may have been other words.

@@ -20,9 +20,8 @@ from vla_deploy.planning.dialogue.confirmation import (
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery.setback import numbered
 from vla_deploy.planning.understanding import (
     AnswerVerdict,
@@ -34,6 +33,8 @@ from vla_deploy.planning.understanding import (
     judge_answer,
 )
 from vla_deploy.planning.understanding.conversation import ANSWER_LIMIT_S, mentions_of
+from vla_deploy.plans.errors import PlanError, PlanInvalid
+from vla_deploy.plans.plan import Plan
 
 MOST_ASKED: Final = 3
 HELD_S: Final = 3600.0
@@ -134,7 +135,7 @@ class Dialogue:
                 self.refuse(command, unclear, answer)
             else:
                 self.pending = self._asked(done, unclear)
-        except PlanningError as error:
+        except PlanError as error:
             self.refuse(command, error, answer)
 
     def dispatch(self, done: PlannedCommand, plan: Plan) -> None:
@@ -162,7 +163,7 @@ class Dialogue:
     def refuse(
         self,
         command: UserCommand,
-        reason: PlanningError | str,
+        reason: PlanError | str,
         answer: PlanningResult | None = None,
         outcome: TurnOutcome = TurnOutcome.REFUSED,
     ) -> None:

@@ -7,10 +7,10 @@ from vla_deploy.ipc import RingWriter, SharedSpace
 from vla_deploy.ipc.announcer import Announcer
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.phrasing import Says, first_part
-from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.interfaces import PlanningResult
-from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
+from vla_deploy.plans.errors import PlanInvalid
+from vla_deploy.plans.plan import Plan
 
 # What a slot of the topic holds, less what stands next to the plan.
 MOST_PLAN_BYTES: Final = 28_000

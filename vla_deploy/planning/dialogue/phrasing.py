@@ -11,8 +11,9 @@ from enum import StrEnum
 from itertools import zip_longest
 from typing import Any, Final
 
-from vla_deploy.planning.errors import NotReadyToMove, NotUnderstood, PlanningError
-from vla_deploy.planning.plan import PUT_IN, Plan
+from vla_deploy.planning.errors import NotReadyToMove, NotUnderstood
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.plan import PUT_IN, Plan
 
 _MOST_STEPS: Final = 6
 _MOST_SPOKEN_CHARACTERS: Final = 160
@@ -43,7 +44,7 @@ class Says(StrEnum):
 
 
 # What a person hears of errors whose message is for reading.
-_SPOKEN: Final[Mapping[type[PlanningError], Says]] = {
+_SPOKEN: Final[Mapping[type[PlanError], Says]] = {
     NotUnderstood: Says.NOT_UNDERSTOOD,
     NotReadyToMove: Says.NOT_READY,
 }
@@ -67,7 +68,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
 }
 
 
-def spoken_refusal(reason: PlanningError | str) -> str:
+def spoken_refusal(reason: PlanError | str) -> str:
     """Return what is said aloud of a refusal: one sentence; the rest is to be read."""
     if isinstance(reason, Says):
         return reason

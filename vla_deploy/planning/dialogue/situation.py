@@ -17,8 +17,8 @@ from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
 from vla_deploy.world.touch import is_denied

@@ -4,19 +4,20 @@ from string import digits
 from typing import Final
 
 from vla_deploy.client.action_words import skill_words
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
+from vla_deploy.planning.errors import Declined, NotUnderstood
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
-from vla_deploy.planning.knowledge import World, match_place
 from vla_deploy.planning.patterns.follow_up import repeated
 from vla_deploy.planning.patterns.phrase import clauses
 from vla_deploy.planning.patterns.table import PATTERNS, is_thing
-from vla_deploy.planning.plan import Plan, chained
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
+from vla_deploy.plans.errors import UnknownPlace
+from vla_deploy.plans.knowledge import World, match_place
+from vla_deploy.plans.plan import Plan, chained
+from vla_deploy.runtime.deadline import Deadline
 
 NAME: Final = "patterns"
 _THERE: Final = frozenset({"here", "there", "over there", "back there"})
@@ -32,7 +33,7 @@ class Patterns(BackEnd):
 
         Raises:
             Declined: a clause fits none.
-            PlanningError: what a clause asks for cannot be done.
+            PlanError: what a clause asks for cannot be done.
         """
         del deadline  # it takes no time
         if request.failed:
@@ -50,7 +51,7 @@ def pattern_plan(request: PlanRequest) -> Plan:
 
     Raises:
         Declined: a clause fits none.
-        PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
+        PlanError: what a clause asks for cannot be done, or there is nothing to repeat.
     """
     said = clauses(request.text)
     plan = repeated(said[0], request) if len(said) == 1 else None
@@ -73,7 +74,7 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
 
     Raises:
         NotUnderstood: no pattern covers a clause.
-        PlanningError: what a clause asks for cannot be done, or is not known.
+        PlanError: what a clause asks for cannot be done, or is not known.
     """
     request = PlanRequest(command_id="", text=text, world=world, here=here)
     try:

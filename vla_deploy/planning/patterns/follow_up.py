@@ -10,10 +10,10 @@ from typing import Final
 
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import match_place, object_or_none
 from vla_deploy.planning.patterns.table import NAMED
-from vla_deploy.planning.plan import PUT_IN, Action, Plan, chained
 from vla_deploy.planning.understanding.conversation import ConversationTurn, TurnOutcome
+from vla_deploy.plans.knowledge import match_place, object_or_none
+from vla_deploy.plans.plan import PUT_IN, Action, Plan, chained
 from vla_deploy.world import UnknownWord, parse_query
 
 _AGAIN: Final = re.compile(

@@ -7,7 +7,7 @@ Some only mean: stop what you are doing. Others object to it, or hold a plan unt
 import re
 from typing import Final
 
-from vla_deploy.planning.bounds import MOST_CHARACTERS
+from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.scope import IDIOMS
 

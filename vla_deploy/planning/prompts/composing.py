@@ -9,12 +9,12 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
+from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
-from vla_deploy.planning.bounds import MOST_CHARACTERS
-from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.understanding import ConversationTurn
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 from vla_deploy.world.words import size_word

@@ -2,18 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import Any
 
-from vla_deploy.planning.plan import Action, Plan, execution_order
-
-
-class FailureCause(StrEnum):
-    """Say by what an action failed: the skill itself, or the world before or after it."""
-
-    PRECONDITION = "precondition"
-    SKILL = "skill"
-    EFFECT = "effect"
+from vla_deploy.plans.plan import Action, FailureCause, Plan, execution_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

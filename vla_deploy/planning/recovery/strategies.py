@@ -7,12 +7,13 @@ is missing between them, such as driving there, grounding puts in; the validator
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from vla_deploy.planning.errors import CannotBeDone, PlanningError
+from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import Check, PlanningResult, PlanRequest, Proposal
-from vla_deploy.planning.knowledge import object_or_none
-from vla_deploy.planning.plan import Action
-from vla_deploy.planning.recovery.setback import Carried, FailureCause
-from vla_deploy.planning.symbolic.state import state_of, subject_of
+from vla_deploy.planning.recovery.setback import Carried
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.knowledge import object_or_none
+from vla_deploy.plans.plan import Action, FailureCause
+from vla_deploy.plans.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
 BLOCKED_BY_OTHERS: Final = frozenset({"navigate_to", "move", "turn"})
@@ -43,7 +44,7 @@ def recover(carried: Carried, request: PlanRequest, check: Check) -> PlanningRes
         proposal = Proposal(plan=plan, back_end=RECOVERY, confidence=_CONFIDENCE, origin=name)
         try:
             return PlanningResult(plan=check(plan, request), proposal=proposal)
-        except PlanningError as refused:
+        except PlanError as refused:
             refusals.append(f"{name}: {refused}")
     why = "; ".join(refusals) or "nothing else is left to try"
     return PlanningResult(error=CannotBeDone(f"{error} ({why})"))

@@ -9,9 +9,9 @@ from enum import StrEnum
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.knowledge import words_of
-from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import Pose, subject_or_none
+from vla_deploy.plans.knowledge import words_of
+from vla_deploy.plans.plan import Action, Plan
+from vla_deploy.plans.symbolic.state import Pose, subject_or_none
 from vla_deploy.world import Snapshot, Thing
 from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS
 

@@ -14,8 +14,6 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Final
 
-from vla_deploy.planning.catalogue import ARMS
-from vla_deploy.planning.errors import DependsOnView, UnknownObject
 from vla_deploy.planning.understanding.phrases import (
     EXTREMES,
     HELD,
@@ -25,6 +23,8 @@ from vla_deploy.planning.understanding.phrases import (
     PRONOUNS,
     SIDES,
 )
+from vla_deploy.plans.catalogue import ARMS
+from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.query import ORDERS, PHRASES
 from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES, SYNONYMS

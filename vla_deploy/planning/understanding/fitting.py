@@ -7,11 +7,11 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Final
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.errors import DependsOnView
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.conversation import Mention, MentionRole
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
+from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
+from vla_deploy.plans.errors import DependsOnView
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.resting import IN

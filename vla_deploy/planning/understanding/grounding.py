@@ -8,27 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.errors import PlanInvalid, UnknownPlace
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.plan import (
-    MOST_ACTIONS,
-    PUT_IN,
-    Action,
-    Plan,
-    dependency_faults,
-    execution_order,
-)
-from vla_deploy.planning.symbolic.conditions import MET, Setting, is_before, is_known
-from vla_deploy.planning.symbolic.simulation import after, in_turn
-from vla_deploy.planning.symbolic.state import (
-    HeldSymbol,
-    SymbolicState,
-    state_of,
-    subject_of,
-    subject_or_none,
-)
-from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.fitting import ThingUse
 from vla_deploy.planning.understanding.places import (
@@ -41,7 +21,27 @@ from vla_deploy.planning.understanding.places import (
     thing_unless_place,
 )
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
-from vla_deploy.planning.validator import action_faults
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.errors import PlanInvalid, UnknownPlace
+from vla_deploy.plans.plan import (
+    MOST_ACTIONS,
+    PUT_IN,
+    Action,
+    Plan,
+    dependency_faults,
+    execution_order,
+)
+from vla_deploy.plans.symbolic.conditions import MET, Setting, is_before, is_known
+from vla_deploy.plans.symbolic.simulation import after, in_turn
+from vla_deploy.plans.symbolic.state import (
+    HeldSymbol,
+    SymbolicState,
+    state_of,
+    subject_of,
+    subject_or_none,
+)
+from vla_deploy.plans.symbolic.table import LOGIC
+from vla_deploy.plans.validator import action_faults
 
 LONGEST_ID: Final = 48
 # These skills want the robot before the thing, those only want it known.
@@ -137,7 +137,7 @@ class _Grounder:
         Each step is carried out in the state before the next one is asked for.
 
         Raises:
-            PlanningError: what it refers to is not known, or must be asked.
+            PlanError: what it refers to is not known, or must be asked.
         """
         given = action.parameters
         match action.skill:

@@ -4,15 +4,16 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from vla_deploy.planning.errors import NotAble, UnknownObject, UnknownPlace
-from vla_deploy.planning.knowledge import match_place, words_of
-from vla_deploy.planning.symbolic.conditions import PUT_INTO
-from vla_deploy.planning.symbolic.state import Pose, SymbolicState
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, MentionRole
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse
 from vla_deploy.planning.understanding.questions import which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
+from vla_deploy.plans.errors import UnknownObject, UnknownPlace
+from vla_deploy.plans.knowledge import match_place, words_of
+from vla_deploy.plans.symbolic.conditions import PUT_INTO
+from vla_deploy.plans.symbolic.state import Pose, SymbolicState
 from vla_deploy.world.relations import NEXT_TO
 
 Parameters = Mapping[str, Any]
@@ -86,7 +87,7 @@ def destination_of(given: Parameters, resolver: Resolver, state: SymbolicState) 
     """Return where to put it and how; without a word about it, on the nearest furniture.
 
     Raises:
-        PlanningError: where that is, is not known, or must be asked.
+        PlanError: where that is, is not known, or must be asked.
     """
     text = given.get("destination")
     if text is not None and not isinstance(text, str):

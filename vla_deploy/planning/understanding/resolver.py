@@ -7,15 +7,16 @@ answer. What nothing singles out is asked back.
 
 from dataclasses import dataclass, replace
 
-from vla_deploy.planning.catalogue import ARMS, GRASPABLE_CLASSES
-from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, MentionRole
 from vla_deploy.planning.understanding.expressions import Expression, Scope
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.questions import which_thing
+from vla_deploy.plans.catalogue import ARMS, GRASPABLE_CLASSES
+from vla_deploy.plans.errors import UnknownObject
+from vla_deploy.plans.knowledge import words_of
 from vla_deploy.world import Thing
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 

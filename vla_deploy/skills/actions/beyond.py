@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.ipc.ros_goals import MOST_POINTS, GoalKind, GoalRequest, GoalState
-from vla_deploy.planning.catalogue import MANIPULATION_TIMEOUT_S, NAVIGATION_TIMEOUT_S
+from vla_deploy.plans.catalogue import MANIPULATION_TIMEOUT_S, NAVIGATION_TIMEOUT_S
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import Skill, SkillContext

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vla_deploy.navigation.errors import NavigationError
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.actions.simple import speak
 from vla_deploy.skills.context import Skill, SkillContext, spoken

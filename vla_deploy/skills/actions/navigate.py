@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, Final, TypeVar
 
-from vla_deploy.planning.knowledge import match_place, parse_object, spoken_places
+from vla_deploy.plans.knowledge import match_place, parse_object, spoken_places
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.actions.navigate import solve_near
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
-from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.errors import UnknownObject
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.actions.navigate import solve_near
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain

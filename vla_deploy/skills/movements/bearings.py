@@ -3,8 +3,8 @@
 import math
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.follower import AT_REST, Twist
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
 

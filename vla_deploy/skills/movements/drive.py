@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.navigation.follower import (
     AT_REST,
@@ -17,7 +18,7 @@ from vla_deploy.navigation.follower import (
     Twist,
     wrap_angle,
 )
-from vla_deploy.navigation.localising.place_judge import MATCH_RATIO, PlaceState
+from vla_deploy.navigation.localising.place_judge import MATCH_RATIO
 from vla_deploy.navigation.obstacles import is_blocked, scan_points
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.actions.beyond import navigation_request, pursue, server_drives

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.knowledge import parse_object
+from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.movements.frames import to_base

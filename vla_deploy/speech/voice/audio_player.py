@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.audio.base import AudioFormat, AudioOutput, Samples
+from drivers.audio.clip import Wave
 from drivers.clock import NS_PER_S, Clock
 from drivers.reopening import Reopening
-from vla_deploy.speech.voice.clip import Wave
 
 LEAD_NS: Final = 3 * NS_PER_S // 20
 """How far ahead of its sounding the speaker gets sound: what is handed over cannot be taken back,

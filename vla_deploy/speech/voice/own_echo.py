@@ -18,9 +18,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.audio.clip import Wave
 from drivers.clock import NS_PER_S
 from vla_deploy.speech.sound import FRAME, RATE_HZ, SoundBlock, duration_ns
-from vla_deploy.speech.voice.clip import Wave
 
 BLOCK: Final = 256
 """A frame is two of them."""

@@ -9,15 +9,15 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.audio.base import AudioFormat
+from drivers.audio.espeak import ESPEAK, EspeakEngine
 from drivers.clock import NS_PER_S, Clock
+from drivers.errors import VoiceError
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.description import VoiceSettings
-from vla_deploy.speech.errors import VoiceError
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.tts import ESPEAK, EspeakEngine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""

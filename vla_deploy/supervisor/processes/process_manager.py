@@ -10,15 +10,15 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import Profile
-from vla_deploy.gateways.ros.errors import RosGatewayError
-from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.runtime.twin_members import MEMBERSHIPS
+from vla_deploy.supervisor.errors import RosNotFound
 from vla_deploy.supervisor.processes.lifecycle import Action, ProcessAct, ProcessSeen
 from vla_deploy.supervisor.processes.liveness import Liveness, Readiness, Vital
 from vla_deploy.supervisor.processes.process import ChildProcess
+from vla_deploy.supervisor.processes.ros_launching import launch_environment
 from vla_deploy.supervisor.runs.log_files import OUTPUT_SUFFIX
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE, end_leftovers
@@ -149,7 +149,7 @@ class ProcessManager:
         self._refused.pop(name, None)
         try:
             child = self._new_child(name)
-        except (OSError, RosGatewayError) as error:
+        except (OSError, RosNotFound) as error:
             self._refused[name] = str(error)
             self._children.pop(name, None)
             self.started.pop(name, None)

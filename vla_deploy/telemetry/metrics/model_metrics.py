@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Final
 
-from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.telemetry.metrics.metric import Metric, count_of
 from vla_deploy.telemetry.metrics.paths import at, each, keys, path, same
 

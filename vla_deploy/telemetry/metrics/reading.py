@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import TOPICS, CellReader, PulseReader, Sample, SharedSpace
-from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.telemetry.metrics.metric import (
     MAX_SERIES,
     Histogram,

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.maps.grid_map import load_map
 from vla_deploy.telemetry.schemas.foxglove_json import (
     MAP,
     Json,

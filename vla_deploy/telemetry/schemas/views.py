@@ -11,8 +11,8 @@ import numpy as np
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.ipc.memory.layout import is_document, record_dtype
-from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.errors import MapInvalid
 from vla_deploy.telemetry.channels import Channel
 from vla_deploy.telemetry.schemas import robot_views, scene_views
 from vla_deploy.telemetry.schemas.foxglove_json import Json, foxglove_schema
@@ -135,7 +135,7 @@ class ViewDrawer:
                 continue
             try:
                 yield one.channel, _text(one.draw(self._robot, stamp_ns))
-            except NavigationError as error:
+            except MapInvalid as error:
                 _log.warning("degraded: no %s: %s", one.channel, error)
 
     def _is_due(self, view: TopicView, stamp_ns: int) -> bool:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.navigation.maps.map_file import MapFile, MapMode, read_map_file, write_map_file
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.maps.map_file import MapFile, MapMode, read_map_file, write_map_file
 
 KEPT = load_robot("butler").home.map_path
 

@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.observation.analyse import analyser_for, as_text, ask
-from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.client.place_state import PlaceState
 
 CUP = {
     "id": "cup_1",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.vla_deploy.dashboard.conftest import Dashboard
-from vla_deploy.navigation.localising.place_judge import PlaceState
+from vla_deploy.client.place_state import PlaceState
 
 CUP = {
     "id": "cup_1",

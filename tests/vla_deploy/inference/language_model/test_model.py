@@ -19,7 +19,7 @@ from vla_deploy.inference.language_model import (
 )
 from vla_deploy.inference.language_model import model as model_module
 from vla_deploy.inference.language_model.decoding import Constraint
-from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.runtime.deadline import Deadline
 
 SCHEMA = {
     "type": "object",

@@ -6,11 +6,12 @@ import pytest
 
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.plan import chained
 from vla_deploy.planning.understanding import Conversation, ConversationTurn
+from vla_deploy.plans.errors import PlanInvalid, UnknownPlace
+from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import chained
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot
 

@@ -9,13 +9,14 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from vla_deploy.model_servers.calls.exchange import Exchange
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.planning.chat_models.chat_model import ServedModel
-from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.errors import PlanInvalid, UnknownPlace
+from vla_deploy.runtime.deadline import Deadline
 
 TIDY = "make it tidy here"
 GO = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}

@@ -12,16 +12,17 @@ from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, ModelStore, StoredModel
-from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.command_parser.certainty import Oddities
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
 from vla_deploy.planning.command_parser.wording import plain_words
-from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
+from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Forbidden, PlanRequest, Prohibition, StandingOrder
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
+from vla_deploy.runtime.deadline import Deadline
 
 WORLD = world_of(load_robot("butler"), {})
 CLOCK = MonotonicClock()
@@ -178,7 +179,7 @@ def test_a_plan_is_no_surer_than_its_words_were_heard(parser: CommandParser) -> 
     ],
 )
 def test_other_talk_gives_no_plan(parser: CommandParser, text: str) -> None:
-    with pytest.raises(PlanningError):
+    with pytest.raises(PlanError):
         parser.propose(request(text), soon())
 
 

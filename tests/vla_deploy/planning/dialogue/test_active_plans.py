@@ -9,7 +9,7 @@ from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import PlanningResult
-from vla_deploy.planning.plan import Plan
+from vla_deploy.plans.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 

@@ -4,8 +4,8 @@ import pytest
 
 from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
-from vla_deploy.planning.knowledge import World, world_of
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.plans.knowledge import World, world_of
+from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.plan_bounds import Confirm
 from vla_deploy.world import Snapshot, Thing

@@ -2,9 +2,9 @@
 
 import pytest
 
-from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.dialogue.phrasing import _PHRASES, Says, steps_in_words
-from vla_deploy.planning.plan import PUT_IN, Plan
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.plan import PUT_IN, Plan
 
 
 @pytest.mark.parametrize("sentence", Says)

@@ -2,12 +2,13 @@
 
 import pytest
 
-from vla_deploy.planning.errors import Declined, NotAble, UnknownPlace
+from vla_deploy.planning.errors import Declined, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
 from vla_deploy.planning.understanding import Conversation, ConversationTurn
+from vla_deploy.plans.errors import UnknownPlace
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {"left": None, "right": None})

@@ -4,16 +4,10 @@ from typing import Any
 
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.recovery.setback import (
-    Carried,
-    FailureCause,
-    Setback,
-    numbered,
-    read_setback,
-)
+from vla_deploy.planning.recovery.setback import Carried, Setback, numbered, read_setback
 from vla_deploy.planning.recovery.strategies import recover
+from vla_deploy.plans.plan import Action, FailureCause, Plan
 
 TAKE = ("pick_up", {"object": "cup_1"})
 MOVE = ("move", {"distance_m": 2.0, "speed_m_s": 0.2})

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from vla_deploy.planning.interfaces import PlanRequest
-from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention, MentionRole
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest

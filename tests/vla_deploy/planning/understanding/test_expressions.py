@@ -2,12 +2,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.planning.errors import DependsOnView, UnknownObject
 from vla_deploy.planning.understanding.expressions import (
     Expression,
     Scope,
     read_expression,
 )
+from vla_deploy.plans.errors import DependsOnView, UnknownObject
 
 FURNITURE = {"coffee table": "coffee_table", "kitchen table": "kitchen_table"}
 

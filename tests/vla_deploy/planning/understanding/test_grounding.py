@@ -6,12 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError, UnknownPlace
-from vla_deploy.planning.plan import PUT_IN, Action, Plan
+from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention, MentionRole
 from vla_deploy.planning.understanding.grounding import ground_plan
-from vla_deploy.planning.validator import check_plan
+from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownPlace
+from vla_deploy.plans.plan import PUT_IN, Action, Plan
+from vla_deploy.plans.validator import check_plan
 
 if TYPE_CHECKING:
     from conftest import Home
@@ -229,7 +230,7 @@ def test_any_plan_is_refused_by_name_or_grounded_and_then_judged(
     request = home.ask("cup_1", "cup_2", "ball_1", "box_1", conversation=home.spoke_of("cup_1"))
     try:
         found = ground_plan(plan_of(*steps), request)
-    except PlanningError as error:
+    except PlanError as error:
         assert str(error)
         return
     with suppress(PlanInvalid):

@@ -3,11 +3,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from vla_deploy.planning.errors import Ambiguous, NotAble, UnknownObject
+from vla_deploy.planning.errors import Ambiguous, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding import Conversation, ConversationTurn, Mention
 from vla_deploy.planning.understanding.fitting import ThingUse
 from vla_deploy.planning.understanding.resolver import Resolver
+from vla_deploy.plans.errors import UnknownObject
 from vla_deploy.world import Thing
 from vla_deploy.world.thing import Rest
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import Samples
+from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.contracts.scripted import ManualClock
@@ -23,7 +24,6 @@ from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.listener import PAGE, StopWords, build_stop_words
 from vla_deploy.speech.stop_words.spotter import Spotter
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 RATE_HZ = 16_000
 NORMAL = dataclasses.replace(load_profile("desktop").speech, stop_words="normal")

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from drivers.audio.base import AudioFormat, AudioOutput
+from drivers.audio.espeak import EspeakEngine
 from drivers.audio.pcm_stream import PcmOutput
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
@@ -14,7 +15,6 @@ from sim_twin.sensors.sound import SpeakerDevice
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.speech.voice.robot_voice import RobotVoice
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 STEP_NS = NS_PER_S // 50
 FORMAT = AudioFormat(rate_hz=16_000)

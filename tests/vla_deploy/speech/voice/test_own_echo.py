@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivers.audio.clip import Wave
+from drivers.audio.espeak import EspeakEngine
 from sim_twin.sound.acoustics import Acoustics, path, through
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.speech.sound import FRAME, RATE_HZ, SoundBlock, duration_ns, level_db
-from vla_deploy.speech.voice.clip import Wave
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 ROOM = Acoustics()
 SENTENCES = ("I have put the red cup into the box", "now I go back to the kitchen table")

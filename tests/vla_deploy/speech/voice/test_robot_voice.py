@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S
 from vla_deploy.speech.voice.robot_voice import MOST_WAITING, TAIL_NS
-from vla_deploy.speech.voice.tts import EspeakEngine
 
 if TYPE_CHECKING:
     from conftest import VoiceRig

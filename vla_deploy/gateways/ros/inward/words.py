@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.gateways.ros.inward.orders import OrderInvalid
-from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 MOST_BYTES: Final = 32_000
 """Of one message: more than any plan that the planner takes has."""

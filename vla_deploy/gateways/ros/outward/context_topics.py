@@ -11,7 +11,7 @@ from vla_deploy.gateways.ros.outward.activity import Activity
 from vla_deploy.gateways.ros.outward.objects import described, latest_last
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.part import Due, Gateway
-from vla_deploy.navigation.maps.map_file import MapFile
+from vla_deploy.robots.maps.map_file import MapFile
 
 STATE: Final = "/robot/state"
 CONTEXT: Final = "/environment/context"

@@ -28,8 +28,8 @@ from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.outward.maps import grid_message
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.ipc.rgbd_image import depths_m
-from vla_deploy.navigation.maps.map_file import MapFile
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
+from vla_deploy.robots.maps.map_file import MapFile
 
 CLOUD: Final = "/environment_map"
 GRID: Final = "/environment_map/grid"

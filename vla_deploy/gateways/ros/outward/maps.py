@@ -13,8 +13,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from vla_deploy.gateways.ros.graph import LATCHED
 from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.part import Gateway
-from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.maps.map_file import MapFile, read_map_file
+from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.maps.map_file import MapFile, read_map_file
 
 _log = logging.getLogger(__name__)
 _ZONE_COLOUR = ColorRGBA(r=0.9, g=0.1, b=0.1, a=0.8)

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.gateways.ros.environment import RosEnvironment
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.processes.ros_environment import RosEnvironment
 
 # Two robots and their servers, killed in turn: with `make campaign`, not with every test run.
 pytestmark = [pytest.mark.slow, pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]

@@ -1,0 +1,51 @@
+"""Group the errors of plans by what their author can do.
+
+PlanError
+├── UnknownPlace      name a place the robot knows
+├── UnknownObject     name a kind of object the robot knows
+│   └── DependsOnView say what it stands on, in or next to
+└── PlanInvalid       mend the plan; carries every fault
+
+`vla_deploy.planning.errors` adds why there is no plan for a command.
+"""
+
+from collections.abc import Iterable, Sequence
+
+
+class PlanError(Exception):
+    """Base of every refusal to make or to carry out a plan."""
+
+
+class UnknownPlace(PlanError):
+    """Say that a place is not in the robot file."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        super().__init__(f'I do not know the place "{name}"; I know: {", ".join(sorted(known))}')
+
+
+class UnknownObject(PlanError):
+    """Say that a kind of object is none the robot can recognise."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        super().__init__(
+            f'I do not know the object "{name}"; I can handle: {", ".join(sorted(known))}'
+        )
+
+
+class DependsOnView(UnknownObject):
+    """Say that where an object is depends on who looks, and changes while the robot drives."""
+
+    def __init__(self, name: str) -> None:
+        PlanError.__init__(
+            self,
+            f'"{name}": left, right, in front and behind change while I drive; say what it is '
+            "on, in or next to",
+        )
+
+
+class PlanInvalid(PlanError):
+    """Say everything that is wrong with a plan, in one line."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("the plan was refused: " + "; ".join(self.faults))

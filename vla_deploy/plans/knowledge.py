@@ -1,0 +1,144 @@
+"""Know what plans may refer to: things by their words, places, poses, hands, and all limits."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+from vla_deploy.plans.errors import DependsOnView, UnknownObject
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import KeepOutZone, Place
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
+from vla_deploy.world import Query, UnknownWord, parse_query
+from vla_deploy.world.query import FROM_A_VIEW
+from vla_deploy.world.reach import IsFree
+from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
+
+
+def words_of(text: str) -> list[str]:
+    """Return lower-case words without articles and punctuation."""
+    words = re.findall(r"[a-z0-9_]+", text.lower())
+    return [word for word in words if word not in ARTICLES]
+
+
+@lru_cache(maxsize=512)
+def parse_object(text: str) -> Query:
+    """Read "the red cup", "mug", "the small cup next to the book", or an id such as "cup_1".
+
+    Its kind is known of an id, too; an empty colour means any.
+
+    Raises:
+        UnknownObject: no word of it, or one word too many, is a kind or colour the robot knows.
+        DependsOnView: it says left, right, in front or behind.
+    """
+    try:
+        asked = parse_query(text)
+    except UnknownWord as error:
+        raise UnknownObject(text.strip(), OBJECT_CLASSES) from error
+    if asked.relation in FROM_A_VIEW:
+        raise DependsOnView(text.strip())
+    kind = asked.thing_id.rpartition("_")[0] or asked.kind
+    if kind not in OBJECT_CLASSES or not asked.is_named:
+        raise UnknownObject(text.strip(), OBJECT_CLASSES)
+    return replace(asked, kind=kind)
+
+
+def object_or_none(text: object) -> Query | None:
+    """Return what a text names, None where it names a place, or nothing known."""
+    if not isinstance(text, str):
+        return None
+    try:
+        return parse_object(text)
+    except UnknownObject:
+        return None
+
+
+def match_place(text: str, places: Mapping[str, str]) -> str | None:
+    """Return the place that `text` names, or None; `places` maps every spoken name to a place."""
+    spoken = " ".join(words_of(text.replace("_", " ")))
+    return places.get(spoken)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """Say what a plan may refer to, and what bounds it.
+
+    `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
+    `furniture` names the places that have something to put things on. `poses` are the robot file's
+    named poses; `holding` is which kind of object each hand holds, and is empty where that is not
+    known. `is_free` returns whether the base fits on a point of the map; None means that no map is
+    at hand. A gripper opens `opening_max_m` wide, None where that is not known.
+    """
+
+    places: Mapping[str, str]
+    poses: frozenset[str]
+    holding: Mapping[str, str | None]
+    sites: Mapping[str, Place] = field(default_factory=dict)
+    furniture: frozenset[str] = frozenset()
+    zones: tuple[KeepOutZone, ...] = ()
+    footprint_radius_m: float = 0.0
+    max_speed_m_s: float | None = None
+    opening_max_m: float | None = None
+    bounds: PlanBounds = NOT_BOUNDED
+    is_free: IsFree | None = None
+
+    def is_surface(self, name: str) -> bool:
+        """Return whether one stands before furniture at a place, not elsewhere in the room."""
+        site = self.sites.get(name)
+        return site is not None and site.pose in site.viewpoints
+
+    def surface_of(self, name: str) -> str:
+        """Return the furniture that putting something "in the kitchen" means, or the place."""
+        site = self.sites.get(name)
+        if site is None or not site.viewpoints or self.is_surface(name):
+            return name
+        first = site.viewpoints[0]
+        return next((one for one, other in self.sites.items() if other.pose == first), name)
+
+    def surfaces_of(self, name: str) -> frozenset[str]:
+        """Return a place, and the furniture that one looks at there."""
+        views = self.sites[name].viewpoints if name in self.sites else ()
+        return frozenset({name, *(one for one, site in self.sites.items() if site.pose in views)})
+
+    def nearest_surface(self, spot: tuple[float, float] | None) -> str | None:
+        """Return the place with something to put things on that is nearest, or None."""
+        poses = {name: site.pose for name, site in self.sites.items() if self.is_surface(name)}
+        if spot is None:
+            return next(iter(poses), None)
+        return min(
+            poses,
+            key=lambda name: math.dist(spot, (poses[name].x_m, poses[name].y_m)),
+            default=None,
+        )
+
+
+def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
+    """Map every name by which a place may be called, in lower case, to the place."""
+    return {
+        " ".join(words_of(spoken.replace("_", " "))): place.name
+        for place in places.values()
+        for spoken in (place.name, *place.aliases)
+    }
+
+
+def world_of(
+    robot: RobotDescription, holding: Mapping[str, str | None], is_free: IsFree | None = None
+) -> World:
+    """Return what plans for this robot may refer to; `is_free` is its map, where one is at hand."""
+    openings_m = [
+        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
+    ]
+    return World(
+        places=spoken_places(robot.places),
+        poses=frozenset(robot.poses),
+        holding=dict(holding),
+        sites=robot.places,
+        furniture=frozenset(name for name, one in robot.places.items() if one.viewpoints),
+        zones=robot.home.zones,
+        footprint_radius_m=robot.base.footprint_radius_m,
+        max_speed_m_s=robot.base.max_speed_m_s,
+        opening_max_m=max(openings_m, default=None),
+        bounds=robot.planning,
+        is_free=is_free,
+    )

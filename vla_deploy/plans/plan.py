@@ -1,0 +1,128 @@
+"""Define the one canonical plan that every planner emits and the executor runs."""
+
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+MOST_ACTIONS: Final = 100
+PUT_IN: Final = "put in"
+"""What the description of an action says that its author did not ask for."""
+
+
+Skill = tuple[str, Mapping[str, Any]]
+"""The name of a skill, and its parameters."""
+
+
+class ActionPriority(StrEnum):
+    """Rank actions whose dependencies allow either order."""
+
+    HIGH = "high"
+    MEDIUM = "medium"
+    LOW = "low"
+
+
+class Action(BaseModel):
+    """Name one skill with its parameters and what must come before it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    id: str = Field(min_length=1, max_length=64)
+    skill: str = Field(min_length=1, max_length=64)
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    depends_on: tuple[str, ...] = ()
+    priority: ActionPriority = ActionPriority.MEDIUM
+    description: str = ""
+    estimated_duration_s: float = Field(default=0.0, ge=0.0)
+    feasibility_score: float = Field(default=1.0, ge=0.0, le=1.0)
+    resources: tuple[str, ...] = ()
+    preconditions: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+
+
+class Plan(BaseModel):
+    """Answer one command with actions, or say why it is not feasible.
+
+    The planner fills in `keeps_out`: the places that nothing may enter while it is carried out.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    goal: str = Field(min_length=1)
+    summary: str = ""
+    reasoning: str = ""
+    feasible: bool = True
+    actions: tuple[Action, ...] = Field(default=(), max_length=MOST_ACTIONS)
+    safety_concerns: tuple[str, ...] = ()
+    success_criteria: tuple[str, ...] = ()
+    keeps_out: tuple[str, ...] = ()
+
+
+class FailureCause(StrEnum):
+    """Say by what an action failed: the skill itself, or the world before or after it."""
+
+    PRECONDITION = "precondition"
+    SKILL = "skill"
+    EFFECT = "effect"
+
+
+def plan_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a plan, as published in `docs/plan.schema.json`."""
+    return Plan.model_json_schema()
+
+
+_RANK: Final = {ActionPriority.HIGH: 0, ActionPriority.MEDIUM: 1, ActionPriority.LOW: 2}
+
+
+def dependency_faults(actions: Sequence[Action]) -> list[str]:
+    """Return every duplicate id, unknown dependency and cycle."""
+    ids = [action.id for action in actions]
+    faults = [
+        f'action id "{name}" is used twice' for name in sorted(set(ids)) if ids.count(name) > 1
+    ]
+    faults += [
+        f'action "{action.id}" depends on "{needed}", which is not in the plan'
+        for action in actions
+        for needed in action.depends_on
+        if needed not in ids
+    ]
+    try:
+        TopologicalSorter({action.id: action.depends_on for action in actions}).prepare()
+    except CycleError as error:
+        faults.append("the dependencies form a cycle: " + " -> ".join(reversed(error.args[1])))
+    return faults
+
+
+def execution_order(actions: Sequence[Action]) -> list[Action]:
+    """Return actions so that dependencies come first, then priority, then the order given.
+
+    Raises:
+        ValueError: the dependencies are not a directed acyclic graph; check them first.
+    """
+    waiting = list(actions)
+    finished: set[str] = set()
+    ordered: list[Action] = []
+    while waiting:
+        ready = [action for action in waiting if finished.issuperset(action.depends_on)]
+        if not ready:
+            raise ValueError("; ".join(dependency_faults(actions)))
+        chosen = min(ready, key=lambda action: _RANK[action.priority])
+        waiting.remove(chosen)
+        finished.add(chosen.id)
+        ordered.append(chosen)
+    return ordered
+
+
+def chained(skills: Sequence[Skill]) -> tuple[Action, ...]:
+    """Return the actions of skills, one after the other."""
+    return tuple(
+        Action(
+            id=f"a{number}",
+            skill=skill,
+            parameters=dict(parameters),
+            depends_on=(f"a{number - 1}",) if number > 1 else (),
+        )
+        for number, (skill, parameters) in enumerate(skills, 1)
+    )

@@ -1,0 +1,1 @@
+"""Read and write the map of a robot's home."""
