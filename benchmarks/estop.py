@@ -27,7 +27,7 @@ from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace

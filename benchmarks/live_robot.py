@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.cli.session import RobotSession
 
 PROFILE_FILE: Final = "bench.toml"

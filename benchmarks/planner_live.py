@@ -22,7 +22,7 @@ from benchmarks.percentiles import spread_s
 from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import RingReader, SharedSpace
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.sound.streams import streamed_microphone
 from sim_twin.sound.talker import Talker
 from vla_deploy.speech.node import SpeechNode

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
-from sim_twin.harness.process_stack import ProcessStack, StackFailed
+from sim_twin.harness.processes import ProcessStack, StackFailed
 
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")
 SIZES: Final = {

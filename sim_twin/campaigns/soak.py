@@ -15,7 +15,7 @@ import psutil
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
-from sim_twin.harness.stack import LockstepStack, StackNotReady
+from sim_twin.harness.lockstep_stack import LockstepStack, StackNotReady
 from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0

@@ -11,7 +11,7 @@ import numpy as np
 from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.faults.verdict import failures
 from sim_twin.faults.witness import FaultWitness
-from sim_twin.harness.stack import LockstepControl, LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepControl, LockstepStack
 
 _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
 

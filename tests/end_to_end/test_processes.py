@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from platforms import load_profile
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]

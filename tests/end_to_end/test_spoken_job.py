@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from sim_twin.sound.talker import Talker
 from vla_deploy import speech
 from vla_deploy.speech.voice.tts import EspeakEngine

@@ -22,7 +22,7 @@ from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.table import faults_of
 from sim_twin.faults.witness import FaultWitness
-from sim_twin.harness.stack import LockstepControl, LockstepStack, StackNotReady
+from sim_twin.harness.lockstep_stack import LockstepControl, LockstepStack, StackNotReady
 from sim_twin.physics.hazards import Hazard
 from sim_twin.physics.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot

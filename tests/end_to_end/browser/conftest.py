@@ -24,7 +24,7 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
 from vla_deploy.client.access.passwords import hash_password
 from vla_deploy.dashboard.access import UserRole

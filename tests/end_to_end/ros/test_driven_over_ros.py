@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.gateways.ros.shared_memory import YOUNG_S
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]

@@ -9,7 +9,7 @@ import psutil
 import pytest
 import yaml
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.gateways.ros.parameters import API_KEY_VARIABLE, PARAMETERS
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]

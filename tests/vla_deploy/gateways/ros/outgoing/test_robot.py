@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.gateways.ros.environment import RosEnvironment
 from vla_deploy.robots import load_robot
 
