@@ -139,19 +139,17 @@ def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepSta
 @pytest.fixture
 def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     """Give the real processes on the twin's time, armed."""
-    from sim_twin.harness.processes import ProcessStack
+    from sim_twin.harness.processes import armed_processes
 
     chosen = _chosen(request)
     chosen.pop("speech", None)  # the processes always have it
     options = (f"--{name}={value}" for name, value in chosen.items())
     # Sockets want a short path, which pytest's own folders are not.
-    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        stack = ProcessStack(Path(folder) / "base", "--fast", *options)
-        try:
-            stack.wait_until_armed()
-            yield stack
-        finally:
-            stack.cut()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        armed_processes(Path(folder) / "base", "--fast", *options) as stack,
+    ):
+        yield stack
 
 
 @pytest.fixture

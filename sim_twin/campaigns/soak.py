@@ -15,7 +15,8 @@ import psutil
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
-from sim_twin.harness.lockstep_stack import LockstepStack, StackNotReady
+from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.robot import RobotFailed
 from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0
@@ -97,7 +98,7 @@ class Soak:
         """Have one job done, and note how it ended; a robot that stopped is let go on after it."""
         try:
             outcome = self.stack.say(job, _JOB_S)
-        except StackNotReady as error:
+        except RobotFailed as error:
             self.stack.give(cancel=True)
             outcome = {"error": str(error)}
         self.stack.events.clear()
@@ -111,7 +112,6 @@ class Soak:
         """Be the person that a stop wants: see to it, and let the robot go on."""
         if self.stack.status()["state"] != "armed":
             self.stopped += 1
-            self.stack.insist("reset")
             self.stack.arm()
 
     def _sample(self) -> SoakSample:

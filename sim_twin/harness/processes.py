@@ -5,68 +5,83 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import psutil
 
 from drivers.audio.base import Samples
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import MonotonicClock
 from drivers.twin_clock import clock_of
 from sim_twin.faults.remote import RemoteFaults
+from sim_twin.harness.robot import VLA_DEPLOY, RobotFailed, RunningRobot, marked
 from sim_twin.physics.truth import fastest_joint
-from sim_twin.referee import ask
+from sim_twin.referee import RemoteReferee
 from sim_twin.sound.talk import said, talk
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.supervisor.runs.runtime import end_leftovers, run_id_of
+from vla_deploy.runtime.logs import RUN_ID_VARIABLE
+from vla_deploy.supervisor.runs.runtime import end_leftovers
 
-_COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
-_POLL_NS: Final = NS_PER_S // 50
-_ANSWER_S: Final = 600.0
+_READY: Final = "ready;"
+"""How the line begins by which a run says that all processes are ready."""
 _END_S: Final = 120.0
 """By the wall clock, and so for a busy computer: a process that hangs ends with the test."""
 _FRESH_S: Final = 1.0
 _TAKERS: Final = ("planner_status", "executor_status")
+_LAST_WORDS: Final = 8
 
 
-class StackFailed(Exception):
-    """Say that the processes did not come up, or that a command line was refused."""
-
-
-class ProcessStack:
+class ProcessStack(RunningRobot, RemoteReferee):
     """Hold one `vla-deploy run --twin` in a runtime directory of its own.
 
     All spans are of the twin's time, which waits for the robot's processes: a busy machine takes
     longer, and nothing else changes.
     """
 
-    def __init__(self, base: Path, *options: str) -> None:
-        """Start the processes; `options` are further words for `vla-deploy run`."""
+    program: ClassVar[tuple[str, ...]] = VLA_DEPLOY
+    act: ClassVar[tuple[str, ...]] = ("run", "--twin")
+    errors: ClassVar[int | None] = None
+    """Where standard error goes; None is that of the test."""
+
+    def __init__(
+        self,
+        base: Path,
+        *options: str,
+        log: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Start the processes; `options` are further words for the run.
+
+        What it prints goes into `log`, beside `base` unless given.
+        """
         self.base = base
         self.run_dir = base
-        self.clock: Clock = MonotonicClock()
-        """The clock of the run, once it is ready."""
+        self.clock = MonotonicClock()  # until the run is ready: the clock of the run
+        self._log = log or base.with_name(f"{base.name}.log")
         self._session: RobotSession | None = None
         self._begun: list[subprocess.Popen[str]] = []
-        self.process = subprocess.Popen(
-            self._words("run", "--twin", *options),
-            stdout=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        with self._log.open("wb") as output:
+            self.process = subprocess.Popen(
+                [*self.program, "--runtime-base", str(base), *self.act, *options],
+                stdout=output,
+                stderr=self.errors,
+                env={**os.environ, **(environment or {})},
+                start_new_session=True,
+            )
 
     def wait_until_ready(self) -> None:
         """Return once all processes run; control arms next, unless something stops it.
 
         Raises:
-            StackFailed: the run ended.
+            RobotFailed: the run ended.
         """
-        assert self.process.stdout is not None
-        if not any(line.startswith("ready;") for line in iter(self.process.stdout.readline, "")):
-            raise StackFailed("the run ended before it was ready; its last words are on stderr")
+        while not any(line.startswith(_READY) for line in self._said()):
+            if self.process.poll() is not None:
+                raise RobotFailed(f"the run ended before it was ready: {self.last_words()}")
+            self.pause(self.poll_s)
         self.run_dir = (self.base / "current").resolve()
         self.clock = clock_of(self.run_dir)
 
@@ -74,64 +89,14 @@ class ProcessStack:
         """Return once the robot takes commands.
 
         Raises:
-            StackFailed: the run ended, control does not arm, or nobody plans or carries out.
+            RobotFailed: the run ended, control does not arm, or nobody plans or carries out.
         """
         self.wait_until_ready()
         if not self.wait_until(lambda: self.state() == "armed"):
-            raise StackFailed(f"control does not arm: {self.status()['control']}")
+            raise RobotFailed(f"control does not arm: {self.status()['control']}")
         for topic in _TAKERS:
             if not self.wait_until(partial(self.document, topic, _FRESH_S)):
-                raise StackFailed(f"{topic} is silent: {self.status()['process_table']}")
-
-    # --- as a user ----------------------------------------------------------------------------
-
-    def ask(self, *words: str) -> "subprocess.CompletedProcess[str]":
-        """Run `vla-deploy WORDS` to its end."""
-        return subprocess.run(
-            self._words(*words), capture_output=True, text=True, timeout=_ANSWER_S, check=False
-        )
-
-    def begin(self, *words: str) -> "subprocess.Popen[str]":
-        """Start `vla-deploy WORDS` and do not wait for it; it ends with the run at the latest."""
-        pipe = subprocess.PIPE
-        begun = subprocess.Popen(self._words(*words), stdout=pipe, stderr=pipe, text=True)
-        self._begun.append(begun)
-        return begun
-
-    def say(self, text: str) -> dict[str, Any]:
-        """Give a command, wait for its end and return its last event.
-
-        Raises:
-            StackFailed: there is no outcome, as when nobody answers.
-        """
-        done = self.ask("say", "--json", text)
-        if not done.stdout:
-            raise StackFailed(done.stderr.strip())
-        outcome: dict[str, Any] = json.loads(done.stdout)
-        return outcome
-
-    def operate(self, act: str) -> None:
-        """Do an operator's act: estop, reset, arm, disarm or stop.
-
-        Raises:
-            StackFailed: it was refused.
-        """
-        done = self.ask(act)
-        if done.returncode:
-            raise StackFailed(done.stderr.strip())
-
-    def status(self) -> dict[str, Any]:
-        """Return what `vla-deploy status --json` tells."""
-        document: dict[str, Any] = json.loads(self.ask("status", "--json").stdout)
-        return document
-
-    def state(self) -> str:
-        """Return control's state, "silent" where control tells none."""
-        return str(self.document("control_status", _FRESH_S).get("state", "silent"))
-
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
-        """Return the newest document of a cell, empty when there is none that young."""
-        return self.session.document(topic, age_limit_s) or {}
+                raise RobotFailed(f"{topic} is silent: {self.status()['process_table']}")
 
     @property
     def session(self) -> RobotSession:
@@ -139,6 +104,40 @@ class ProcessStack:
         if self._session is None:
             self._session = RobotSession(self.run_dir, self.clock)
         return self._session
+
+    # --- as a user ----------------------------------------------------------------------------
+
+    def begin(self, *words: str, output: int = subprocess.PIPE) -> "subprocess.Popen[str]":
+        """Start `vla-deploy WORDS` and do not wait for it; it ends with the run at the latest."""
+        self._begun.append(super().begin(*words, output=output))
+        return self._begun[-1]
+
+    def say(self, text: str) -> dict[str, Any]:
+        """Give a command, wait for its end and return its last event.
+
+        Raises:
+            RobotFailed: there is no outcome, as when nobody answers.
+        """
+        done = self.ask("say", "--json", text)
+        if not done.stdout:
+            raise RobotFailed(done.stderr.strip())
+        outcome: dict[str, Any] = json.loads(done.stdout)
+        return outcome
+
+    def operate(self, act: str) -> None:
+        """Do an operator's act: estop, reset, arm, disarm or stop.
+
+        Raises:
+            RobotFailed: it was refused.
+        """
+        done = self.ask(act)
+        if done.returncode:
+            raise RobotFailed(done.stderr.strip())
+
+    def status(self) -> dict[str, Any]:
+        """Return what `vla-deploy status --json` tells."""
+        document: dict[str, Any] = json.loads(self.ask("status", "--json").stdout)
+        return document
 
     def speak(self, text: str, voice: str = "en-gb", snr_db: float | None = None) -> dict[str, Any]:
         """Let somebody in the room say a text; return when the words begin and end, host's time.
@@ -149,100 +148,46 @@ class ProcessStack:
         """
         return talk(self.run_dir, text, voice, snr_db=snr_db)
 
+    def fastest_rad_s(self) -> float:
+        """Return the speed of the fastest joint, by physics."""
+        return fastest_joint(self.truth())[1]
+
     def said(self) -> Samples:
         """Return what the robot's speaker has played since the last call, (n, channels)."""
         return said(self.run_dir)
-
-    # --- as an adversary ----------------------------------------------------------------------
-
-    def row(self, name: str) -> dict[str, Any]:
-        """Return a process' row of the supervisor's table.
-
-        Raises:
-            KeyError: there is no such process.
-        """
-        rows = {row["name"]: row for row in self.document("process_table")["processes"]}
-        row: dict[str, Any] = rows[name]
-        return row
-
-    def is_back(self, name: str, pid: int, timeout_s: float = 60.0) -> bool:
-        """Return whether another process took the place of `pid` in time, and is ready.
-
-        Raises:
-            KeyError: there is no such process.
-        """
-
-        def is_ready() -> bool:
-            row = self.row(name)
-            return row["pid"] not in (pid, None) and row["state"] == "ready"
-
-        return self.wait_until(is_ready, timeout_s)
-
-    def kill(self, name: str) -> None:
-        """End a process as `kill -9` does.
-
-        Raises:
-            KeyError: there is no such process.
-        """
-        self._signal(name, signal.SIGKILL)
-
-    def freeze(self, name: str) -> None:
-        """Let a process neither run nor end, as a machine that hangs would.
-
-        Raises:
-            KeyError: there is no such process.
-        """
-        self._signal(name, signal.SIGSTOP)
-
-    def thaw(self, name: str) -> None:
-        """Let a frozen process go on.
-
-        Raises:
-            KeyError: there is no such process.
-        """
-        self._signal(name, signal.SIGCONT)
-
-    def _signal(self, name: str, number: signal.Signals) -> None:
-        os.kill(self.row(name)["pid"], number)
 
     @property
     def faults(self) -> RemoteFaults:
         """Return the way to make the twin's devices fail."""
         return RemoteFaults(self.run_dir)
 
-    # --- as the judge -------------------------------------------------------------------------
+    # --- its end ------------------------------------------------------------------------------
 
-    def truth(self) -> dict[str, Any]:
-        """Return what the physics knows."""
-        return ask(self.run_dir, "truth")
-
-    def inside(self, name: str, container: str) -> dict[str, Any]:
-        """Return whether an object rests in a container."""
-        return ask(self.run_dir, "inside", object=name, container=container)
-
-    def fastest_rad_s(self) -> float:
-        """Return the speed of the fastest joint."""
-        return fastest_joint(self.truth())[1]
-
-    def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
-        """Return whether `condition()` came true in time."""
-        deadline_ns = self.clock.now_ns() + round(timeout_s * NS_PER_S)
-        while not condition():
-            if self.clock.now_ns() > deadline_ns:
-                return False
-            self.clock.sleep_until(self.clock.now_ns() + _POLL_NS)
-        return True
+    def last_words(self) -> str:
+        """Return the end of what the run has printed."""
+        return " | ".join(self._said()[-_LAST_WORDS:])
 
     def members(self) -> list[psutil.Process]:
         """Return every process that carries the run's id, the supervisor's descendants or not."""
-        return [one for one in psutil.process_iter() if run_id_of(one) == self.run_dir.name]
+        return marked(RUN_ID_VARIABLE, self.run_dir.name)
 
     def close(self) -> None:
-        """End the run in order; ending twice is allowed."""
+        """End the run in order; ending twice is allowed.
+
+        Raises:
+            RobotFailed: it did not end in time, and was killed.
+        """
         self._let_go()
         if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGTERM)
-        self._wait()
+            self.process.terminate()
+        try:
+            self.process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+            raise RobotFailed(
+                f"the run did not end within {_END_S:g} s and was killed: {self.last_words()}"
+            ) from None
 
     def cut(self) -> None:
         """End the run as a power cut does: its end in order takes longer than many a test."""
@@ -251,11 +196,14 @@ class ProcessStack:
             return
         self._let_go()
         self.process.kill()
-        self._wait()
+        self.process.wait()
         members = self.members()
         end_leftovers(self.run_dir.name)
         psutil.wait_procs(members, timeout=_END_S)
         shutil.rmtree((self.run_dir / "ipc").resolve(), ignore_errors=True)
+
+    def _said(self) -> list[str]:
+        return self._log.read_text(encoding="utf-8", errors="replace").splitlines()
 
     def _let_go(self) -> None:
         if self._session is not None:
@@ -266,10 +214,17 @@ class ProcessStack:
             begun.communicate()  # closes its pipes, too
         self._begun.clear()
 
-    def _wait(self) -> None:
-        self.process.wait(_END_S)
-        if self.process.stdout is not None:
-            self.process.stdout.close()
 
-    def _words(self, *words: str) -> list[str]:
-        return [*_COMMAND, "--runtime-base", str(self.base), *words]
+@contextmanager
+def armed_processes(base: Path, *options: str) -> Iterator[ProcessStack]:
+    """Give the real processes, armed, and cut them off at the end.
+
+    Raises:
+        RobotFailed: they do not come up and arm.
+    """
+    stack = ProcessStack(base, *options)
+    try:
+        stack.wait_until_armed()
+        yield stack
+    finally:
+        stack.cut()

@@ -51,13 +51,7 @@ def launch() -> Iterator[Launch]:
     runners = []
 
     def start(mode: str, rules: ServiceRules = QUICK) -> ServiceRunner:
-        runner = ServiceRunner(
-            [sys.executable, "-c", SERVICE, mode],
-            os.environ,
-            watchdog_s=1.0,
-            restart_s=0.05,
-            rules=rules,
-        )
+        runner = ServiceRunner([sys.executable, "-c", SERVICE, mode], os.environ, rules)
         runners.append(runner)
         runner.start()
         return runner
