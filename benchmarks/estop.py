@@ -27,7 +27,7 @@ from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
-from sim_twin.harness.lockstep_stack import LockstepControl
+from sim_twin.harness.lockstep_stack import lockstep_robot
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.ipc.stop_button import StopButton
@@ -93,20 +93,18 @@ def _ask_again_and_again(robot: ProcessStack, requests: int, draw: random.Random
 
 def standstill_s(phase: Phase) -> float:
     """Return how long everything takes to rest after a request in a phase of the work."""
-    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        stack = LockstepControl(Path(folder))
-        stack.add_senses()
-        try:
-            stage = PhaseStage(stack)
-            stage.begin(phase)
-            began_s = stack.lockstep.now_s
-            stack.operate("estop")
-            while stack.lockstep.now_s - began_s < _LONGEST_S:
-                stage.run_for(_LOOK_S)
-                if fastest_joint(stack.lockstep.truth())[1] < STANDSTILL_RAD_S:
-                    return stack.lockstep.now_s - began_s
-        finally:
-            stack.close()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        closing(lockstep_robot(Path(folder), takes_all=False)) as stack,
+    ):
+        stage = PhaseStage(stack)
+        stage.begin(phase)
+        began_s = stack.lockstep.now_s
+        stack.operate("estop")
+        while stack.lockstep.now_s - began_s < _LONGEST_S:
+            stage.run_for(_LOOK_S)
+            if fastest_joint(stack.lockstep.truth())[1] < STANDSTILL_RAD_S:
+                return stack.lockstep.now_s - began_s
     raise NoStop(f"{phase.value}: not at rest {_LONGEST_S:g} s after the request")
 
 

@@ -200,6 +200,15 @@ class LockstepStack(LockstepControl):
         return self._outcomes.pop(command_id)
 
 
+def lockstep_robot(tmp_path: Path, seed: int = 0, *, takes_all: bool) -> LockstepControl:
+    """Return the whole stack, or, at a fraction of its cost, control and what it drives by."""
+    if takes_all:
+        return LockstepStack(tmp_path, seed)
+    control = LockstepControl(tmp_path, seed)
+    control.add_senses()
+    return control
+
+
 class SensesNode:
     """Publish what a driving base is judged by where perception, which needs a camera, is away.
 

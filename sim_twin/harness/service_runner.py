@@ -108,10 +108,6 @@ class ServiceRunner:
         self._set(state=RunnerState.STARTING)
         self._thread.start()
 
-    def wait_ready(self, timeout_s: float = 60.0) -> bool:
-        """Wait until the service is ready; return whether it is."""
-        return self.wait_for(RunnerState.READY, timeout_s)
-
     def wait_for(self, state: RunnerState, timeout_s: float) -> bool:
         """Wait for a state; return whether it came."""
         with self._changed:

@@ -5,6 +5,7 @@ import math
 import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +23,7 @@ from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.table import faults_of
 from sim_twin.faults.witness import FaultWitness
-from sim_twin.harness.lockstep_stack import LockstepControl, LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepControl, lockstep_robot
 from sim_twin.harness.robot import RobotFailed
 from sim_twin.physics.hazards import Hazard
 from sim_twin.physics.truth import STANDSTILL_RAD_S
@@ -118,15 +119,12 @@ def play(cell: Cell, seed: int = 0) -> CampaignCase:
     """Play one case on a robot of its own and judge it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         takes_all = cell.component in _SENSORS
-        stack = (LockstepStack if takes_all else LockstepControl)(Path(folder), seed)
-        try:
-            if not takes_all:
-                stack.add_senses()
-            return _Trial(cell, stack).run()
-        except (NotSet, RobotFailed) as error:
-            return CampaignCase(name=cell.name, failures=(f"the stage could not be set: {error}",))
-        finally:
-            stack.close()
+        with closing(lockstep_robot(Path(folder), seed, takes_all=takes_all)) as stack:
+            try:
+                return _Trial(cell, stack).run()
+            except (NotSet, RobotFailed) as error:
+                why = f"the stage could not be set: {error}"
+                return CampaignCase(name=cell.name, failures=(why,))
 
 
 class _Trial:

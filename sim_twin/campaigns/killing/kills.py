@@ -131,12 +131,11 @@ def inject_all(
     drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]
 ) -> CampaignReport:
     """Do injections one after the other on one machine."""
-    with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
-        campaign = KillCampaign(Path(folder), seed)
-        try:
-            cases = [told(_injected(campaign, injection), tell) for injection in drawn]
-        finally:
-            campaign.close()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-kill-") as folder,
+        contextlib.closing(KillCampaign(Path(folder), seed)) as campaign,
+    ):
+        cases = [told(_injected(campaign, injection), tell) for injection in drawn]
     return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
