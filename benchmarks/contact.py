@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.ipc import CellReader
 from vla_deploy.robots.kinematics.model import RobotModel

@@ -25,7 +25,7 @@ from benchmarks.command import parser, rows, show
 from benchmarks.spans import REST, Spans, Tally
 from benchmarks.stopwatch import answering
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.control.judging import safety_stage
 
 _COMMAND: Final = "pick up the red cup and put it in the box"

@@ -22,8 +22,9 @@ from urllib.parse import urlsplit
 import psutil
 
 from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import arm, live_robot
+from benchmarks.live_robot import live_robot
 from drivers.clock import NS_PER_S
+from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
 
 CLIENTS: Final = 50
@@ -57,10 +58,10 @@ def measure(seconds: float = 60.0) -> dict[str, Any]:
         priority = REALTIME_PRIORITY if permitted else 0
     with (
         tempfile.TemporaryDirectory(prefix="vla-") as folder,
-        live_robot(Path(folder), realtime_priority=priority) as session,
+        live_robot(Path(folder), realtime_priority=priority) as robot,
     ):
-        arm(session)
-        return {"realtime": permitted, **_measure(session, seconds / _ROUNDS)}
+        robot.arm()
+        return {"realtime": permitted, **_measure(robot.session, seconds / _ROUNDS)}
 
 
 def _measure(session: RobotSession, seconds: float) -> dict[str, Any]:
@@ -88,17 +89,15 @@ def _span(session: RobotSession, process: psutil.Process, seconds: float) -> dic
     after, then = _ticks(session), process.cpu_times()
     spent_s = then.user + then.system - cpu.user - cpu.system
     took_s = (session.clock.now_ns() - began_ns) / NS_PER_S
-    late, ticks = after[1] - before[1], after[0] - before[0]
     return {
-        "late_ratio": late / ticks,
+        "late_ratio": after.since(before).late_ratio,
         "cpu_ratio": spent_s / took_s,
         "memory_mb": process.memory_info().rss / 2**20,
     }
 
 
-def _ticks(session: RobotSession) -> tuple[int, int]:
-    status = session.document("control_status") or {}
-    return int(status["tick"]), int(status["late_ticks"])
+def _ticks(session: RobotSession) -> TickWatch:
+    return TickWatch.of(session.document("control_status") or {})
 
 
 def _dashboard(session: RobotSession) -> tuple[psutil.Process, tuple[str, str]]:

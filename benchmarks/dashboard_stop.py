@@ -9,9 +9,7 @@ which blocks its event loop and all else of it, and after it was killed. A brows
 notice a finger is not in it.
 """
 
-import os
 import random
-import signal
 import socket
 import subprocess
 import sys
@@ -22,10 +20,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import NotReached, arm, await_change, live_robot
+from benchmarks.live_robot import live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.cli.session import RobotSession
+from sim_twin.harness.processes import ProcessStack
+from sim_twin.harness.robot import RobotFailed
 
 CLIENTS: Final = 20
 BOTH: Final = ("page", "door")
@@ -47,8 +46,8 @@ def measure(requests: int = 100, seed: int = 0) -> dict[str, Any]:
     with (
         tempfile.TemporaryDirectory(prefix="vla-") as folder,
         realtime() as permitted,  # who measures must not wait for whom it keeps busy
-        live_robot(Path(folder), REALTIME_PRIORITY if permitted else 0) as session,
-        closing(_Presser(session, random.Random(seed))) as presser,
+        live_robot(Path(folder), REALTIME_PRIORITY if permitted else 0) as robot,
+        closing(_Presser(robot, random.Random(seed))) as presser,
         busy_cores(),
     ):
         with _pages(presser.address("page")):
@@ -80,20 +79,17 @@ def _figures(way: str, times_ms: list[float]) -> dict[str, Any]:
 class _Presser:
     """Arm, press by some doors, and see when the wire tells."""
 
-    def __init__(self, session: RobotSession, draw: random.Random) -> None:
-        self.session = session
+    def __init__(self, robot: ProcessStack, draw: random.Random) -> None:
+        self.robot = robot
         self._draw = draw
-        self._witness = StopWitness(session.run_dir)
+        self._witness = StopWitness(robot.run_dir)
 
     def address(self, door: str) -> tuple[str, int]:
         """Return where a door was told to be, also once it is gone."""
         topic = {"page": "dashboard_status", "door": "stop_door_status"}[door]
-        deadline_ns = self.session.clock.now_ns() + round(_START_S * NS_PER_S)
-        while (told := self.session.document(topic)) is None:
-            if self.session.clock.now_ns() > deadline_ns:
-                raise NoStop(f"nobody tells where the {door} is; see `vla-deploy status`")
-            self.session.pause()
-        return "127.0.0.1", int(told["port"])
+        if not self.robot.wait_until(lambda: self.robot.document(topic), _START_S):
+            raise NoStop(f"nobody tells where the {door} is; see `vla-deploy status`")
+        return "127.0.0.1", int(self.robot.document(topic)["port"])
 
     def presses(
         self, count: int, doors: Sequence[str], goes_on: Callable[[], bool] = lambda: True
@@ -115,19 +111,19 @@ class _Presser:
         if not self._is_armed() or not self._witness.operates():
             return None
         with ExitStack() as opened:
-            asked_ns = self.session.clock.now_ns()
+            asked_ns = self.robot.clock.now_ns()
             for door, address in addresses.items():
                 _send(opened, door, address)
             time_ms = (self._witness.stop_frame_ns() - asked_ns) / _NS_PER_MS
-            await_change(self.session, "armed")
+            self.robot.await_change("armed")
         return time_ms
 
     def _is_armed(self) -> bool:
         try:
-            arm(self.session)
-        except NotReached:
+            self.robot.arm()
+        except RobotFailed:
             return False
-        self.session.pause(self._draw.uniform(0.02, 0.1))
+        self.robot.pause(self._draw.uniform(0.02, 0.1))
         return True
 
 
@@ -146,15 +142,15 @@ def _send(opened: ExitStack, door: str, address: tuple[str, int]) -> None:
 def _while_frozen(presser: _Presser, count: int) -> list[float]:
     """Press while the dashboard is frozen, in turns with spans in which it goes on."""
     times_ms: list[float] = []
-    clock = presser.session.clock
+    clock = presser.robot.clock
     while len(times_ms) < count:
-        with _frozen(_pid(presser.session)):
+        with _frozen(presser.robot):
             found = presser.presses(count - len(times_ms), BOTH, _for(_SETTLED_S, clock))
-            presser.session.pause(max(0.0, BLOCKED_S - _SETTLED_S))
+            presser.robot.pause(max(0.0, BLOCKED_S - _SETTLED_S))
         if not found:
             break
         times_ms += found
-        presser.session.pause(1.0)
+        presser.robot.pause(1.0)
     return times_ms
 
 
@@ -164,34 +160,30 @@ def _for(seconds: float, clock: Clock) -> Callable[[], bool]:
 
 
 @contextmanager
-def _frozen(pid: int) -> Iterator[None]:
-    os.kill(pid, signal.SIGSTOP)
+def _frozen(robot: ProcessStack) -> Iterator[None]:
+    _await_dashboard(robot)
+    robot.freeze("dashboard")
     try:
         yield
     finally:
-        os.kill(pid, signal.SIGCONT)
+        robot.thaw("dashboard")
 
 
 def _after_kills(presser: _Presser) -> list[float]:
     """Press right after each of a few kills, before the supervisor has the dashboard back."""
     times_ms: list[float] = []
     for _ in range(KILLS):
-        os.kill(_pid(presser.session), signal.SIGKILL)
+        _await_dashboard(presser.robot)
+        presser.robot.kill("dashboard")
         times_ms += presser.presses(1, BOTH)
-        presser.session.pause(BLOCKED_S)
+        presser.robot.pause(BLOCKED_S)
     return times_ms
 
 
-def _pid(session: RobotSession) -> int:
-    """Return the running dashboard's pid."""
-    deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
-    while session.clock.now_ns() < deadline_ns:
-        table = session.document("process_table") or {"processes": []}
-        for row in table["processes"]:
-            if row["name"] == "dashboard" and row["state"] == "ready":
-                return int(row["pid"])
-        session.pause()
-    raise NoStop("there is no dashboard to be without; see `vla-deploy status`")
+def _await_dashboard(robot: ProcessStack) -> None:
+    """Return once the dashboard runs."""
+    if not robot.wait_until(lambda: robot.row("dashboard")["state"] == "ready", _START_S):
+        raise NoStop("there is no dashboard to be without; see `vla-deploy status`")
 
 
 @contextmanager

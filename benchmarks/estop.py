@@ -22,15 +22,14 @@ from typing import Any, Final
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import arm, await_change, live_robot
+from benchmarks.live_robot import live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import lockstep_robot
+from sim_twin.harness.processes import ProcessStack
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
-from vla_deploy.cli.session import RobotSession
-from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 
 _PERIOD_NS: Final = NS_PER_S / load_profile("desktop").control_rate_hz
@@ -52,10 +51,10 @@ def measure(requests: int, seed: int) -> dict[str, Any]:
 def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
     with (
         realtime() as permitted,  # who measures must not wait for whom it keeps busy
-        live_robot(folder, REALTIME_PRIORITY if permitted else 0) as session,
+        live_robot(folder, REALTIME_PRIORITY if permitted else 0) as robot,
         busy_cores(),
     ):
-        ticks = _ask_again_and_again(session, requests, random.Random(seed))
+        ticks = _ask_again_and_again(robot, requests, random.Random(seed))
     if not ticks:
         raise NoStop(f"the robot stopped by itself before each of {requests} requests")
     ticks.sort()
@@ -70,45 +69,42 @@ def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
     }
 
 
-def _ask_again_and_again(session: RobotSession, requests: int, draw: random.Random) -> list[float]:
+def _ask_again_and_again(robot: ProcessStack, requests: int, draw: random.Random) -> list[float]:
     """Return, in control ticks, how long each request took to the wire.
 
     The busy machine itself may stop the robot before it is asked to: such a request is left out.
     """
     ticks = []
     with (
-        closing(SharedSpace(session.run_dir / "ipc", session.clock)) as space,
-        closing(StopButton(space, "bench", session.clock)) as button,
-        closing(StopWitness(session.run_dir)) as witness,
+        closing(StopButton(robot.session.space, "bench", robot.clock)) as button,
+        closing(StopWitness(robot.run_dir)) as witness,
     ):
         for _ in range(requests):
-            arm(session)
-            session.pause(draw.uniform(0.02, 0.1))
+            robot.arm()
+            robot.pause(draw.uniform(0.02, 0.1))
             if not witness.operates():
                 continue
-            asked_ns = session.clock.now_ns()
+            asked_ns = robot.clock.now_ns()
             button.press()
             ticks.append((witness.stop_frame_ns() - asked_ns) / _PERIOD_NS)
-            await_change(session, "armed")
+            robot.await_change("armed")
     return ticks
 
 
 def standstill_s(phase: Phase) -> float:
     """Return how long everything takes to rest after a request in a phase of the work."""
-    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        stack = LockstepControl(Path(folder))
-        stack.add_senses()
-        try:
-            stage = PhaseStage(stack)
-            stage.begin(phase)
-            began_s = stack.lockstep.now_s
-            stack.operate("estop")
-            while stack.lockstep.now_s - began_s < _LONGEST_S:
-                stage.run_for(_LOOK_S)
-                if fastest_joint(stack.lockstep.truth())[1] < STANDSTILL_RAD_S:
-                    return stack.lockstep.now_s - began_s
-        finally:
-            stack.close()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        closing(lockstep_robot(Path(folder), takes_all=False)) as stack,
+    ):
+        stage = PhaseStage(stack)
+        stage.begin(phase)
+        began_s = stack.lockstep.now_s
+        stack.operate("estop")
+        while stack.lockstep.now_s - began_s < _LONGEST_S:
+            stage.run_for(_LOOK_S)
+            if fastest_joint(stack.lockstep.truth())[1] < STANDSTILL_RAD_S:
+                return stack.lockstep.now_s - began_s
     raise NoStop(f"{phase.value}: not at rest {_LONGEST_S:g} s after the request")
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import psutil
 
 from benchmarks.command import parser, show
-from benchmarks.live_robot import PROFILE_FILE, arm, live_stack
+from benchmarks.live_robot import PROFILE_FILE, live_stack
 from drivers.clock import NS_PER_S
 from platforms import Profile, load_profile
 from vla_deploy.cli.session import RobotSession
@@ -73,14 +73,14 @@ def measure(seconds: float = 40.0, profile: str = PROFILE) -> dict[str, Any]:
     """Return delays, rates, CPU and memory of perception while the robot works.
 
     Raises:
-        StackFailed: the processes do not come up.
+        RobotFailed: the processes do not come up.
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         text = HERE.format(profile=profile)
-        with live_stack(Path(folder), text) as (_, session):
-            arm(session)
+        with live_stack(Path(folder), text) as robot:
+            robot.arm()
             used = load_profile(Path(folder) / PROFILE_FILE)
-            return _report(*_watch(session, seconds), used, profile)
+            return _report(*_watch(robot.session, seconds), used, profile)
 
 
 def _watch(session: RobotSession, seconds: float) -> tuple[_Seen, float, float]:

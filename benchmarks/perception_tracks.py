@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.perception.images.detection import Detection
 from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate

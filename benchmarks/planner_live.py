@@ -11,20 +11,18 @@ the physics too, so these are upper bounds.
 
 import tempfile
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.live_robot import PROFILE_FILE, NotReached, arm, live_stack
+from benchmarks.live_robot import PROFILE_FILE, live_stack
 from benchmarks.percentiles import spread_s
 from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.harness.process_stack import ProcessStack
-from vla_deploy.cli.session import RobotSession
-from vla_deploy.ipc import RingReader, SharedSpace
+from sim_twin.harness.processes import ProcessStack
+from sim_twin.harness.robot import RobotFailed
 
 PROFILE: Final = "jetson_orin_nano"
 ACCOUNTED: Final = ("planner", "speech")
@@ -43,36 +41,32 @@ _LOOK_S: Final = 0.004
 class _Robot:
     """Watch a running robot from outside: its plans, and whether it moves."""
 
-    def __init__(self, stack: ProcessStack, session: RobotSession, space: SharedSpace) -> None:
+    def __init__(self, stack: ProcessStack) -> None:
         self.stack = stack
-        self.session = session
-        self._plans: RingReader = space.ring_reader("plan", from_start=False)
-        self._joints = space.cell_reader("joint_state")
-        self._base = space.cell_reader("base_state")
-        self._utterances = space.ring_writer("utterance")
-        self._count = 0
+        self._session = stack.session
+        self._plans = self._session.events("plan")
 
     def rest(self) -> None:
         """End what is under way, and wait until nothing has moved for a while.
 
         Raises:
-            NotReached: the robot goes on moving, or control does not arm.
+            RobotFailed: the robot goes on moving, or control does not arm.
         """
-        self._utterances.publish({"command_id": "bench-rest", "cancel": True, "source": "bench"})
-        clock = self.session.clock
+        self._session.utter(cancel=True)
+        clock = self.stack.clock
         still_since_ns = began_ns = clock.now_ns()
         while (now_ns := clock.now_ns()) < still_since_ns + round(STILL_S * NS_PER_S):
             if now_ns > began_ns + round(REST_S * NS_PER_S):
-                raise NotReached(f"the robot does not come to rest within {REST_S:g} s")
+                raise RobotFailed(f"the robot does not come to rest within {REST_S:g} s")
             if self.moves():
                 still_since_ns = now_ns
-            self.session.pause(_LOOK_S)
-        arm(self.session)
+            self.stack.pause(_LOOK_S)
+        self.stack.arm()
         self._plans.drain()
 
     def moves(self) -> bool:
         """Return whether a wheel or a joint is faster than while the robot rests."""
-        joints, base = self._joints.latest(), self._base.latest()
+        joints, base = self._session.fresh("joint_state"), self._session.fresh("base_state")
         if joints is None or base is None:
             return False
         count = int(joints.data["joint_count"])
@@ -82,10 +76,8 @@ class _Robot:
 
     def type(self, text: str) -> int:
         """Give a command in words; return when."""
-        self._count += 1
-        now_ns = self.session.clock.now_ns()
-        message = {"command_id": f"bench-{self._count}", "text": text, "source": "bench"}
-        self._utterances.publish(message)
+        now_ns = self.stack.clock.now_ns()
+        self._session.utter(text=text)
         return now_ns
 
     def speak(self, text: str) -> int:
@@ -94,14 +86,14 @@ class _Robot:
 
     def follow(self, began_ns: int) -> tuple[float | None, float | None]:
         """Return how long the plan, and then the motion, took to come; None where none did."""
-        clock, planned_s = self.session.clock, None
+        clock, planned_s = self.stack.clock, None
         while clock.now_ns() < began_ns + round(ANSWER_S * NS_PER_S):
             for event in self._plans.drain():
                 if "plan" in event.payload:
                     planned_s = (event.stamp_ns - began_ns) / NS_PER_S
             if planned_s is not None and self.moves():
                 return planned_s, (clock.now_ns() - began_ns) / NS_PER_S
-            self.session.pause(_LOOK_S)
+            self.stack.pause(_LOOK_S)
         return planned_s, None
 
 
@@ -109,16 +101,13 @@ def measure(rounds: int = 1, spoken: bool = True, profile: str = PROFILE) -> dic
     """Return delays of typed and spoken commands, CPU and memory of the planner.
 
     Raises:
-        StackFailed: the processes do not come up.
+        RobotFailed: the processes do not come up.
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         text = HERE.format(profile=profile)
-        with (
-            live_stack(Path(folder), text) as (stack, session),
-            closing(SharedSpace(stack.run_dir / "ipc", session.clock)) as space,
-        ):
-            arm(session)
-            robot = _Robot(stack, session, space)
+        with live_stack(Path(folder), text) as stack:
+            stack.arm()
+            robot = _Robot(stack)
             texts = COMMANDS * rounds
             report = _delays("typed", texts, robot, robot.type)
             if spoken:

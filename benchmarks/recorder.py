@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.spans import REST, Spans
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.control.judging.tick_recorder import TickRecorder
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.safety import SafetyInputs

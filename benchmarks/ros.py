@@ -21,9 +21,10 @@ import psutil
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import arm, live_stack
+from benchmarks.live_robot import live_stack
 from benchmarks.percentiles import percentile
 from drivers.clock import NS_PER_S
+from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import RosSettings
@@ -48,15 +49,14 @@ def measure(seconds: float, rounds: int) -> dict[str, Any]:
     """Return the figures; `seconds` are for share and latency, `rounds` for late ticks."""
     with tempfile.TemporaryDirectory(prefix="vla-") as name:
         folder = Path(name)
-        robot = _robot(folder / "butler")
-        options = ("--robot", str(robot), "--ros")
-        with live_stack(folder, _profile(), *options) as (stack, session):
-            arm(session)
-            session.pause(_SETTLE_S)
-            process = psutil.Process(int(stack.row("ros")["pid"]))
+        options = ("--robot", str(_robot(folder / "butler")), "--ros")
+        with live_stack(folder, _profile(), *options) as robot:
+            robot.arm()
+            robot.pause(_SETTLE_S)
+            process = psutil.Process(int(robot.row("ros")["pid"]))
             environment = _environment(folder)
-            report = _share_and_latency(session, process, environment, seconds)
-            return report | _late_ticks(session, process, environment, rounds)
+            report = _share_and_latency(robot.session, process, environment, seconds)
+            return report | _late_ticks(robot.session, process, environment, rounds)
 
 
 def _share_and_latency(
@@ -92,12 +92,12 @@ def _late_ticks(
     for _ in range(rounds):
         process.suspend()
         session.pause(_SHORT_S)
-        late["without"] += _counted(session)[0]
+        late["without"] += _counted(session).late
         process.resume()
         session.pause(_SETTLE_S)
-        more, counted = _counted(session)
-        late["with"] += more
-        ticks += counted
+        counted = _counted(session)
+        late["with"] += counted.late
+        ticks += counted.ticks
     listener.kill()
     listener.communicate()
     return {
@@ -108,12 +108,11 @@ def _late_ticks(
     }
 
 
-def _counted(session: RobotSession) -> tuple[int, int]:
-    """Return how many ticks of a window were late, and how many it had."""
-    before = session.document("control_status") or {}
+def _counted(session: RobotSession) -> TickWatch:
+    """Return the ticks of a window."""
+    before = TickWatch.of(session.document("control_status") or {})
     session.pause(_WINDOW_S)
-    after = session.document("control_status") or {}
-    return after["late_ticks"] - before["late_ticks"], after["tick"] - before["tick"]
+    return TickWatch.of(session.document("control_status") or {}).since(before)
 
 
 def _robot(folder: Path) -> Path:

@@ -8,7 +8,7 @@ from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.harness.audio_streams import streamed_microphone
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.sound.talker import Talker
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import build_stop_words

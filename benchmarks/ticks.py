@@ -16,10 +16,11 @@ from typing import Any, Final
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import arm, live_robot
+from benchmarks.live_robot import live_robot
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
-from vla_deploy.cli.session import RobotSession
+from sim_twin.campaigns.ticks import TickWatch
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.control.reporting.telemetry import TickClock
 
 _PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
@@ -44,11 +45,11 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str, Any]:
-    with live_robot(folder, priority) as session, realtime() if priority else nullcontext():
-        arm(session)
-        idle = _late_ratios(session, seconds)
+    with live_robot(folder, priority) as robot, realtime() if priority else nullcontext():
+        robot.arm()
+        idle = _late_ratios(robot, seconds)
         with busy_cores():
-            loaded = _late_ratios(session, seconds)
+            loaded = _late_ratios(robot, seconds)
     return {
         f"{row}_{name}_{load}": ratio
         for load, ratios in zip(_LOADS, (idle, loaded), strict=True)
@@ -56,14 +57,13 @@ def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str
     }
 
 
-def _late_ratios(session: RobotSession, seconds: float) -> tuple[float, float]:
+def _late_ratios(robot: ProcessStack, seconds: float) -> tuple[float, float]:
     """Return the shares of control's late ticks and of the bare loop's."""
-    session.pause(_SETTLE_S)
-    before = session.document("control_status") or {}
-    bare = sleep_bare(session.clock, _PERIOD_S, seconds)
-    after = session.document("control_status") or {}
-    ticks = after["tick"] - before["tick"]
-    return (after["late_ticks"] - before["late_ticks"]) / ticks, bare.late_ticks / bare.tick
+    robot.pause(_SETTLE_S)
+    before = TickWatch.of(robot.document("control_status"))
+    bare = sleep_bare(robot.clock, _PERIOD_S, seconds)
+    ticks = TickWatch.of(robot.document("control_status")).since(before)
+    return ticks.late_ratio, bare.late_ticks / bare.tick
 
 
 def sleep_bare(clock: Clock, period_s: float, seconds: float) -> TickClock:

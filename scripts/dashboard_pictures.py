@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
-from sim_twin.harness.process_stack import ProcessStack, StackFailed
+from sim_twin.harness.processes import ProcessStack
+from sim_twin.harness.robot import RobotFailed
 
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")
 SIZES: Final = {
@@ -52,7 +53,7 @@ def main() -> None:
         try:
             stack.wait_until_armed()
             if not stack.wait_until(lambda: stack.document("dashboard_status"), READY_S):
-                raise StackFailed(
+                raise RobotFailed(
                     "the dashboard does not tell its address: vla-deploy logs dashboard"
                 )
             browser = playwright.chromium.launch(
@@ -68,14 +69,14 @@ def take_all(stack: ProcessStack, browser: Browser, out: Path, views: tuple[str,
     """Give a command, and write a picture of each view, at each size.
 
     Raises:
-        StackFailed: the robot does not come to the end of its command.
+        RobotFailed: the robot does not come to the end of its command.
     """
     url = stack.document("dashboard_status")["url"]
     for device, size in SIZES.items():
         if not stack.wait_until(
             lambda: stack.document("executor_status")["state"] == "idle", WORK_S
         ):
-            raise StackFailed(f"the robot still works after {WORK_S:g} s: vla-deploy status")
+            raise RobotFailed(f"the robot still works after {WORK_S:g} s: vla-deploy status")
         dark = THEMES[device] == "dark"
         context = browser.new_context(viewport=size, color_scheme="dark" if dark else "light")
         page = context.new_page()

@@ -1,13 +1,13 @@
 """Group what the twin refuses to do.
 
 TwinError
-├── OpenGLMissing    nothing can be rendered here: install the named packages
-├── ModelMismatch    robot file and world do not fit together: fix the named file
-├── RefereeRefusal   the referee does not know the object, container or operation
-├── FilmFault        a film cannot be written: choose another path or ending
-├── FaultRefused     the fault is unknown, not supported there, or out of range: see what is
-├── DrawingFailed    the camera's or the window's process did not start: the message says why
-└── Unreachable      no twin answers under the run directory: start one
+├── OpenGLMissing      nothing can be rendered here: install the named packages
+├── TwinModelMismatch  robot file and world do not fit together: fix the named file
+├── RefereeRefusal     the referee does not know the object, container or operation
+├── FilmFault          a film cannot be written: choose another path or ending
+├── FaultRefused       the fault is unknown, not supported there, or out of range: see what is
+├── DrawingFailed      the camera's or the window's process did not start: the message says why
+└── TwinUnreachable    no twin answers under the run directory: start one
 """
 
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from sim_twin.contracts.hardware import Hardware
     from sim_twin.faults import FaultInjector
     from sim_twin.harness.lockstep import Lockstep
-    from sim_twin.harness.process_stack import ProcessStack
+    from sim_twin.harness.lockstep_stack import LockstepStack
+    from sim_twin.harness.processes import ProcessStack
     from sim_twin.harness.remote_faults import RemoteFaults
-    from sim_twin.harness.stack import LockstepStack
 
 MARKERS = (
     "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with; "
@@ -124,7 +124,7 @@ def lockstep(make_lockstep: Callable[..., Lockstep]) -> Lockstep:
 @pytest.fixture
 def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepStack]:
     """Give the whole robot in lock-step, armed."""
-    from sim_twin.harness.stack import LockstepStack
+    from sim_twin.harness.lockstep_stack import LockstepStack
 
     run_dir = tmp_path / "twin"
     run_dir.mkdir()
@@ -139,19 +139,17 @@ def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepSta
 @pytest.fixture
 def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     """Give the real processes on the twin's time, armed."""
-    from sim_twin.harness.process_stack import ProcessStack
+    from sim_twin.harness.processes import armed_processes
 
     chosen = _chosen(request)
     chosen.pop("speech", None)  # the processes always have it
     options = (f"--{name}={value}" for name, value in chosen.items())
     # Sockets want a short path, which pytest's own folders are not.
-    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        stack = ProcessStack(Path(folder) / "base", "--fast", *options)
-        try:
-            stack.wait_until_armed()
-            yield stack
-        finally:
-            stack.cut()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        armed_processes(Path(folder) / "base", "--fast", *options) as stack,
+    ):
+        yield stack
 
 
 @pytest.fixture

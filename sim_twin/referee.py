@@ -38,7 +38,7 @@ def ask(run_dir: Path, op: str, **arguments: Any) -> dict[str, Any]:
     """Ask the twin under `run_dir` and return its answer.
 
     Raises:
-        Unreachable: no twin answers there.
+        TwinUnreachable: no twin answers there.
         RefereeRefusal: the twin does not know the operation, or what it was asked about.
     """
     if op not in _SOCKET_AND_ARGUMENTS:
@@ -54,13 +54,26 @@ def ask(run_dir: Path, op: str, **arguments: Any) -> dict[str, Any]:
     return answer
 
 
-def told_hazards(run_dir: Path) -> tuple[str, ...]:
-    """Return in words what the twin under `run_dir` saw go wrong since its watch began.
+class RemoteReferee:
+    """Judge a run in other processes by its physics; all raise `TwinUnreachable` without a twin."""
 
-    Raises:
-        Unreachable: no twin answers there.
-    """
-    return tuple(found["text"] for found in ask(run_dir, "hazards", begin="")["hazards"])
+    run_dir: Path
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the physics knows."""
+        return ask(self.run_dir, "truth")
+
+    def inside(self, name: str, container: str) -> dict[str, Any]:
+        """Return whether an object rests in a container."""
+        return ask(self.run_dir, "inside", object=name, container=container)
+
+    def begin_watch(self) -> None:
+        """Forget the hazards seen so far."""
+        ask(self.run_dir, "hazards", begin="yes")
+
+    def hazards(self) -> tuple[str, ...]:
+        """Return the hazards since the watch began, in words."""
+        return tuple(found["text"] for found in ask(self.run_dir, "hazards", begin="")["hazards"])
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -12,7 +12,7 @@ from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.pressing import pressure
-from sim_twin.campaigns.report import CampaignReport, make_room
+from sim_twin.campaigns.report import CampaignReport, NoRoom, make_room
 from sim_twin.campaigns.selection import NothingChosen
 from sim_twin.campaigns.switching import switches
 from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_number
@@ -39,9 +39,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(argv)
     progress = _to_stderr if options.json else _to_stdout
     try:
-        _make_room(options.junit)
+        if options.junit is not None:
+            make_room(options.junit)
         report = CAMPAIGNS[options.campaign](options, progress)
-    except (NothingChosen, _NoRoom) as error:
+    except (NothingChosen, NoRoom) as error:
         _to_stderr(f"validate {options.campaign}: {error}")
         return 2
     except KeyboardInterrupt:
@@ -56,19 +57,6 @@ def start(argv: Sequence[str] | None = None) -> int:
     """Run it as a process of its own, which SIGTERM ends in order."""
     end_on_sigterm()
     return main(argv)
-
-
-class _NoRoom(Exception):
-    """Say why no report can be written where `--junit` wants it."""
-
-
-def _make_room(junit: Path | None) -> None:
-    """Make the folder of the report before anything is played: hours later it is too late."""
-    try:
-        if junit is not None:
-            make_room(junit)
-    except OSError as error:
-        raise _NoRoom(f"--junit {junit}: {error.strerror}: {error.filename}") from error
 
 
 def _to_stdout(line: str) -> None:

@@ -31,7 +31,7 @@ def table_with_hog(wish: Path) -> tuple[ProcessSpec, ...]:
 def main(argv: Sequence[str] | None = None) -> None:
     """Run until SIGTERM."""
     parser = argparse.ArgumentParser(prog="hosted", description=__doc__)
-    parser.add_argument("--base", type=Path, required=True)
+    parser.add_argument("--runtime-base", type=Path, required=True)
     parser.add_argument("--profile", required=True)
     parser.add_argument("--probe-root", type=Path, default=Path("/"))
     parser.add_argument("--wish", type=Path, help="what the hog uses; none without")
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         profile=given.profile,
         twin=True,
         seed=given.seed,
-        runtime_base=given.base,
+        runtime_base=given.runtime_base,
         arm=True,
         probe_root=given.probe_root,
         pace=TwinPace.WALL,  # lateness and budgets are judged by the wall clock
@@ -50,6 +50,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     table = TABLE if given.wish is None else table_with_hog(given.wish)
     with Supervisor(options, table) as supervisor:
         supervisor.start()
+        sys.stdout.write("ready;\n")  # as `vla-deploy run` says it
+        sys.stdout.flush()
         supervisor.run_until_stopped()
 
 

@@ -12,6 +12,7 @@ from statistics import median
 from typing import Any, Final
 
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.harness.robot import VLA_DEPLOY
 
 BUSY_LOOPS: Final = 8
 COUNT: Final = 10
@@ -79,7 +80,7 @@ def _demo(seed: int) -> Outcome:
         base, out = Path(folder) / "base", Path(folder) / "out"
         words = ["--runtime-base", str(base), "demo", "--json", "--seed", str(seed)]
         done = subprocess.run(
-            [sys.executable, "-m", "vla_deploy.cli", *words, "--out", str(out)],
+            [*VLA_DEPLOY, *words, "--out", str(out)],
             capture_output=True,
             text=True,
             timeout=_LONGEST_S,

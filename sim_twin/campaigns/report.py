@@ -3,7 +3,7 @@
 import errno
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -70,8 +70,27 @@ class CampaignReport:
         return "\n".join(lines)
 
     def write_junit(self, path: Path) -> None:
-        """Write what CI servers read."""
-        write_junit(path, self.campaign, self.cases)
+        """Write the cases in the JUnit format, which CI servers read."""
+        counts = {
+            "name": self.campaign,
+            "tests": str(len(self.cases)),
+            "failures": str(len(self.failed)),
+            "errors": "0",
+            "skipped": str(len(self.skipped)),
+        }
+        root = ElementTree.Element("testsuites")
+        node = ElementTree.SubElement(root, "testsuite", counts)
+        for case in self.cases:
+            seconds = f"{case.seconds:.3f}"
+            child = ElementTree.SubElement(
+                node, "testcase", classname=self.campaign, name=case.name, time=seconds
+            )
+            for failure in case.failures:
+                ElementTree.SubElement(child, "failure", message=failure)
+            if case.skipped:
+                ElementTree.SubElement(child, "skipped", message=case.skipped)
+            ElementTree.SubElement(child, "system-out").text = json.dumps(case.figures)
+        ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
 def told(case: CampaignCase, tell: Callable[[str], None]) -> CampaignCase:
@@ -80,41 +99,24 @@ def told(case: CampaignCase, tell: Callable[[str], None]) -> CampaignCase:
     return case
 
 
-def make_room(path: Path) -> None:
-    """Make the folder of a file that is to be written later.
+class NoRoom(Exception):
+    """Say why no report can be written where `--junit` wants it."""
+
+
+def make_room(junit: Path) -> None:
+    """Make the folder of the report before anything is played: hours later it is too late.
 
     Raises:
-        OSError: it cannot be made, or no file can be written there.
+        NoRoom: it cannot be made, or no file can be written there.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise PermissionError(errno.EACCES, "it cannot be written", str(path))
-
-
-def write_junit(path: Path, suite: str, cases: Sequence[CampaignCase]) -> None:
-    """Write cases in the JUnit format."""
-    counts = {
-        "name": suite,
-        "tests": str(len(cases)),
-        "failures": str(sum(bool(case.failures) for case in cases)),
-        "errors": "0",
-        "skipped": str(sum(bool(case.skipped) for case in cases)),
-    }
-    root = ElementTree.Element("testsuites")
-    node = ElementTree.SubElement(root, "testsuite", counts)
-    for case in cases:
-        seconds = f"{case.seconds:.3f}"
-        child = ElementTree.SubElement(
-            node, "testcase", classname=suite, name=case.name, time=seconds
-        )
-        for failure in case.failures:
-            ElementTree.SubElement(child, "failure", message=failure)
-        if case.skipped:
-            ElementTree.SubElement(child, "skipped", message=case.skipped)
-        ElementTree.SubElement(child, "system-out").text = json.dumps(case.figures)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    try:
+        junit.parent.mkdir(parents=True, exist_ok=True)
+        if junit.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "it is a folder", str(junit))
+        if not os.access(junit if junit.exists() else junit.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, "it cannot be written", str(junit))
+    except OSError as error:
+        raise NoRoom(f"--junit {junit}: {error.strerror}: {error.filename}") from error
 
 
 def _short(value: object) -> str:

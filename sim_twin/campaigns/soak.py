@@ -5,6 +5,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -13,16 +14,16 @@ import numpy as np
 import psutil
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.growth import slope, warm
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
-from sim_twin.harness.stack import LockstepStack, StackNotReady
+from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.robot import RobotFailed
 from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0
 LEAST_JOBS_RATIO: Final = 0.8
 """So many jobs must end well: a robot that is stuck at the first one grows by nothing either."""
-_WARM_UP_RATIO: Final = 0.25
-"""Caches of libraries fill up in the first quarter; growth is judged after it."""
 _SMALL_BLOCK_BYTES: Final = 1024
 _BLOCKS_KEPT: Final = 7
 """numpy keeps so many freed blocks of each size below for the next array (NBUCKETS and NCACHE in
@@ -97,7 +98,7 @@ class Soak:
         """Have one job done, and note how it ended; a robot that stopped is let go on after it."""
         try:
             outcome = self.stack.say(job, _JOB_S)
-        except StackNotReady as error:
+        except RobotFailed as error:
             self.stack.give(cancel=True)
             outcome = {"error": str(error)}
         self.stack.events.clear()
@@ -111,7 +112,6 @@ class Soak:
         """Be the person that a stop wants: see to it, and let the robot go on."""
         if self.stack.status()["state"] != "armed":
             self.stopped += 1
-            self.stack.insist("reset")
             self.stack.arm()
 
     def _sample(self) -> SoakSample:
@@ -141,13 +141,12 @@ def growth(samples: Sequence[SoakSample], field: str, per: str = "sim_h") -> flo
     Raises:
         ValueError: there are too few samples to tell.
     """
-    too_few, warm = _too_few(samples), _warm(samples)
+    too_few = _too_few(samples)
     if too_few:
         raise ValueError(too_few)
-    hours = np.array([getattr(sample, per) for sample in warm])
-    values = np.array([float(getattr(sample, field)) for sample in warm])
-    slope: float = np.polynomial.Polynomial.fit(hours, values, 1).convert().coef[-1]
-    return float(slope)
+    judged = warm(samples)
+    hours = [getattr(sample, per) for sample in judged]
+    return slope(hours, [getattr(sample, field) for sample in judged])
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
@@ -159,12 +158,11 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     names = chosen((*_MUST_NOT_GROW, "memory", "jobs"), options.only, str)
     give_large_blocks_back()  # as every process of the robot does
     fill_cache_of_small_arrays()
-    with tempfile.TemporaryDirectory(prefix="vla-soak-") as folder:
-        soak = Soak(Path(folder), options.seed)
-        try:
-            samples = soak.work(options.hours, tell)
-        finally:
-            soak.close()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-soak-") as folder,
+        closing(Soak(Path(folder), options.seed)) as soak,
+    ):
+        samples = soak.work(options.hours, tell)
     cases = (*judge(samples), jobs_case(soak.done, len(soak.failed)))
     mine = tuple(case for case in cases if case.name in names)
     return CampaignReport(campaign="soak", cases=mine, summary=_summary(soak, samples))
@@ -177,21 +175,21 @@ def judge(samples: Sequence[SoakSample]) -> tuple[CampaignCase, ...]:
         return tuple(
             CampaignCase(name=name, skipped=too_few) for name in ("memory", *_MUST_NOT_GROW)
         )
-    slope = growth(samples, "memory_mib")
-    too_much = (f"grows by {slope:.2f} MiB/h, limit {MOST_MIB_PER_H:g}",)
+    mib_per_h = growth(samples, "memory_mib")
+    too_much = (f"grows by {mib_per_h:.2f} MiB/h, limit {MOST_MIB_PER_H:g}",)
     cases = [
         CampaignCase(
             name="memory",
-            failures=too_much if slope > MOST_MIB_PER_H else (),
+            failures=too_much if mib_per_h > MOST_MIB_PER_H else (),
             figures={
-                "mib_per_sim_h": slope,
+                "mib_per_sim_h": mib_per_h,
                 "mib_per_wall_h": growth(samples, "memory_mib", "wall_h"),
             },
         )
     ]
-    warm = _warm(samples)
+    begin = warm(samples)[0]
     for field in _MUST_NOT_GROW:
-        first, last = getattr(warm[0], field), getattr(samples[-1], field)
+        first, last = getattr(begin, field), getattr(samples[-1], field)
         grown = (f"grew from {first} to {last}",) if last > first else ()
         cases.append(
             CampaignCase(name=field, failures=grown, figures={"first": first, "last": last})
@@ -199,13 +197,9 @@ def judge(samples: Sequence[SoakSample]) -> tuple[CampaignCase, ...]:
     return tuple(cases)
 
 
-def _warm(samples: Sequence[SoakSample]) -> Sequence[SoakSample]:
-    return samples[round(_WARM_UP_RATIO * len(samples)) :]
-
-
 def _too_few(samples: Sequence[SoakSample]) -> str:
     """Return why the samples say nothing of growth, empty where they are enough."""
-    count = len(_warm(samples))
+    count = len(warm(samples))
     enough = count >= _LEAST_SAMPLES
     return "" if enough else f"{count} samples after the warm-up, expected {_LEAST_SAMPLES}"
 

@@ -1,12 +1,11 @@
 """Give commands in words, one at a time, and see how each ends."""
 
-import uuid
 from typing import Final
 
-from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import RingReader, RingWriter
+from drivers.clock import NS_PER_S
+from vla_deploy.client.following import LAST_EVENTS
+from vla_deploy.client.link import RobotLink
 
-_LAST_EVENTS: Final = ("finished", "rejected")
 _ANSWER_NS: Final = 8 * NS_PER_S
 """After so long without a word nobody has heard the command: the planner was away."""
 
@@ -14,10 +13,9 @@ _ANSWER_NS: Final = 8 * NS_PER_S
 class CommandTalk:
     """Give commands one at a time and see how each ends, without ever waiting."""
 
-    def __init__(self, utterances: RingWriter, events: RingReader, clock: Clock) -> None:
-        self._utterances = utterances
-        self._events = events
-        self._clock = clock
+    def __init__(self, link: RobotLink) -> None:
+        self._link = link
+        self._events = link.events("task_event")
         self._now = ""
         self._answer_by_ns: int | None = None
         self.done = 0
@@ -26,19 +24,17 @@ class CommandTalk:
     @property
     def is_busy(self) -> bool:
         """Return whether the last command goes on, or may still be answered."""
-        unheard = self._answer_by_ns is not None and self._clock.now_ns() > self._answer_by_ns
+        unheard = self._answer_by_ns is not None and self._link.clock.now_ns() > self._answer_by_ns
         return bool(self._now) and not unheard
 
     def say(self, text: str) -> None:
         """Give a command; the one before is no longer followed."""
-        self._now = f"campaign-{uuid.uuid4().hex[:12]}"
-        self._answer_by_ns = self._clock.now_ns() + _ANSWER_NS
-        self._utterances.publish({"command_id": self._now, "source": "cli", "text": text})
+        self._answer_by_ns = self._link.clock.now_ns() + _ANSWER_NS
+        self._now = self._link.utter(text=text)
 
     def cancel(self) -> None:
         """End what goes on."""
-        command = {"command_id": f"campaign-{uuid.uuid4().hex[:12]}", "source": "cli"}
-        self._utterances.publish({**command, "cancel": True})
+        self._link.utter(cancel=True)
 
     def listen(self) -> None:
         """Note how the command goes on and ends."""
@@ -47,7 +43,7 @@ class CommandTalk:
             if said.get("command_id") != self._now:
                 continue
             self._answer_by_ns = None
-            if said.get("event") in _LAST_EVENTS:
+            if said.get("event") in LAST_EVENTS:
                 self._now = ""
                 success = bool(said.get("success"))
                 self.done += success

@@ -1,8 +1,8 @@
 """Count control's ticks, and say how many of them may be late."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 LATE_MARGIN_RATIO: Final = 0.01
 """So many more ticks may be late than before: other users of the computer come and go."""
@@ -15,6 +15,11 @@ class TickWatch:
 
     ticks: int
     late: int
+
+    @classmethod
+    def of(cls, status: Mapping[str, Any]) -> "TickWatch":
+        """Return what control has counted since it started, by its status."""
+        return cls(ticks=int(status.get("tick", 0)), late=int(status.get("late_ticks", 0)))
 
     @property
     def late_ratio(self) -> float:

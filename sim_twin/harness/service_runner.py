@@ -6,7 +6,6 @@ belongs to the service is found by a mark in its environment instead of by a con
 """
 
 import logging
-import os
 import secrets
 import signal
 import socket
@@ -18,12 +17,12 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 from typing import Final
 
 import psutil
 
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.harness.robot import end_process, marked
 
 MARK: Final = "SERVICE_RUNNER_MARK"
 _CREDENTIALS: Final = struct.Struct("3i")
@@ -78,18 +77,12 @@ class ServiceRunner:
         self,
         command: Sequence[str],
         env: Mapping[str, str],
-        *,
-        watchdog_s: float,
-        restart_s: float,
-        rules: ServiceRules | None = None,
-        clock: Clock | None = None,
-        log_path: Path | None = None,
+        rules: ServiceRules,
     ) -> None:
-        self.rules = rules or ServiceRules(watchdog_s=watchdog_s, restart_s=restart_s)
+        self.rules = rules
         self.report = ServiceReport()
         self._command = list(command)
-        self._log_path = log_path
-        self._clock: Clock = clock or MonotonicClock()
+        self._clock = MonotonicClock()
         self._mark = secrets.token_hex(8)
         self._folder = tempfile.TemporaryDirectory(prefix="service-")
         self._socket = _listen(f"{self._folder.name}/notify")
@@ -115,10 +108,6 @@ class ServiceRunner:
         self._set(state=RunnerState.STARTING)
         self._thread.start()
 
-    def wait_ready(self, timeout_s: float = 60.0) -> bool:
-        """Wait until the service is ready; return whether it is."""
-        return self.wait_for(RunnerState.READY, timeout_s)
-
     def wait_for(self, state: RunnerState, timeout_s: float) -> bool:
         """Wait for a state; return whether it came."""
         with self._changed:
@@ -134,7 +123,7 @@ class ServiceRunner:
 
     def members(self) -> list[psutil.Process]:
         """Return every process of the service that runs, wherever it was reparented to."""
-        return [process for process in psutil.process_iter() if _has_mark(process, self._mark)]
+        return marked(MARK, self._mark)
 
     def _serve(self) -> None:
         while not self._stop.is_set() and self._may_start():
@@ -180,17 +169,11 @@ class ServiceRunner:
         return process.wait()
 
     def _spawn(self) -> "subprocess.Popen[bytes]":
-        if self._log_path is None:
-            return self._popen(subprocess.DEVNULL)
-        with self._log_path.open("ab") as log:
-            return self._popen(log.fileno())
-
-    def _popen(self, output: int) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(
             self._command,
             env=self._environment,
             stdin=subprocess.DEVNULL,
-            stdout=output,
+            stdout=subprocess.DEVNULL,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
@@ -231,13 +214,13 @@ class ServiceRunner:
             self._set(watchdog_kills=self.report.watchdog_kills + 1)
         process.send_signal(signal.SIGABRT)
         process.send_signal(signal.SIGCONT)
-        _wait_or_kill(process, self.rules.abort_timeout_s)
+        end_process(process, self.rules.abort_timeout_s)
 
     def _terminate(self, process: "subprocess.Popen[bytes]") -> None:
         self._set(state=RunnerState.STOPPING)
         process.terminate()
         process.send_signal(signal.SIGCONT)
-        _wait_or_kill(process, self.rules.stop_timeout_s)
+        end_process(process, self.rules.stop_timeout_s)
 
     def _end_members(self) -> None:
         """Let children come to rest, then kill what is left (KillMode=mixed)."""
@@ -262,19 +245,3 @@ def _listen(path: str) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
     listener.settimeout(_POLL_S)
     return listener
-
-
-def _wait_or_kill(process: "subprocess.Popen[bytes]", timeout_s: float) -> None:
-    try:
-        process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-
-
-def _has_mark(process: psutil.Process, mark: str) -> bool:
-    try:
-        is_ours = process.environ().get(MARK) == mark
-    except (psutil.NoSuchProcess, psutil.AccessDenied):
-        return False
-    return is_ours and process.pid != os.getpid()

@@ -39,7 +39,7 @@ def talk(
     """Let somebody speak in the twin's room; return when the words begin and end, host's time.
 
     Raises:
-        Unreachable: no twin answers there.
+        TwinUnreachable: no twin answers there.
         RefereeRefusal: the robot has no microphone.
         VoiceError: the words do not become sound.
     """
@@ -62,7 +62,7 @@ def said(run_dir: Path) -> Samples:
     """Return what the robot's speaker has played since the last call, (n, channels).
 
     Raises:
-        Unreachable: no twin answers there.
+        TwinUnreachable: no twin answers there.
         RefereeRefusal: the robot has no speaker.
     """
     path = run_dir / "dev" / f"said-{os.getpid()}.wav"

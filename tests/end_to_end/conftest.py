@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.robots.loader import ROBOT_FILE, ROBOTS_DIR
 
 START = 'start = "charging_station"'

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack, armed_processes
 from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
 
@@ -33,12 +33,8 @@ def stack(coarse: str, unused_port: Callable[[], int]) -> Iterator[ProcessStack]
         settings.parent.mkdir(parents=True)
         # Of its own: the usual one would be taken by another robot while its dashboard is away.
         settings.write_text(f"port = {unused_port()}\n", encoding="utf-8")
-        stack = ProcessStack(base, "--fast", "--profile", coarse)
-        try:
-            stack.wait_until_armed()
+        with armed_processes(base, "--fast", "--profile", coarse) as stack:
             yield stack
-        finally:
-            stack.cut()
 
 
 class Page:

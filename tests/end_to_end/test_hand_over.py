@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from platforms import load_profile
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.skills.node import ExecutorNode
 
 pytestmark = pytest.mark.gl

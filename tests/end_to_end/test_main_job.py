@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from benchmarks.perception_tracks import SceneWatcher
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 
 COMMAND = "pick up the red cup and put it in the box"
 MakeStack = Callable[..., LockstepStack]

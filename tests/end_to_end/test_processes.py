@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from platforms import load_profile
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
@@ -24,9 +24,6 @@ DRIVE = "go to the kitchen"
 
 
 class Run(ProcessStack):
-    def pids(self) -> dict[str, int]:
-        return {row["name"]: row["pid"] for row in self.document("process_table")["processes"]}
-
     def drive(self) -> "subprocess.Popen[str]":
         saying = self.begin("say", DRIVE)
         moves = self.wait_until(lambda: self.fastest_rad_s() > MOVING_RAD_S)
@@ -62,10 +59,7 @@ class Runs:
 
 
 def is_as_new(run: Run) -> bool:
-    if run.process.poll() is not None or run.state() != "armed":
-        return False
-    processes = run.document("process_table")["processes"]
-    return {row["state"] for row in processes} <= {"ready", "off"}
+    return run.process.poll() is None and run.state() == "armed" and run.is_ready()
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ import pytest
 from mcap.reader import make_reader
 from websockets.sync.client import connect
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 
 pytestmark = [

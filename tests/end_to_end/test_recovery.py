@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 pytestmark = pytest.mark.gl

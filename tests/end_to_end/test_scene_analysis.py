@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.analysis.geometric import GeometricAnalyser
 from vla_deploy.cli.observation.analyse import ask
 from vla_deploy.cli.session import RobotSession

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.audio.espeak import EspeakEngine
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 from sim_twin.sound.talker import Talker
 from vla_deploy import speech
 

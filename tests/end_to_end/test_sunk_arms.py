@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 
 pytestmark = pytest.mark.gl
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from platforms import load_profile
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.perception.node import PerceptionNode
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(120)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.physics.hazards import MOST_TILT_RAD, HazardWatch
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot

@@ -5,6 +5,7 @@ import math
 import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,13 +17,14 @@ from sim_twin.campaigns.faulting.phases import PAYLOAD, NotSet, Phase, PhaseStag
 from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.campaigns.orderly_end import end_on_sigterm
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.table import faults_of
-from sim_twin.harness.stack import LockstepControl, LockstepStack, StackNotReady
+from sim_twin.harness.lockstep_stack import LockstepControl, lockstep_robot
+from sim_twin.harness.robot import RobotFailed
 from sim_twin.physics.hazards import Hazard
 from sim_twin.physics.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot
@@ -117,15 +119,12 @@ def play(cell: Cell, seed: int = 0) -> CampaignCase:
     """Play one case on a robot of its own and judge it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         takes_all = cell.component in _SENSORS
-        stack = (LockstepStack if takes_all else LockstepControl)(Path(folder), seed)
-        try:
-            if not takes_all:
-                stack.add_senses()
-            return _Trial(cell, stack).run()
-        except (NotSet, StackNotReady) as error:
-            return CampaignCase(name=cell.name, failures=(f"the stage could not be set: {error}",))
-        finally:
-            stack.close()
+        with closing(lockstep_robot(Path(folder), seed, takes_all=takes_all)) as stack:
+            try:
+                return _Trial(cell, stack).run()
+            except (NotSet, RobotFailed) as error:
+                why = f"the stage could not be set: {error}"
+                return CampaignCase(name=cell.name, failures=(why,))
 
 
 class _Trial:
@@ -217,10 +216,8 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     with multiprocessing.get_context("spawn").Pool(
         options.workers, initializer=end_on_sigterm, maxtasksperchild=20
     ) as pool:
-        cases = []
-        for case in pool.imap(partial(play, seed=options.seed), mine):
-            tell(case.row)
-            cases.append(case)
+        played = pool.imap(partial(play, seed=options.seed), mine)
+        cases = [told(case, tell) for case in played]
     return CampaignReport(campaign="faults", cases=tuple(cases), summary=_summary(cases))
 
 

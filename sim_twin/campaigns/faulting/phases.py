@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Final
 
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 
 PAYLOAD: Final = "red_cup"
 """What the left hand carries; its middle is where the hand's grip site is."""

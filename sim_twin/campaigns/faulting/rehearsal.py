@@ -11,7 +11,7 @@ import numpy as np
 from sim_twin.campaigns.faulting.verdict import failures
 from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.faults.scenario import Meanwhile, Scenario
-from sim_twin.harness.stack import LockstepControl, LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack, lockstep_robot
 
 _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5
@@ -49,11 +49,8 @@ class Rehearsal:
 
     def __init__(self, scenario: Scenario, tmp_path: Path, seed: int = 0) -> None:
         self._scenario = scenario
-        takes_all = scenario.meanwhile.takes_all
-        self._stack = (LockstepStack if takes_all else LockstepControl)(tmp_path, seed)
+        self._stack = lockstep_robot(tmp_path, seed, takes_all=scenario.meanwhile.takes_all)
         self._base_command = self._stack.space.cell_writer("base_command")
-        if not takes_all:
-            self._stack.add_senses()
         self._start_s = 0.0
 
     def run(self) -> RehearsalOutcome:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from sim_twin.faults.scenario import NO_CAUSE
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.physics.truth import STANDSTILL_RAD_S
 from vla_deploy.ipc import BY_NAME
 

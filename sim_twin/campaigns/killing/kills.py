@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from sim_twin.campaigns.killing.failures import late_ready, wrong_state
 from sim_twin.campaigns.killing.moment import Work
 from sim_twin.campaigns.killing.rest import RestWatch
 from sim_twin.campaigns.killing.rules import RULES, Injection, KillRule, injections
-from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
-from sim_twin.campaigns.robot_service import RobotService, ServiceNotReady
 from sim_twin.campaigns.selection import chosen
+from sim_twin.harness.robot import RobotFailed
+from sim_twin.harness.service import Machine, RobotService
 from vla_deploy.supervisor.table import RestartPolicy
 
 INJECTIONS: Final = 200
@@ -42,7 +41,7 @@ class KillCampaign:
         except BaseException:
             self._machine.close()
             raise
-        self._work = Work(self._robot, self._machine, self._clock)
+        self._work = Work(self._robot, self._machine)
 
     def inject(self, injection: Injection) -> CampaignCase:
         """Do one and judge it."""
@@ -61,21 +60,20 @@ class KillCampaign:
         met = self._work.meet(injection)
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()
-        pid = self._robot.signal(injection.process, injection.signal)
+        pid = self._robot.send_signal(injection.process, injection.signal)
         rest = RestWatch(rule)
         ready_s = self._follow(began_ns, rest, injection.process, pid)
         self._settle(began_ns, rest)
-        state = self._robot.control_state()
-        failures = [*self._machine.hazards(), *rest.failures(), *late_ready(rule.ready_s, ready_s)]
-        if state not in rule.states:
-            failures.append(wrong_state(state, self._robot.why(), rule.states))
+        state = self._robot.state()
+        failures = [*self._machine.hazards(), *rest.failures()]
+        failures += rule.judge(ready_s, state, self._robot.why())
         failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
         figures = {"rest_s": rest.rest_s, "ready_s": ready_s, "state": state, **met}
         return CampaignCase(
             name=injection.name,
             failures=tuple(failures),
             figures={**figures, "moved_rad": rest.moved_rad},
-            seconds=self._since(began_ns),
+            seconds=self._robot.since_s(began_ns),
         )
 
     def close(self) -> None:
@@ -100,7 +98,7 @@ class KillCampaign:
             since_s = self._look(began_ns, rest)
             if math.isinf(ready_s) and self._is_back(rule, process, pid):
                 ready_s = since_s
-            self._pause(_POLL_S if since_s < rest.least_s else _POLL_LATER_S)
+            self._robot.pause(_POLL_S if since_s < rest.least_s else _POLL_LATER_S)
         return ready_s
 
     def _settle(self, began_ns: int, rest: RestWatch) -> None:
@@ -108,24 +106,18 @@ class KillCampaign:
         end_ns = self._clock.now_ns() + round(_SETTLE_S * NS_PER_S)
         while self._clock.now_ns() < end_ns:
             self._look(began_ns, rest)
-            self._pause(_POLL_LATER_S)
+            self._robot.pause(_POLL_LATER_S)
 
     def _look(self, began_ns: int, rest: RestWatch) -> float:
-        since_s = self._since(began_ns)
+        since_s = self._robot.since_s(began_ns)
         if rest.wants(since_s):
             rest.look(since_s, self._machine.truth())
         return since_s
 
-    def _pause(self, duration_s: float) -> None:
-        self._clock.sleep_until(self._clock.now_ns() + round(duration_s * NS_PER_S))
-
-    def _since(self, began_ns: int) -> float:
-        return (self._clock.now_ns() - began_ns) / NS_PER_S
-
     def _is_back(self, rule: KillRule, process: str, pid: int) -> bool:
         if rule.ends:
             return self._robot.has_ended()
-        return self._robot.is_ready() and self._robot.pid_of(process) not in (0, pid)
+        return self._robot.is_ready() and self._robot.pids().get(process) not in (None, pid)
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
@@ -139,19 +131,18 @@ def inject_all(
     drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]
 ) -> CampaignReport:
     """Do injections one after the other on one machine."""
-    with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
-        campaign = KillCampaign(Path(folder), seed)
-        try:
-            cases = [told(_injected(campaign, injection), tell) for injection in drawn]
-        finally:
-            campaign.close()
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-kill-") as folder,
+        contextlib.closing(KillCampaign(Path(folder), seed)) as campaign,
+    ):
+        cases = [told(_injected(campaign, injection), tell) for injection in drawn]
     return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
 def _injected(campaign: KillCampaign, injection: Injection) -> CampaignCase:
     try:
         return campaign.inject(injection)
-    except ServiceNotReady as error:
+    except RobotFailed as error:
         return CampaignCase(name=injection.name, failures=(str(error),))
 
 

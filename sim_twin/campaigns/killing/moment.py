@@ -5,10 +5,9 @@ import subprocess
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S
 from sim_twin.campaigns.killing.rules import COMMANDS, PUT_DOWN, Injection, KillMoment
-from sim_twin.campaigns.machine import Machine
-from sim_twin.campaigns.robot_service import RobotService
+from sim_twin.harness.service import Machine, RobotService
 from vla_deploy.robots import load_robot
 
 MOVING_RAD_S: Final = 0.1
@@ -26,11 +25,11 @@ class Work:
     A command that outlives a kill goes on, so that the next one may hit its later part.
     """
 
-    def __init__(self, robot: RobotService, machine: Machine, clock: Clock) -> None:
+    def __init__(self, robot: RobotService, machine: Machine) -> None:
         self._robot = robot
         self._machine = machine
-        self._clock = clock
-        self._job: subprocess.Popen[bytes] | None = None
+        self._clock = robot.clock
+        self._job: subprocess.Popen[str] | None = None
         self._job_ns = 0
         self._has_put_down = False
         self._put_down = itertools.cycle(PUT_DOWN)
@@ -54,12 +53,12 @@ class Work:
             now_ns = self._clock.now_ns()
             if now_ns >= end_ns or (now_ns >= due_ns and met["motion"] and is_carrying):
                 return met
-            self._clock.sleep_until(now_ns + round(_POLL_S * NS_PER_S))
+            self._robot.pause(_POLL_S)
 
     def end(self) -> None:
         """End the command that goes on."""
         if self._job is not None:
-            self._robot.end(self._job)
+            self._robot.interrupt(self._job)
             self._job = None
 
     def _keep_at_it(self, commands: Iterator[str]) -> None:
@@ -68,7 +67,9 @@ class Work:
         if now_ns - self._job_ns > _LONGEST_S * NS_PER_S:
             self.end()
         if self._job is None or self._job.poll() is not None:
-            self._job, self._job_ns = self._robot.begin("say", self._next(commands)), now_ns
+            quiet = subprocess.DEVNULL
+            self._job = self._robot.begin("say", self._next(commands), output=quiet)
+            self._job_ns = now_ns
 
     def _next(self, commands: Iterator[str]) -> str:
         """Return what to say next; every other time, that a full hand puts down what it has."""

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from sim_twin.campaigns.killing.failures import late
 from sim_twin.campaigns.killing.rules import KillRule
 from sim_twin.physics.truth import fastest_joint
 
@@ -48,7 +47,9 @@ class RestWatch:
 
     def failures(self) -> Iterator[str]:
         """Return that it rested too late, or moved after it."""
-        yield from late(self.rule.rest_s, self.rest_s, self._mover)
+        limit_s = self.rule.rest_s
+        if limit_s is not None and not self.rest_s <= limit_s:
+            yield f"at rest after {self.rest_s:.2f} s, limit {limit_s:g} s ({self._mover})"
         if self.moved_rad > STILL_RAD:
             yield f"{self._shifted} moved by {self.moved_rad:.3f} rad before a hand let it"
 

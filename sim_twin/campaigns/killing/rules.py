@@ -3,7 +3,7 @@
 import random
 import signal
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -50,6 +50,13 @@ class KillRule:
     def stays(self) -> bool:
         """Return whether nothing may move from the rest to a hand's act; lowered arms lie limp."""
         return self.rest_s is not None and self.states == _WANTS_A_HAND
+
+    def judge(self, ready_s: float, state: str, why: str) -> Iterator[str]:
+        """Return what was wrong with when all was ready again, and where control then is."""
+        if not ready_s <= self.ready_s:
+            yield f"ready after {ready_s:.1f} s, limit {self.ready_s:g} s"
+        if state not in self.states:
+            yield f"control is {state} ({why}), expected {' or '.join(self.states)}"
 
 
 _CARRIES_ON: Final = ("armed",)

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-from drivers.clock import Clock
 from sim_twin.campaigns.pressing.clock_shift import CannotShift, ClockShift
 from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.working_robot import WorkingRobot
@@ -63,8 +62,7 @@ class CannotPress(Exception):
 class PressedScene:
     """Own folder, board, disk, clock and robot of one case; use it as a context manager."""
 
-    def __init__(self, clock: Clock, seed: int, *, small_disk: bool, shifted_clock: bool) -> None:
-        self._clock = clock
+    def __init__(self, seed: int, *, small_disk: bool, shifted_clock: bool) -> None:
         self._seed = seed
         self._wants = (small_disk, shifted_clock)
         self._closing = contextlib.ExitStack()
@@ -185,7 +183,6 @@ class PressedScene:
         }
         return WorkingRobot(
             self.disk / "run",
-            self._clock,
             *(str(word) for pair in words.items() for word in pair),
             log=self.folder / "robot.log",
             environment=self.shift.environment if self.shift is not None else None,

@@ -9,23 +9,24 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.pressing.judge import judge, listed
 from sim_twin.campaigns.pressing.pressed_scene import CannotPress, PressedScene
 from sim_twin.campaigns.pressing.trial import PressureTrial
 from sim_twin.campaigns.pressing.troubles import TROUBLES, Trouble
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
-from sim_twin.campaigns.working_robot import RobotFailed
+from sim_twin.harness.robot import RobotFailed
 
 
-def play(trouble: Trouble, seed: int, clock: Clock) -> CampaignCase:
+def play(trouble: Trouble, seed: int) -> CampaignCase:
     """Give one trouble to a robot of its own and judge what follows."""
+    clock = MonotonicClock()
     began_ns = clock.now_ns()
     wants = {"small_disk": trouble.small_disk, "shifted_clock": trouble.shifted_clock}
     try:
-        with PressedScene(clock, seed, **wants) as scene:
-            seen = PressureTrial(trouble, scene, clock).run()
+        with PressedScene(seed, **wants) as scene:
+            seen = PressureTrial(trouble, scene).run()
     except CannotPress as error:
         return CampaignCase(name=trouble.name, skipped=str(error))
     except RobotFailed as error:
@@ -45,11 +46,8 @@ def play(trouble: Trouble, seed: int, clock: Clock) -> CampaignCase:
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Play every trouble whose name contains `options.only`, one after the other."""
-    clock = MonotonicClock()
-    cases = []
-    for trouble in chosen(TROUBLES, options.only, lambda trouble: trouble.name):
-        cases.append(play(trouble, options.seed, clock))
-        tell(cases[-1].row)
+    troubles = chosen(TROUBLES, options.only, lambda trouble: trouble.name)
+    cases = [told(play(trouble, options.seed), tell) for trouble in troubles]
     return CampaignReport(campaign="pressure", cases=tuple(cases), summary=_summary(cases))
 
 

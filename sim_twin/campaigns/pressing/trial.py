@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S
 from sim_twin.campaigns.pressing.judge import TroubleSeen, steps_of
 from sim_twin.campaigns.pressing.pressed_scene import PressedScene
 from sim_twin.campaigns.pressing.troubles import Trouble
-from sim_twin.campaigns.working_robot import RobotFailed
+from sim_twin.harness.robot import RobotFailed
 
 _SETTLED_S: Final = 5.0
 _SETTLE_LIMIT_S: Final = 60.0
@@ -28,10 +28,11 @@ _PROOF: Final = "look left"
 class PressureTrial:
     """Lead one robot through one trouble."""
 
-    def __init__(self, trouble: Trouble, scene: PressedScene, clock: Clock) -> None:
+    def __init__(self, trouble: Trouble, scene: PressedScene) -> None:
         self._trouble = trouble
         self._scene = scene
-        self._clock = clock
+        self._clock = scene.robot.clock
+        self._since = scene.robot.since_s
         self._jobs = 0
         self._next_job_ns = 0
         self._states: dict[str, str] = {}
@@ -152,6 +153,3 @@ class PressureTrial:
         budget = self._scene.budget()
         history: list[dict[str, Any]] = budget["ladder"]["history"] if budget else []
         return history[self._history_before :]
-
-    def _since(self, began_ns: int) -> float:
-        return (self._clock.now_ns() - began_ns) / NS_PER_S

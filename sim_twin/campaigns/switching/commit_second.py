@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stillness import Stall
+from sim_twin.campaigns.switching.host_stalls import STEP_S, HostStall
 
 HALF_S: Final = 0.5
 LATE_RATIO: Final = 0.2
@@ -35,12 +35,12 @@ def late_around(looks: Sequence[CommitLook], at_ns: int) -> tuple[int, int, int]
     return last.late - first.late, first.now_ns, last.now_ns
 
 
-def explained(stalls: Sequence[Stall], begin_ns: int, end_ns: int, period_s: float) -> int:
+def explained(stalls: Sequence[HostStall], begin_ns: int, end_ns: int, period_s: float) -> int:
     """Return how many ticks may be late for stalls of a core: one, and one more for each period."""
     return sum(
         1 + int(one.seconds / period_s)
         for one in stalls
-        if begin_ns <= one.due_ns <= end_ns and one.seconds + one.before_s >= LATE_RATIO * period_s
+        if begin_ns <= one.due_ns <= end_ns and one.seconds + STEP_S >= LATE_RATIO * period_s
     )
 
 

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-
+from sim_twin.campaigns.growth import slope, warm
 from sim_twin.campaigns.report import CampaignCase
 from sim_twin.campaigns.ticks import TickWatch, late_limit, total
 
@@ -14,7 +13,6 @@ MOST_MIB_PER_SWITCH: Final = 0.05
 FEWEST_FOR_A_SLOPE: Final = 40
 LEAST_RATE_RATIO: Final = 0.9
 LEAST_MOTION_RAD: Final = 0.05
-_WARM_UP_RATIO: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,18 +55,13 @@ def judge(seen: SwitchSeen, outcomes: Sequence[str], reason: str = "") -> Iterat
 
 def slopes(history: Sequence[SwitchSeen]) -> dict[str, float]:
     """Return by how many MiB each process grows with a switch, after the warm-up."""
-    warm = history[round(_WARM_UP_RATIO * len(history)) :]
-    if len(warm) < 2:
+    judged = warm(history)
+    if len(judged) < 2:
         return {}
-    numbers = np.arange(len(warm), dtype=float)
     return {
-        name: float(
-            np.polynomial.Polynomial.fit(numbers, [seen.memory_mib[name] for seen in warm], 1)
-            .convert()
-            .coef[-1]
-        )
-        for name in warm[0].memory_mib
-        if all(name in seen.memory_mib for seen in warm)
+        name: slope(range(len(judged)), [seen.memory_mib[name] for seen in judged])
+        for name in judged[0].memory_mib
+        if all(name in seen.memory_mib for seen in judged)
     }
 
 
@@ -77,11 +70,11 @@ def memory_case(history: Sequence[SwitchSeen]) -> CampaignCase:
     found = slopes(history)
     enough = len(history) >= FEWEST_FOR_A_SLOPE
     failures = tuple(
-        f"{name} grows by {slope:.3f} MiB per switch, limit {MOST_MIB_PER_SWITCH:g}"
-        for name, slope in found.items()
-        if enough and slope > MOST_MIB_PER_SWITCH
+        f"{name} grows by {growth:.3f} MiB per switch, limit {MOST_MIB_PER_SWITCH:g}"
+        for name, growth in found.items()
+        if enough and growth > MOST_MIB_PER_SWITCH
     )
-    figures: dict[str, Any] = {f"{name}_mib_per_switch": slope for name, slope in found.items()}
+    figures: dict[str, Any] = {f"{name}_mib_per_switch": growth for name, growth in found.items()}
     if not enough:
         figures["not_judged"] = f"{len(history)} switches, {FEWEST_FOR_A_SLOPE} are needed"
     return CampaignCase(name="memory", failures=failures, figures=figures)

@@ -14,15 +14,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import NS_PER_S
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.switching.commit_second import CommitLook, commit_ns, explained, late_around
+from sim_twin.campaigns.switching.host_stalls import HostStallMonitor
 from sim_twin.campaigns.switching.judge import SwitchSeen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switching.profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import TickWatch
-from sim_twin.campaigns.working_robot import RobotFailed, WorkingRobot
-from sim_twin.harness.stillness import FINE_STEP_S, StillnessWatch
+from sim_twin.campaigns.working_robot import WorkingRobot
+from sim_twin.harness.robot import RobotFailed
 from vla_deploy.robots import load_robot
 
 SWITCHES: Final = 100
@@ -36,18 +37,18 @@ class SwitchCampaign:
     """Own a robot whose joints go to and fro for as long as it lives."""
 
     def __init__(self, folder: Path, seed: int) -> None:
-        self._clock = MonotonicClock()
         self._paths = {
             name: _written(folder, name, text)
             for name, text in {**GOOD, **{bad.name: bad.text for bad in BAD}}.items()
         }
         self._now = "swift"
         words = ("--profile", str(self._paths["swift"]), "--seed", str(seed))
-        self._robot = WorkingRobot(folder / "run", self._clock, *words, log=folder / "robot.log")
+        self._robot = WorkingRobot(folder / "run", *words, log=folder / "robot.log")
+        self._clock = self._robot.clock
         self._targets = itertools.cycle((0.6, -0.6))
         self._swing_ns = 0
-        self._meter = _Meter(self._robot, self._clock)
-        self._stillness = StillnessWatch(FINE_STEP_S)
+        self._meter = _Meter(self._robot)
+        self._host = HostStallMonitor()
         try:
             self._tuck()
         except BaseException:
@@ -86,7 +87,7 @@ class SwitchCampaign:
 
     def close(self) -> None:
         """End the robot."""
-        self._stillness.close()
+        self._host.close()
         self._robot.close()
 
     def _tuck(self) -> None:
@@ -97,16 +98,15 @@ class SwitchCampaign:
 
     def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> SwitchSeen:
         began_ns, start = self._clock.now_ns(), self._robot.ticks()
-        self._stillness.stalls()
+        self._host.stalls()
         self._meter.begin()
         last = self._robot.use_profile(self._paths[target], meanwhile=self._look)
         self._keep_moving(after_s)
         late, due = self._around_commit(least_rate_hz)
-        seconds = (self._clock.now_ns() - began_ns) / NS_PER_S
         return SwitchSeen(
             outcome=last["outcome"],
             reason=last["reason"],
-            seconds=seconds,
+            seconds=self._robot.since_s(began_ns),
             ticks=self._robot.ticks().since(start),
             least_rate_hz=least_rate_hz,
             moved_rad=self._meter.moved_rad,
@@ -127,7 +127,7 @@ class SwitchCampaign:
         if at_ns is None or not self._has_priority():
             return None, 0
         late, begin_ns, end_ns = late_around(looks, at_ns)
-        stalls = self._stillness.stalls()
+        stalls = self._host.stalls()
         return late, explained(stalls, begin_ns, end_ns, 1.0 / least_rate_hz)
 
     def _has_priority(self) -> bool:
@@ -151,9 +151,8 @@ class SwitchCampaign:
 class _Meter:
     """Note control's states and how far the setpoints go."""
 
-    def __init__(self, robot: WorkingRobot, clock: Clock) -> None:
+    def __init__(self, robot: WorkingRobot) -> None:
         self._robot = robot
-        self._clock = clock
         self.begin()
 
     def begin(self) -> None:
@@ -168,7 +167,7 @@ class _Meter:
         """Look once."""
         phase = str(self._robot.document("profile_status").get("phase", ""))
         late = self._robot.ticks().late
-        self.looks.append(CommitLook(now_ns=self._clock.now_ns(), late=late, phase=phase))
+        self.looks.append(CommitLook(now_ns=self._robot.clock.now_ns(), late=late, phase=phase))
         state = self._robot.state()
         self.states.add(state)
         if state != "armed":

@@ -39,7 +39,6 @@ _POSITION_MODES: Final = (
     OperatingMode.EXTENDED_POSITION,
     OperatingMode.CURRENT_BASED_POSITION,
 )
-_CURRENT_MODES: Final = (OperatingMode.CURRENT, OperatingMode.CURRENT_BASED_POSITION)
 
 Rows = NDArray[np.intp]
 

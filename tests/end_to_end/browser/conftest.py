@@ -25,7 +25,7 @@ from playwright.sync_api import (
 )
 
 from drivers.audio.espeak import EspeakEngine
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack, armed_processes
 from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
 from vla_deploy.client.access.passwords import hash_password
 from vla_deploy.dashboard.access import UserRole
@@ -59,13 +59,9 @@ def stack(chromium: Browser, coarse: str) -> Iterator[ProcessStack]:
         add_accounts(base)
         profile = Path(folder) / "shipped.toml"  # tests write another one beside it
         shutil.copyfile(coarse, profile)
-        stack = ProcessStack(base, "--profile", str(profile))
-        try:
-            stack.wait_until_armed()
-            assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0), 60.0)
+        with armed_processes(base, "--profile", str(profile)) as stack:
+            assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0))
             yield stack
-        finally:
-            stack.cut()
 
 
 def add_accounts(base: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from mcap.reader import make_reader
 from playwright.sync_api import Page, expect
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 

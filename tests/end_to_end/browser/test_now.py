@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 

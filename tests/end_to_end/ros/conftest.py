@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 
 
 @pytest.fixture(scope="package")  # two robots in one domain would answer each other's callers

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.imports import IMPORTS
 

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.gateways.ros.shared_memory import YOUNG_S
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
@@ -152,11 +152,7 @@ def test_a_dead_or_frozen_gateway_leaves_a_safe_robot_and_comes_back(
     hit(robot, "ros")
     assert robot.wait_until(lambda: abs(base()["v_m_s"]) < 0.01)
     sender.kill()
-    assert robot.wait_until(
-        lambda: (
-            robot.row("ros")["pid"] not in (None, gateway) and robot.row("ros")["state"] == "ready"
-        )
-    )
+    assert robot.is_back("ros", gateway)
     assert robot.state() == "armed"
     assert robot.wait_until(lambda: not robot.document("control_status")["active_motions"], 5.0)
     assert robot.document("control_status")["late_ticks"] == late

@@ -13,7 +13,7 @@ from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.report import CampaignCase
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import faults_of
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")

@@ -6,7 +6,6 @@ from collections import Counter
 
 import pytest
 
-from sim_twin.campaigns.killing.failures import late, late_ready
 from sim_twin.campaigns.killing.rest import STILL_RAD, RestWatch
 from sim_twin.campaigns.killing.rules import (
     COMMANDS,
@@ -70,13 +69,21 @@ def test_every_command_of_the_campaign_is_planned_by_patterns_alone(text, skill,
     assert skill in [action.skill for action in plan_command(text, world).actions]
 
 
-def test_only_what_comes_too_late_or_never_is_a_failure() -> None:
-    assert not list(late(1.5, 1.5, "")) + list(late(None, 9.0, "")) + list(late_ready(30.0, 30.0))
-    assert "inf" in next(late(1.5, float("inf"), "left_wheel"))
-    assert "inf" in next(late_ready(30.0, float("inf")))
-
-
 KILLED = RULES["control", signal.SIGKILL]
+
+
+@pytest.mark.parametrize(
+    ("ready_s", "state", "failures"),
+    [
+        (KILLED.ready_s, "stopped", []),
+        (math.inf, "stopped", ["ready after inf s, limit 30 s"]),
+        (1.0, "armed", ["control is armed (why), expected disarmed or stopped or fault"]),
+    ],
+)
+def test_what_is_ready_too_late_or_in_a_wrong_state_is_a_failure(
+    ready_s: float, state: str, failures: list[str]
+) -> None:
+    assert list(KILLED.judge(ready_s, state, "why")) == failures
 
 
 def seen(watch: RestWatch, *looks: tuple[float, float, float]) -> list[str]:
@@ -90,8 +97,8 @@ def seen(watch: RestWatch, *looks: tuple[float, float, float]) -> list[str]:
 
 def test_a_robot_that_rests_in_time_and_stays_is_well() -> None:
     watch = RestWatch(KILLED)
-    assert not seen(watch, (0.1, 0.0, 1.0), (0.5, 0.1, 0.0), (1.7, 0.1, 0.0), (9.0, 0.1, 0.0))
-    assert watch.rest_s == 0.5
+    assert not seen(watch, (0.1, 0.0, 1.0), (1.5, 0.1, 0.0), (1.7, 0.1, 0.0), (9.0, 0.1, 0.0))
+    assert watch.rest_s == KILLED.rest_s == 1.5
 
 
 def test_one_that_never_rests_is_late() -> None:

@@ -63,6 +63,7 @@ def test_sigterm_ends_a_campaign_with_its_workers_and_their_folders(
 class _Closed:
     """Stand in for the robot and the watch; the campaign ends while the arms are folded."""
 
+    clock = None
     closed = 0
 
     def __init__(self, *_words: object, **_options: object) -> None:
@@ -79,7 +80,7 @@ def test_a_campaign_that_is_ended_while_it_begins_ends_its_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(switches, "WorkingRobot", _Closed)
-    monkeypatch.setattr(switches, "StillnessWatch", _Closed)
+    monkeypatch.setattr(switches, "HostStallMonitor", _Closed)
     with pytest.raises(SystemExit):
         switches.SwitchCampaign(tmp_path, seed=0)
     assert _Closed.closed == 2

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from drivers.clock import MonotonicClock
 from platforms import load_profile
 from platforms.probes import open_probes
 from sim_twin.campaigns.pressing import pressure
@@ -108,7 +107,7 @@ def test_the_real_processes_bear_it(only: str) -> None:
 
 def scene_in(folder: Path) -> PressedScene:
     """Return a scene without a robot."""
-    scene = PressedScene(MonotonicClock(), 0, small_disk=False, shifted_clock=False)
+    scene = PressedScene(0, small_disk=False, shifted_clock=False)
     scene.folder = folder
     scene.lay_out_board()
     return scene

@@ -10,6 +10,7 @@ import pytest
 from platforms import ProfileError, load_profile
 from sim_twin.campaigns.switching import switches
 from sim_twin.campaigns.switching.commit_second import CommitLook, commit_ns, explained, late_around
+from sim_twin.campaigns.switching.host_stalls import HostStall
 from sim_twin.campaigns.switching.judge import (
     MOST_MIB_PER_SWITCH,
     SwitchSeen,
@@ -20,7 +21,6 @@ from sim_twin.campaigns.switching.judge import (
 )
 from sim_twin.campaigns.switching.profiles import BAD, GOOD
 from sim_twin.campaigns.ticks import TickWatch
-from sim_twin.harness.stillness import Stall
 
 KEPT = SwitchSeen(
     outcome="kept",
@@ -139,14 +139,14 @@ def test_late_ticks_in_the_second_count_and_no_others() -> None:
 
 
 def test_a_stall_explains_one_late_tick_and_one_for_each_period() -> None:
-    stalls = [Stall(due_ns=S, seconds=0.017), Stall(due_ns=S, seconds=0.001)]
+    stalls = [HostStall(due_ns=S, seconds=0.017), HostStall(due_ns=S, seconds=0.001)]
     assert explained(stalls, 0, 2 * S, 0.008) == 3
     assert explained(stalls, 2 * S, 3 * S, 0.008) == 0
 
 
 def test_a_stall_may_have_been_longer_than_it_was_seen() -> None:
-    assert explained([Stall(due_ns=S, seconds=0.0012)], 0, 2 * S, 0.008) == 0
-    assert explained([Stall(due_ns=S, seconds=0.0012, before_s=0.0005)], 0, 2 * S, 0.008) == 1
+    assert explained([HostStall(due_ns=S, seconds=0.0010)], 0, 2 * S, 0.008) == 0
+    assert explained([HostStall(due_ns=S, seconds=0.0012)], 0, 2 * S, 0.008) == 1
 
 
 @pytest.mark.slow

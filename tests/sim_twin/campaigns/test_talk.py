@@ -8,7 +8,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.contracts.scripted import ManualClock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.client.link import RobotLink
 
 
 class Room:
@@ -16,12 +16,11 @@ class Room:
 
     def __init__(self, folder: Path) -> None:
         self.clock = ManualClock(NS_PER_S)
-        self.space = SharedSpace(folder, self.clock)
+        self.link = RobotLink(folder, self.clock, source="cli")
+        self.space = self.link.space
         self._heard = self.space.ring_reader("utterance", from_start=False)
         self._events = self.space.ring_writer("task_event")
-        writer = self.space.ring_writer("utterance")
-        reader = self.space.ring_reader("task_event", from_start=False)
-        self.talk = CommandTalk(writer, reader, self.clock)
+        self.talk = CommandTalk(self.link)
 
     def say(self, text: str) -> str:
         self.talk.say(text)
@@ -36,9 +35,9 @@ class Room:
 
 @pytest.fixture
 def room(tmp_path: Path) -> Iterator[Room]:
-    room = Room(tmp_path / "ipc")
+    room = Room(tmp_path)
     yield room
-    room.space.close()
+    room.link.close()
 
 
 def test_a_command_goes_on_until_its_own_end(room: Room) -> None:

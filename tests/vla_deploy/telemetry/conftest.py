@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from sim_twin.harness.stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
 from vla_deploy.telemetry.triggers import Debounce

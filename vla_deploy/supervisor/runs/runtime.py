@@ -249,7 +249,7 @@ _KILL_WAIT_S = 2.0
 
 def run_id_of(process: psutil.Process) -> str | None:
     """Return the run that a living process belongs to, None where it belongs to none of ours."""
-    return _environment(process).get(RUN_ID_VARIABLE)
+    return environment_of(process).get(RUN_ID_VARIABLE)
 
 
 def end_orphans(run_ids: Collection[str]) -> list[int]:
@@ -271,7 +271,7 @@ def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
     """
     leftovers = []
     for process in psutil.process_iter():
-        environment = _environment(process)
+        environment = environment_of(process)
         named = process_name in (None, environment.get(PROCESS_VARIABLE))
         if environment.get(RUN_ID_VARIABLE) == run_id and named:
             _signal(process, kill=True)
@@ -279,11 +279,12 @@ def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
     return leftovers
 
 
-def _environment(process: psutil.Process) -> Mapping[str, str]:
+def environment_of(process: psutil.Process) -> Mapping[str, str]:
+    """Return a process' environment, empty where it is another user's or has ended."""
     try:
         return process.environ()
     except (psutil.AccessDenied, psutil.NoSuchProcess, OSError):
-        return {}  # another user's, a kernel thread, ended or gone: not ours
+        return {}
 
 
 def _signal(process: psutil.Process, *, kill: bool) -> None:

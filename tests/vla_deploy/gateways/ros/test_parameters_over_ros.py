@@ -9,7 +9,7 @@ import psutil
 import pytest
 import yaml
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack, armed_processes
 from vla_deploy.gateways.ros.parameters import API_KEY_VARIABLE, PARAMETERS
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
@@ -52,12 +52,9 @@ def robot(
     file.write_text(yaml.safe_dump({"cognitive_robot": {"ros__parameters": GIVEN}}))
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
     monkeypatch.setenv(API_KEY_VARIABLE, KEY)
-    stack = ProcessStack(base, "--ros", "--profile", coarse, "--params-file", str(file))
-    try:
-        stack.wait_until_armed()
+    words = ("--ros", "--profile", coarse, "--params-file", str(file))
+    with armed_processes(base, *words) as stack:
         yield stack
-    finally:
-        stack.cut()
 
 
 def holders_of(key: str, robot: ProcessStack) -> set[str]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from sim_twin.harness.process_stack import ProcessStack
+from sim_twin.harness.processes import ProcessStack
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.processes.ros_environment import RosEnvironment
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_twin.harness.stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack
 
 
 @pytest.mark.twin(speech=True)

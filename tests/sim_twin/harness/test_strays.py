@@ -9,7 +9,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sim_twin.campaigns.strays import MARK, strays
+from sim_twin.harness.robot import marked
+from sim_twin.harness.service import strays
+from sim_twin.harness.service_runner import MARK
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE
 
@@ -63,12 +65,16 @@ def start(mark: str) -> Iterator[Start]:
         row.wait(20)
 
 
+def found(mark: str, rows: set[int] | None) -> list[str]:
+    return strays(marked(MARK, mark), RUN, rows)
+
+
 @pytest.mark.parametrize("own_session", [False, True])
 def test_a_row_answers_for_itself_and_its_children(
     start: Start, mark: str, own_session: bool
 ) -> None:
     row, _ = start(stays=True, own_session=own_session)
-    assert strays(mark, RUN, {row}) == []
+    assert found(mark, {row}) == []
 
 
 @pytest.mark.parametrize("own_session", [False, True])
@@ -78,26 +84,30 @@ def test_what_a_dead_row_of_the_same_run_has_left_is_a_stray(
     _, left = start(stays=False, own_session=own_session)
     successor, _ = start(stays=True, own_session=False)
     assert mark not in " ".join(psutil.Process(left).cmdline())
-    assert strays(mark, RUN, {successor}) == [f"{left} of this run and no row, left by planner"]
+    assert found(mark, {successor}) == [f"{left} of this run and no row, left by planner"]
 
 
 def test_what_is_in_no_row_is_a_stray_though_its_parent_lives(start: Start, mark: str) -> None:
     row, child = start(stays=True, own_session=True)
-    assert {stray.split()[0] for stray in strays(mark, RUN, set())} == {str(row), str(child)}
+    assert {stray.split()[0] for stray in found(mark, set())} == {
+        str(row),
+        str(child),
+    }
 
 
 def test_whatever_is_of_another_run_is_a_stray(start: Start, mark: str) -> None:
     row, child = start(stays=True, own_session=True, run_id="20260101-110000-1")
-    assert sorted(strays(mark, RUN, {row})) == sorted(
+    assert sorted(found(mark, {row})) == sorted(
         f"{pid} of run 20260101-110000-1" for pid in (row, child)
     )
 
 
 def test_another_robots_processes_are_not_ours(start: Start, mark: str) -> None:
     start(stays=False, own_session=True)
-    assert strays(f"{mark}-other", RUN, set()) == []
+    assert marked(MARK, mark)
+    assert marked(MARK, f"{mark}-other") == []
 
 
 def test_without_a_table_the_run_that_goes_on_is_not_judged(start: Start, mark: str) -> None:
     start(stays=False, own_session=True)
-    assert strays(mark, RUN, None) == []
+    assert found(mark, None) == []

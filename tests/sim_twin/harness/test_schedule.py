@@ -1,6 +1,6 @@
 import pytest
 
-from sim_twin.harness.schedule import Schedule
+from sim_twin.harness.lockstep import Schedule
 from sim_twin.timing.clock import SimClock
 
 MS = 1_000_000

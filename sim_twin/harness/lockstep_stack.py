@@ -1,41 +1,49 @@
 """Run the whole robot stack in lock-step: the processes' nodes, one thread, simulated time."""
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from drivers import registry
 from drivers.audio.base import Samples
+from drivers.clock import NS_PER_S
+from drivers.imu.base import Imu
+from drivers.lidar.base import Lidar
+from drivers.opener import DeviceOpener
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
 from sim_twin.harness.audio_streams import streamed_microphone, streamed_speaker
 from sim_twin.harness.lockstep import Lockstep
-from sim_twin.harness.senses_node import SensesNode
+from sim_twin.harness.robot import RobotFailed, RobotUnderTest
 from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
+from vla_deploy.client.link import RobotLink
 from vla_deploy.control.node import ControlNode
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import BY_NAME, SharedSpace
 from vla_deploy.perception.node import PerceptionNode
+from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
-from vla_deploy.runtime.node import Node
+from vla_deploy.runtime.node import Node, NodeContext
 from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
 from vla_deploy.speech.voice.robot_voice import build_voice
 
-READY_TIMEOUT_S = 10.0
-COMMAND_TIMEOUT_S = 300.0
-ACT_S = 3.0
-ACT_EVERY_S = 0.5
-REACHED = {"reset": "disarmed", "arm": "armed"}
+COMMAND_TIMEOUT_S: Final = 300.0
+LOOK_PERIOD_S: Final = 1.0 / BY_NAME["near_obstacles"].rate_hz
+_ACT_S: Final = 3.0
+_ACT_EVERY_S: Final = 0.5
+_REACHED: Final = {"reset": "disarmed", "arm": "armed"}
 
 
-class StackNotReady(Exception):
-    """Say that the stack did not come up."""
+class LockstepControl(RobotUnderTest):
+    """Own a twin and the control node; be the operator and read what control publishes."""
 
-
-class LockstepControl:
-    """Own a twin and the control node; be the operator and read what control tells."""
+    status_age_limit_s = None
 
     def __init__(
         self,
@@ -49,9 +57,9 @@ class LockstepControl:
         self.lockstep = Lockstep(robot, world, seed, profile, tmp_path=tmp_path)
         self.robot = self.lockstep.robot
         self._profile = load_profile(profile)
-        self.space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
-        self.operator = self.space.ring_writer("operator")
-        self._status = self.space.cell_reader("control_status")
+        self.clock = self.lockstep.clock
+        self._link = RobotLink(tmp_path, self.clock, source="test")
+        self.space = self._link.space
         self.control: Node = self._new_control()
         self.lockstep.add(self.control)
 
@@ -74,34 +82,34 @@ class LockstepControl:
         context, devices = self.lockstep.context, self.lockstep.devices
         return ControlNode(context, self.robot, self._profile, devices)
 
+    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
+        """Return the newest document of a cell, empty when there is none that young."""
+        return self._link.document(topic, age_limit_s) or {}
+
     def status(self) -> dict[str, Any]:
         """Return control's newest status, or an empty document before the first."""
-        sample = self._status.latest()
-        return sample.document() if sample is not None else {}
+        return self.document("control_status")
 
     def operate(self, act: str) -> None:
         """Publish an operator's act."""
-        self.operator.publish({"act": act, "source": "test", "reason": ""})
+        self._link.publish("operator", {"act": act, "source": "test", "reason": ""})
 
-    def arm(self) -> None:
-        """Wait for control, arm it, and wait until it is armed.
-
-        Raises:
-            NotReady: it does not get there.
-        """
-        clock = self.lockstep
-        if not clock.run_until(lambda: bool(self.status()), READY_TIMEOUT_S):
-            raise StackNotReady("control tells no status")
-        self.operate("arm")
-        if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
-            raise StackNotReady(f"control does not arm: {self.status()}")
+    publish_act = operate
 
     def insist(self, act: str) -> None:
         """Do an operator's act again and again, as a person would, until it has its effect."""
-        for _ in range(round(ACT_S / ACT_EVERY_S)):
+        for _ in range(round(_ACT_S / _ACT_EVERY_S)):
             self.operate(act)
-            if self.lockstep.run_until(lambda: self.status()["state"] == REACHED[act], ACT_EVERY_S):
+            if self.wait_until(lambda: self.state() == _REACHED[act], _ACT_EVERY_S):
                 return
+
+    def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
+        """Run until `condition()`; return whether it came true in time."""
+        return self.lockstep.run_until(lambda: bool(condition()), timeout_s)
+
+    def pause(self, duration_s: float) -> None:
+        """Let simulated time pass, in which every node runs."""
+        self.lockstep.run_for(duration_s)
 
     def speak(self, text: str, talker: Talker | None = None, snr_db: float | None = None) -> Spoken:
         """Let somebody in the room say a text; return when the words begin and end.
@@ -120,7 +128,7 @@ class LockstepControl:
     def close(self) -> None:
         """Stop every node and release the twin."""
         self.lockstep.close()
-        self.space.close()
+        self._link.close()
 
 
 class LockstepStack(LockstepControl):
@@ -138,8 +146,7 @@ class LockstepStack(LockstepControl):
     ) -> None:
         """Start every node; with `speech` the robot hears and speaks too, which costs time."""
         super().__init__(tmp_path, seed, profile, robot=robot, world=world)
-        self._utterances = self.space.ring_writer("utterance")
-        self._events = self.space.ring_reader("task_event", from_start=True)
+        self._events = self._link.events("task_event", from_start=True)
         self._numbers = itertools.count(1)
         self.events: list[dict[str, Any]] = []
         self._outcomes: dict[str, dict[str, Any]] = {}
@@ -170,7 +177,7 @@ class LockstepStack(LockstepControl):
     def give(self, **utterance: Any) -> str:
         """Give a command without waiting; return its id."""
         command_id = f"command-{next(self._numbers)}"
-        self._utterances.publish({"command_id": command_id, "source": "test"} | utterance)
+        self._link.publish("utterance", {"command_id": command_id, "source": "test"} | utterance)
         return command_id
 
     def outcome(self, command_id: str) -> dict[str, Any] | None:
@@ -185,9 +192,90 @@ class LockstepStack(LockstepControl):
         """Give a command and run until it has ended.
 
         Raises:
-            NotReady: it does not end in time.
+            RobotFailed: it does not end in time.
         """
         command_id = self.give(text=text)
-        if not self.lockstep.run_until(lambda: self.outcome(command_id) is not None, timeout_s):
-            raise StackNotReady(f'"{text}" did not end within {timeout_s:g} s')
+        if not self.wait_until(lambda: self.outcome(command_id) is not None, timeout_s):
+            raise RobotFailed(f'"{text}" did not end within {timeout_s:g} s')
         return self._outcomes.pop(command_id)
+
+
+def lockstep_robot(tmp_path: Path, seed: int = 0, *, takes_all: bool) -> LockstepControl:
+    """Return the whole stack, or, at a fraction of its cost, control and what it drives by."""
+    if takes_all:
+        return LockstepStack(tmp_path, seed)
+    control = LockstepControl(tmp_path, seed)
+    control.add_senses()
+    return control
+
+
+class SensesNode:
+    """Publish what a driving base is judged by where perception, which needs a camera, is away.
+
+    Lidar and IMU are read by their real drivers, the camera sees an empty floor. The pose follows
+    wheels and IMU from where the robot starts; scans do not correct it.
+    """
+
+    period_s = 0.02
+
+    def __init__(
+        self, context: NodeContext, robot: RobotDescription, devices: DeviceOpener
+    ) -> None:
+        """Open lidar and IMU.
+
+        Raises:
+            DriverError: one of them is missing or busy.
+            MapInvalid: the robot file's map cannot be used.
+        """
+        self._clock = clock = context.clock
+        lidar, imu = devices.serial(robot.lidar.device), devices.serial(robot.imu.device)
+        self._lidar: Lidar = registry.open_lidar(robot.lidar.model, lidar, clock)
+        self._imu: Imu = registry.open_imu(robot.imu.model, imu, clock)
+        self._space = SharedSpace(context.run_dir / "ipc", clock)
+        self._pose_tracker = PoseTracker(robot, RobotModel(robot), self._space)
+        self._scan = self._space.cell_writer("scan")
+        self._attitude = self._space.cell_writer("imu")
+        self._obstacles = self._space.cell_writer("near_obstacles")
+        self._next_look_ns = 0
+
+    def start(self) -> None:
+        """Open the pose's topics; the rest is open."""
+        self._pose_tracker.start(self._space)
+
+    def step(self) -> None:
+        """Publish what is new.
+
+        Raises:
+            LinkLost: a line has gone.
+        """
+        self._publish_attitude()
+        self._pose_tracker.predict(self._clock.now_ns())
+        self._publish_scan()
+        if self._clock.now_ns() >= self._next_look_ns:
+            self._next_look_ns = self._clock.now_ns() + round(LOOK_PERIOD_S * NS_PER_S)
+            self._obstacles.put(count=0, period_s=LOOK_PERIOD_S, x_m=(), y_m=(), z_m=())
+
+    def stop(self) -> None:
+        """Release lidar and IMU."""
+        self._lidar.close()
+        self._imu.close()
+        self._space.close()
+
+    def _publish_attitude(self) -> None:
+        samples = self._imu.poll()
+        if not samples:
+            return
+        newest = samples[-1]
+        self._pose_tracker.add_imu(newest)
+        self._attitude.put(
+            yaw_rad=newest.yaw_rad,
+            pitch_rad=newest.pitch_rad,
+            roll_rad=newest.roll_rad,
+            acceleration_m_s2=newest.acceleration_m_s2,
+        )
+
+    def _publish_scan(self) -> None:
+        scan = self._lidar.poll()
+        if scan is not None:
+            ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
+            self._scan.put(range_m=scan.range_m, beam_age_s=ages_s)

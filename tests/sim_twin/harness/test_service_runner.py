@@ -51,13 +51,7 @@ def launch() -> Iterator[Launch]:
     runners = []
 
     def start(mode: str, rules: ServiceRules = QUICK) -> ServiceRunner:
-        runner = ServiceRunner(
-            [sys.executable, "-c", SERVICE, mode],
-            os.environ,
-            watchdog_s=1.0,
-            restart_s=0.05,
-            rules=rules,
-        )
+        runner = ServiceRunner([sys.executable, "-c", SERVICE, mode], os.environ, rules)
         runners.append(runner)
         runner.start()
         return runner
@@ -70,7 +64,7 @@ def launch() -> Iterator[Launch]:
 
 def test_a_service_is_ready_when_its_main_process_says_so(launch: Launch) -> None:
     runner = launch("good")
-    assert runner.wait_ready(20)
+    assert runner.wait_for(RunnerState.READY, 20)
     clock = MonotonicClock()
     deadline_ns = clock.now_ns() + 5 * NS_PER_S
     while runner.report.status != "at work" and clock.now_ns() < deadline_ns:  # a datagram later
@@ -83,11 +77,11 @@ def test_a_service_is_ready_when_its_main_process_says_so(launch: Launch) -> Non
 def test_a_killed_or_frozen_service_is_started_again(launch: Launch) -> None:
     runner = launch("good")
     for restarts, number in enumerate((signal.SIGKILL, signal.SIGSTOP), start=1):
-        assert runner.wait_ready(20)
+        assert runner.wait_for(RunnerState.READY, 20)
         before = runner.report.main_pid
         os.kill(before, number)
         assert runner.wait_for(RunnerState.RESTARTING, 10)
-        assert runner.wait_ready(20)
+        assert runner.wait_for(RunnerState.READY, 20)
         assert runner.report.main_pid != before
         assert runner.report.restarts == restarts
     assert runner.report.watchdog_kills == 1
@@ -115,13 +109,13 @@ def test_a_wrong_configuration_is_not_tried_again(launch: Launch) -> None:
 def test_only_the_main_process_may_say_that_it_is_ready(launch: Launch) -> None:
     rules = replace(QUICK, start_timeout_s=1.5)
     runner = launch("someone else", rules)
-    assert not runner.wait_ready(2.0)
+    assert not runner.wait_for(RunnerState.READY, 2.0)
     assert runner.report.watchdog_kills == 0
 
 
 def test_nothing_of_a_killed_service_is_left(launch: Launch) -> None:
     runner = launch("child")
-    assert runner.wait_ready(20)
+    assert runner.wait_for(RunnerState.READY, 20)
     child = next(one for one in runner.members() if one.pid != runner.report.main_pid)
     os.kill(runner.report.main_pid, signal.SIGKILL)
     psutil.wait_procs([child], timeout=10)

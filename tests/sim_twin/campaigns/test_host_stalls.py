@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sim_twin.harness.stillness import FINE_STEP_S, PRIORITY, StillnessWatch
+from sim_twin.campaigns.switching.host_stalls import PRIORITY, HostStallMonitor
 
 STALL_S = 0.06
 ABOVE = f"""
@@ -30,10 +30,10 @@ def may_be_real_time() -> bool:
 
 @pytest.mark.skipif(not may_be_real_time(), reason="needs CAP_SYS_NICE")
 def test_a_core_that_stands_still_is_noticed() -> None:
-    watch = StillnessWatch(FINE_STEP_S)
+    monitor = HostStallMonitor()
     try:
-        watch.stalls()  # it has begun to look by now
+        monitor.stalls()  # it has begun to look by now
         subprocess.run([sys.executable, "-c", ABOVE], check=True)
-        assert max(stall.seconds for stall in watch.stalls()) > STALL_S / 2
+        assert max(stall.seconds for stall in monitor.stalls()) > STALL_S / 2
     finally:
-        watch.close()
+        monitor.close()
