@@ -25,7 +25,7 @@ from benchmarks.live_robot import arm, live_stack
 from benchmarks.percentiles import percentile
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.gateways.ros.launching import launch_environment
+from vla_deploy.gateways.ros.environment import launch_environment
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import RosSettings
 

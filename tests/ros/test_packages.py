@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vla_deploy.gateways.ros.imports import IMPORTS
+from vla_deploy.gateways.ros.environment import IMPORTS
 from vla_deploy.gateways.ros.parameters import PARAMETERS, handed_over_parameters
 
 ROOT = Path(__file__).parents[2]

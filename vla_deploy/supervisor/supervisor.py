@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
-from vla_deploy.gateways.ros.launching import require_environment
+from vla_deploy.gateways.ros.environment import require_environment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT

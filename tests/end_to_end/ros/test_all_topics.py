@@ -9,7 +9,7 @@ import pytest
 
 from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.imports import IMPORTS
+from vla_deploy.gateways.ros.environment import IMPORTS
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(300)]
 

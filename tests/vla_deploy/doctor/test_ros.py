@@ -8,7 +8,7 @@ import pytest
 
 from vla_deploy.doctor import FindingLevel, ros
 from vla_deploy.doctor.context import ask_command
-from vla_deploy.gateways.ros.imports import IMPORTS
+from vla_deploy.gateways.ros.environment import IMPORTS
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts, RosSettings
 

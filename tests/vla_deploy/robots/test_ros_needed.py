@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from vla_deploy.gateways.ros.environment import require_environment
 from vla_deploy.gateways.ros.errors import RosNotFound
-from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.robots import RobotFileError, load_robot
 from vla_deploy.robots.loader import ROBOT_FILE, ROBOTS_DIR
 

@@ -10,7 +10,7 @@ from platforms import load_profile
 from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.operation.say import read_json
-from vla_deploy.gateways.ros.launching import require_environment
+from vla_deploy.gateways.ros.environment import require_environment
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.knowledge import world_of

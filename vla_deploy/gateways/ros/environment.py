@@ -1,4 +1,4 @@
-"""Find the Python environment of ROS 2 Jazzy: the interpreter of the gateway, and its variables.
+"""Find the Python environment of ROS 2 Jazzy, and decide how the gateway is started in it.
 
 Of this project it sees three packages by links, never our own environment: ROS's Python may be of
 another version, and its NumPy another one.
@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from vla_deploy.gateways.ros.errors import RosNotFound
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.ros_settings import RosSettings
 
 VARIABLE: Final = "VLA_DEPLOY_ROS_PYTHON"
 WORKSPACE_VARIABLE: Final = "VLA_DEPLOY_ROS_WORKSPACE"
@@ -30,6 +32,30 @@ _CLEARED: Final = ("PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "_ROS_WHEELS_B
 # A setup.bash puts its folders in front of what it finds here.
 _PREFIXES: Final = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH")
 _OF_THE_SHELL: Final = frozenset({"_", "SHLVL", "PWD", "OLDPWD"})
+DOMAIN: Final = "ROS_DOMAIN_ID"
+DISCOVERY: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+PACKAGES_DIR: Final = "ros/packages"
+LOGS_DIR: Final = "logs/ros"
+TRANSPORT_PROFILE: Final = Path(__file__).with_name("fastdds_profile.xml")
+BUILT_FROM_SOURCE: Final = "colcon build --base-paths ros   # in a checkout; docs/ros.md"
+MESSAGES: Final = (
+    *("action_msgs", "builtin_interfaces", "control_msgs", "diagnostic_msgs", "geometry_msgs"),
+    *("lifecycle_msgs", "nav2_msgs", "nav_msgs", "rcl_interfaces", "rosgraph_msgs"),
+    *("sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs", "trajectory_msgs"),
+    *("unique_identifier_msgs", "visualization_msgs", "vla_deploy_msgs"),
+)
+IMPORTS: Final[Mapping[str, str]] = {
+    "numpy": "python3-numpy",
+    "yaml": "python3-yaml",
+    "rclpy": "ros-jazzy-rclpy",
+    **{name: f"ros-jazzy-{name.replace('_', '-')}" for name in MESSAGES},
+    "vla_deploy_msgs": "",
+}
+"""All that the gateway imports from outside Python and this project, with its package of apt.
+
+What a gateway module, or one of ours that it imports, needs must be here: ROS's environment has
+nothing else. A module without a package is built from this project's `ros/`.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +124,53 @@ def link_packages(folder: Path) -> Path:
             fresh.symlink_to(target)
             fresh.replace(link)
     return folder
+
+
+def launch_environment(
+    settings: RosSettings, run_dir: Path, inherited: Mapping[str, str] = os.environ
+) -> tuple[Path, dict[str, str]]:
+    """Return the interpreter, and what its environment has beside the supervisor's.
+
+    Raises:
+        RosNotFound: this computer has no ROS 2 Jazzy, or not where the robot file says.
+    """
+    found = find_environment(settings.python, settings.workspace)
+    variables = dict(found.variables)
+    packages = link_packages(run_dir / PACKAGES_DIR)
+    paths = (str(packages), variables.get("PYTHONPATH", ""))
+    variables["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    variables[DISCOVERY] = settings.discovery.upper()
+    if settings.domain_id is not None:
+        variables[DOMAIN] = str(settings.domain_id)
+    variables["ROS_LOG_DIR"] = str(run_dir / LOGS_DIR)
+    # An image is larger than the shared memory that Fast DDS takes by itself.
+    profile = inherited.get("FASTRTPS_DEFAULT_PROFILES_FILE", str(TRANSPORT_PROFILE))
+    variables["FASTRTPS_DEFAULT_PROFILES_FILE"] = profile
+    return found.python, variables
+
+
+def require_environment(robot: RobotDescription) -> None:
+    """See that a robot which is driven or moved over ROS can be.
+
+    Raises:
+        RosNotFound: it is, and this computer has no ROS 2 Jazzy, or not where the robot file says.
+    """
+    settings = robot.ros
+    if not settings.is_needed:
+        return
+    try:
+        find_environment(settings.python, settings.workspace)
+    except RosNotFound as error:
+        raise RosNotFound(
+            f"robot {robot.name}: [ros] says navigation = {settings.navigation!r} and arms = "
+            f'{settings.arms!r}, which needs ROS; set both to "own", or: {error}'
+        ) from error
+
+
+def remedy(module: str) -> str:
+    """Return the command that installs a module of the table on a robot."""
+    apt = IMPORTS[module]
+    return f"sudo apt-get install -y {apt}" if apt else BUILT_FROM_SOURCE
 
 
 def _places() -> tuple[Path, ...]:

@@ -4,7 +4,9 @@ What comes in is handled in the node's step, in the order of arrival, so that on
 deals with the robot. A press of the stop does not wait for that.
 """
 
+import json
 import logging
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -17,16 +19,19 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
+    qos_profile_sensor_data,
 )
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from std_msgs.msg import String
 
 from vla_deploy.gateways.ros.declaring import SteadyNode
 
 NODE_NAME: Final = "vla_deploy"
+PUBLISHED_BY: Final = "published_by"
+"""Where a topic is published and subscribed here, the key by which we know our own."""
 MOST_WAITING: Final = 256
 """Of what comes in between two steps; what is more is dropped, and counted."""
 SOURCE: Final = "ros"
@@ -37,22 +42,11 @@ _LOOKS: Final = 4
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
 
-RELIABLE: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
-)
-SENSOR: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
-)
-LATCHED: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+RELIABLE: Final = QoSProfile(depth=10)
+SENSOR: Final = qos_profile_sensor_data
+LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # A subscription that takes from publishers of either reliability.
-ANY: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.BEST_EFFORT
-)
+ANY: Final = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def named(nodes: Iterable[str]) -> str:
@@ -221,3 +215,36 @@ class GraphLink:
             self._executor.spin()
         except ExternalShutdownException:
             _log.info("left the ROS graph")
+
+
+class JsonTopic:
+    """Publish JSON documents as std_msgs/String, as nodes do that have no messages of their own.
+
+    Several topics get the same; numbers that JSON has no form for become null.
+    """
+
+    def __init__(self, graph: GraphLink, *topics: str) -> None:
+        self._publishers = [graph.publisher(String, topic) for topic in topics]
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anybody listens."""
+        return any(one.get_subscription_count() > 0 for one in self._publishers)
+
+    def publish(self, document: Any) -> None:
+        """Publish a document."""
+        text = json.dumps(_finite(document), separators=(",", ":"), ensure_ascii=False)
+        self.publish_text(text)
+
+    def publish_text(self, text: str) -> None:
+        """Publish a text as it is."""
+        for publisher in self._publishers:
+            publisher.publish(String(data=text))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -10,8 +10,8 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import Profile
+from vla_deploy.gateways.ros.environment import launch_environment
 from vla_deploy.gateways.ros.errors import RosGatewayError
-from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream

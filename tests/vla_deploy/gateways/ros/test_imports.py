@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import vla_deploy.gateways.ros
-from vla_deploy.gateways.ros.imports import BUILT_FROM_SOURCE, IMPORTS, remedy
+from vla_deploy.gateways.ros.environment import BUILT_FROM_SOURCE, IMPORTS, remedy
 
 GATEWAY = Path(vla_deploy.gateways.ros.__file__).parent
 OURS = {"vla_deploy", "drivers", "platforms"}
