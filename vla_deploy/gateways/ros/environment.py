@@ -27,7 +27,7 @@ SETUP_TIMEOUT_S: Final = 20.0
 _COMPLETE: Final = ".complete"  # scripts/ros-environment writes it last
 _BOOTSTRAPPER: Final = "lib/python3*/site-packages/ros_wheels_bootstrapper.pth"
 # Another ROS, or our own environment, may have set these for the supervisor. The bootstrapper of
-# the wheels restarts the interpreter to set LD_LIBRARY_PATH, unless it is told that it has.
+# the wheels restarts the interpreter to set LD_LIBRARY_PATH, unless this variable says that it has.
 _CLEARED: Final = ("PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
 # A setup.bash puts its folders in front of what it finds here.
 _PREFIXES: Final = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH")
@@ -90,8 +90,12 @@ def find_environment(
     if named:
         origin = "the robot file" if configured else f"the variable {VARIABLE}"
         python = _interpreter(Path(named).expanduser(), origin)
-        if _has_wheels(python):
-            _refuse_workspace(workspace, python)
+        if any(python.parent.parent.glob(_BOOTSTRAPPER)):
+            if workspace:
+                raise RosNotFound(
+                    f"the workspace {workspace} cannot be laid over the wheels of {python}: it was "
+                    "built against another ROS; leave out one of [ros] python and workspace"
+                )
             return _of_wheels(python, f"{python}, named by {origin}")
         layers = [setup] if setup.is_file() else []
         return _of_setup(python, layers, workspace, inherited, f"named by {origin}")
@@ -116,7 +120,9 @@ def link_packages(folder: Path) -> Path:
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         if spec is None or not spec.submodule_search_locations:
-            raise RosNotFound(f"no package {name} beside {__file__}: the installation is not whole")
+            raise RosNotFound(
+                f"no package {name} next to {__file__}: the installation is not whole"
+            )
         target = Path(spec.submodule_search_locations[0]).resolve()
         link = folder / name
         if not link.is_symlink() or link.readlink() != target:
@@ -129,7 +135,7 @@ def link_packages(folder: Path) -> Path:
 def launch_environment(
     settings: RosSettings, run_dir: Path, inherited: Mapping[str, str] = os.environ
 ) -> tuple[Path, dict[str, str]]:
-    """Return the interpreter, and what its environment has beside the supervisor's.
+    """Return the interpreter, and what its environment has on top of the supervisor's.
 
     Raises:
         RosNotFound: this computer has no ROS 2 Jazzy, or not where the robot file says.
@@ -187,18 +193,6 @@ def _interpreter(named: Path, origin: str) -> Path:
             f"virtual environment, but {python} cannot be run; mend it, or leave it out"
         )
     return python.absolute()
-
-
-def _has_wheels(python: Path) -> bool:
-    return any(python.parent.parent.glob(_BOOTSTRAPPER))
-
-
-def _refuse_workspace(workspace: str, python: Path) -> None:
-    if workspace:
-        raise RosNotFound(
-            f"the workspace {workspace} cannot be laid over the wheels of {python}: it was built "
-            "against another ROS; leave out one of [ros] python and workspace"
-        )
 
 
 def _of_wheels(python: Path, origin: str) -> RosEnvironment:

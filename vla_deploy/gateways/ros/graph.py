@@ -11,12 +11,13 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import rclpy
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
     QoSProfile,
@@ -55,19 +56,7 @@ def named(nodes: Iterable[str]) -> str:
     return f"{SOURCE}:{listed}" if listed else SOURCE
 
 
-class Publisher(Protocol):
-    """Send messages of one topic."""
-
-    def publish(self, message: Any) -> None:
-        """Send one."""
-        ...
-
-    def get_subscription_count(self) -> int:
-        """Return how many listen."""
-        ...
-
-
-class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
+class _Waking(Future):  # type: ignore[misc]  # rclpy has no types
     """Wake the executor with the result: rclpy 7 looks at what awaits only when something comes."""
 
     def __init__(self, executor: SingleThreadedExecutor) -> None:
@@ -101,8 +90,7 @@ class GraphLink:
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
         """Return a publisher."""
-        made: Publisher = self.node.create_publisher(kind, topic, qos)
-        return made
+        return self.node.create_publisher(kind, topic, qos)
 
     def listen(
         self, kind: type, topic: str, take: Callable[[Any], None], qos: QoSProfile = ANY
@@ -116,7 +104,7 @@ class GraphLink:
         """Subscribe; each message is taken in a step, with who sent it."""
 
         def receive(message: Any) -> None:
-            sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
+            sender = self.sender(topic)  # now: who sends once may be gone in a moment
             if sender == SOURCE:
                 find = partial(self.sender, topic)
                 self.put(lambda: self.when_named(find, partial(take, message)))
@@ -130,7 +118,7 @@ class GraphLink:
     ) -> None:
         """Give `take`, in a step, the name that `find` returns.
 
-        DDS tells a node's name after its publishers and clients, so some steps are waited for it.
+        DDS has a node's name after its publishers and clients, so some steps are waited for it.
         """
         name = find()
         if name == SOURCE and looks:
@@ -139,7 +127,7 @@ class GraphLink:
             take(name)
 
     def sender(self, topic: str) -> str:
-        """Return who publishes a topic beside us, for logs and the audit trail.
+        """Return which other nodes publish a topic, for logs and the audit trail.
 
         rclpy does not say which publisher a message came from: of several all are named.
         """
@@ -151,7 +139,7 @@ class GraphLink:
         return named(self._others((one.node_name, one.node_namespace) for one in found))
 
     def caller(self, service: str) -> str:
-        """Return who has a client of a service beside us: its caller is among them."""
+        """Return which other nodes have a client of a service: its caller is among them."""
         callers = []
         for name, namespace in self.node.get_node_names_and_namespaces():
             try:

@@ -57,27 +57,32 @@ def find(tmp_path):
     return find_here
 
 
-def test_the_configured_interpreter_goes_before_everything(tmp_path, find) -> None:
-    chosen = make_wheels(tmp_path / "chosen")
-    other = make_wheels(tmp_path / "other")
-    make_wheels(tmp_path / "checkout" / ".venv-ros")
-    for named in (str(chosen), str(tmp_path / "chosen")):
-        found = find(named, **{VARIABLE: str(other)})
-        assert (found.python, "the robot file" in found.origin) == (chosen, True)
-
-
-def test_the_variable_goes_before_what_is_found(tmp_path, find) -> None:
-    other = make_wheels(tmp_path / "other")
-    make_wheels(tmp_path / "checkout" / ".venv-ros")
-    assert find(**{VARIABLE: str(other)}).python == other
-
-
-def test_wheels_beside_the_checkout_go_before_the_systems_ros(tmp_path, find) -> None:
-    wheels = make_wheels(tmp_path / "checkout" / ".venv-ros")
-    make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
-    found = find()
-    assert found.python == wheels
-    assert found.variables["PYTHONPATH"] == found.variables["AMENT_PREFIX_PATH"] == ""
+@pytest.mark.parametrize(
+    ("laid_out", "configured", "variable", "found"),
+    [
+        (("chosen", "other", "checkout/.venv-ros"), "chosen/bin/python", "other", "chosen"),
+        (("chosen", "other", "checkout/.venv-ros"), "chosen", "other", "chosen"),
+        (("other", "checkout/.venv-ros"), "", "other", "other"),
+        (("checkout/.venv-ros", "opt"), "", "", "checkout/.venv-ros"),
+        (("opt",), "", "", None),
+    ],
+)
+def test_what_is_configured_goes_before_the_variable_before_wheels_before_the_systems_ros(
+    tmp_path, find, laid_out, configured, variable, found
+) -> None:
+    for folder in laid_out:
+        if folder == "opt":
+            make_setup(tmp_path / folder / "setup.bash", "jazzy")
+        else:
+            make_wheels(tmp_path / folder)
+    named = str(tmp_path / configured) if configured else ""
+    environment = find(named, **({VARIABLE: str(tmp_path / variable)} if variable else {}))
+    expected = SYSTEM_PYTHON if found is None else tmp_path / found / "bin" / "python"
+    assert environment.python == expected
+    assert ("the robot file" in environment.origin) == bool(configured)
+    if found is not None:
+        assert environment.variables["PYTHONPATH"] == environment.variables["AMENT_PREFIX_PATH"]
+        assert environment.variables["PYTHONPATH"] == ""
 
 
 def test_wheels_that_are_not_whole_are_passed_over(tmp_path, find) -> None:

@@ -8,7 +8,6 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.inward.words import OrderInvalid
 from vla_deploy.ipc.errors import BadPayload
 
-CANCELLED: Final = "cancelled on request"
 _STATUS_AGE_S: Final = 2.0
 
 
@@ -27,18 +26,13 @@ class CommandOrder:
             link.clock,
         )
 
-    @property
-    def has_ended(self) -> bool:
-        """Return whether the last event is there."""
-        return self.last is not None
-
     def cancel(self) -> None:
         """Ask for its end; its last event follows."""
         self._link.utter(command_id=self._following.command_id, cancel=True)
 
     def take(self, events: list[Event]) -> None:
         """Take what came since the last step, and find out whether nobody works on it."""
-        if self.has_ended:
+        if self.last is not None:
             return
         why = self._following.why_lost()
         self.news.extend(self._following.take(events))
@@ -92,7 +86,7 @@ class CommandOrders:
         events = [event.payload for event in self._events.drain()]
         for order in list(self._orders):
             order.take(events)
-            if order.has_ended:
+            if order.last is not None:
                 self._orders.remove(order)
 
     def close(self) -> None:

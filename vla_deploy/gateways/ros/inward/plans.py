@@ -20,17 +20,17 @@ from vla_deploy.gateways.ros.inward.words import OrderInvalid, parsed_plan, show
 from vla_deploy.gateways.ros.part import Gateway
 
 Result: Final = ExecutePlan.Result
-Told: Final = ExecutePlan.Feedback
+News: Final = ExecutePlan.Feedback
 _BUSY: Final = "the robot is busy"
 _STATES: Final = {
-    "queued": Told.PLANNING,
-    "planning": Told.PLANNING,
-    "asked": Told.ASKED,
-    "accepted": Told.EXECUTING,
-    "plan": Told.EXECUTING,
-    "action": Told.EXECUTING,
-    "said": Told.EXECUTING,
-    "setback": Told.RECOVERING,
+    "queued": News.PLANNING,
+    "planning": News.PLANNING,
+    "asked": News.ASKED,
+    "accepted": News.EXECUTING,
+    "plan": News.EXECUTING,
+    "action": News.EXECUTING,
+    "said": News.EXECUTING,
+    "setback": News.RECOVERING,
 }
 
 
@@ -77,7 +77,7 @@ class PlanAction:
 
 
 class Carrying:
-    """Pursue one command, and tell each action's news."""
+    """Pursue one command, and publish each action's news."""
 
     def __init__(self, order: CommandOrder, feedback: Feedback, *, of_plan: bool) -> None:
         self._order = order
@@ -95,7 +95,7 @@ class Carrying:
                 self._places = {one["id"]: place for place, one in enumerate(actions)}
             state = _STATES.get(event["event"])
             if state is not None:
-                self._feedback(self._told(state, event))
+                self._feedback(self._message(state, event))
         return None if self._order.last is None else self._finish(self._order.last)
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
@@ -107,9 +107,9 @@ class Carrying:
         result = Result(error_code=Result.CANCELLED, error=reason)
         return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
-    def _told(self, state: str, event: Event) -> Any:
+    def _message(self, state: str, event: Event) -> Any:
         action_id = str(event.get("action_id") or "")
-        return Told(
+        return News(
             state=state,
             action_id=action_id,
             skill=str(event.get("skill") or ""),

@@ -165,7 +165,7 @@ class JointCommands(GatewayPart):
         self._wanted |= wanted
 
     def _why_not_held(self, joints: dict[str, float]) -> str:
-        """Take the groups of these joints beside those that are held; return who has them else."""
+        """Take the groups of these joints with those that are held; return who has them else."""
         needed = frozenset(self._gateway.robot.groups_moving(joints))
         if self._claim is not None and needed <= self._claimed:
             return ""

@@ -60,7 +60,7 @@ class CommandTopics(GatewayPart):
         for one in list(self._open):
             while one.order.news:
                 one.has_asked = one.order.news.popleft()["event"] == "asked"
-            if one.order.has_ended:
+            if one.order.last is not None:
                 self._open.remove(one)
 
     def _take(self, topic: str, message: Any, sender: str) -> None:

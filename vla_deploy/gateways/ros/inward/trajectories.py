@@ -22,8 +22,6 @@ from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.ipc.errors import BadPayload
 
 FEEDBACK_HZ: Final = 20.0
-GOAL_TOLERANCE: Final = 0.05
-"""Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
 
 
 class TrajectoryAction:
@@ -50,13 +48,7 @@ class TrajectoryAction:
 
     def judge(self, goal: Any) -> TrajectoryGoal:
         """Return the goal in the form in which it is pursued."""
-        judged = judged_goal(
-            goal,
-            self._joints,
-            partial=self._partial,
-            time=self._gateway.time,
-            goal_tolerance=GOAL_TOLERANCE,
-        )
+        judged = judged_goal(goal, self._joints, partial=self._partial, time=self._gateway.time)
         require_armed(self._gateway, Result.INVALID_GOAL)
         return judged
 

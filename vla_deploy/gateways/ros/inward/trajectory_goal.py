@@ -20,6 +20,8 @@ MOST_POINTS: Final = 255
 MOST_AGE_S: Final = 0.5
 MOST_AHEAD_S: Final = 10.0
 LONGEST_S: Final = 600.0
+GOAL_TOLERANCE: Final = 0.05
+"""Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
 DEFAULT_GOAL_TIME_S: Final = 0.5
 _UNRESTRICTED: Final = -1.0
 
@@ -43,7 +45,7 @@ class TrajectoryGoal:
 
 
 def judged_goal(
-    goal: Any, joints: Sequence[str], *, partial: bool, time: RosTime, goal_tolerance: float
+    goal: Any, joints: Sequence[str], *, partial: bool, time: RosTime
 ) -> TrajectoryGoal:
     """Return a goal for some joints in the form in which it is pursued.
 
@@ -61,7 +63,7 @@ def judged_goal(
         positions=positions,
         start_ns=_start_ns(trajectory.header.stamp, float(times_s[-1]), time),
         path_tolerance=_tolerances(goal.path_tolerance, named, math.inf),
-        goal_tolerance=_tolerances(goal.goal_tolerance, named, goal_tolerance),
+        goal_tolerance=_tolerances(goal.goal_tolerance, named, GOAL_TOLERANCE),
         goal_time_s=_seconds(goal.goal_time_tolerance) or DEFAULT_GOAL_TIME_S,
     )
 

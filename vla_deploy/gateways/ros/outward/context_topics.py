@@ -1,4 +1,4 @@
-"""Publish what planning nodes ask for beside plans: state, surroundings, what the robot does."""
+"""Publish the robot's state, its surroundings and what it does, as planning nodes read them."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -52,7 +52,7 @@ class ContextTopics(GatewayPart):
             return
         activity = self._activity()
         commands = self._gateway.commands
-        key = (activity.capstone, activity.plan, tuple(commands.statuses.values()))
+        key = (activity.capstone, activity.plan, tuple(commands.current.statuses.values()))
         if key != self._published or self._status_due.is_now(now_ns):
             self._published = key
             self._publish_statuses(activity)
@@ -75,7 +75,7 @@ class ContextTopics(GatewayPart):
     def _publish_statuses(self, activity: Activity) -> None:
         commands = self._gateway.commands
         self._capstone.publish_text(f"State: {activity.capstone}, Tasks: {commands.actions_left}")
-        statuses = list(commands.statuses.values())
+        statuses = list(commands.current.statuses.values())
         index = next((i for i, one in enumerate(statuses) if one in ("active", "pending")), 0)
         self._plan.publish(
             {
@@ -111,7 +111,7 @@ class ContextTopics(GatewayPart):
             "detected_objects": [described(one) for one in latest_last(scene.get("objects", ()))],
             "available_tools": [hand.gripper for hand in hands],
             "battery_level": None,
-            "current_task": commands.text,
+            "current_task": commands.current.text,
             "recent_actions": [self._recent(one) for one in commands.recent],
             **self._brief(),
         }

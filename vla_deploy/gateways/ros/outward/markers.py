@@ -81,8 +81,8 @@ class SceneMarkers(GatewayPart):
         yield marker
 
     def _goals(self) -> Iterator[Marker]:
-        commands = self._gateway.commands
-        for number, action in enumerate(commands.actions, start=1):
+        plan = self._gateway.commands.current
+        for number, action in enumerate(plan.actions, start=1):
             where = self._locator.where
             name, given = ranked_name(action["skill"], action["parameters"], where)
             at = given.get("target_position") or where(str(given.get("target_object", "")))
@@ -91,7 +91,7 @@ class SceneMarkers(GatewayPart):
                 marker = marker_at("goals", Marker.SPHERE, _GOAL_COLOUR, place)
                 marker.scale.x = marker.scale.y = marker.scale.z = 0.1
                 yield marker
-                status = commands.statuses.get(action["id"], "")
+                status = plan.statuses.get(action["id"], "")
                 yield _text(f"{number} {name} {status}", (place[0], place[1], place[2] + 0.3))
 
 

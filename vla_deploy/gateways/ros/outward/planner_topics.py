@@ -94,7 +94,7 @@ class PlannerTopics(GatewayPart):
 
     def _publish_action(self, news: CommandNews) -> None:
         event = news.event
-        actions = self._gateway.commands.actions
+        actions = self._gateway.commands.current.actions
         planned = next((one for one in actions if one["id"] == event.get("action_id")), {})
         self._action.publish(
             {

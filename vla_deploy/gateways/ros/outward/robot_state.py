@@ -26,6 +26,9 @@ _EXECUTOR_AGE_S: Final = 1.0
 _POSE_AGE_S: Final = 0.5
 _PLACES: Final = ("tracking", "unsure", "lost")
 _UNMEASURED: Final = math.nan
+_NOT_MEASURED: Final = (
+    *("temperature", "current", "charge", "capacity", "design_capacity", "percentage"),
+)
 EVENT_SOURCES: Final = {
     "task_event": "event",
     "operator": "act",
@@ -113,12 +116,7 @@ class SupplyTopic(GatewayPart):
     def _message(self, volts: float) -> BatteryState:
         message = BatteryState(
             voltage=volts,
-            temperature=_UNMEASURED,
-            current=_UNMEASURED,
-            charge=_UNMEASURED,
-            capacity=_UNMEASURED,
-            design_capacity=_UNMEASURED,
-            percentage=_UNMEASURED,
+            **dict.fromkeys(_NOT_MEASURED, _UNMEASURED),
             power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
             power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
             power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
