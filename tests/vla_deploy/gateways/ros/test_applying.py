@@ -12,6 +12,16 @@ from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.plan_bounds import Confirm
 
 DEFAULTS = {one.name: one.default for one in PARAMETERS}
+NO_MORE = "the robot file allows no more"
+WITHIN = "plan_timeout: {:g} s holds, not {:g}: it may be 1 to 300 s"
+AT_NO_RATE = (
+    "planning_rate: 5 Hz changes nothing: "
+    "the planner acts when a command comes or a plan fails, at no rate"
+)
+CUT = (
+    "max_memory_items: of the commands remembered, all but the newest 10 are forgotten; "
+    "profile desktop keeps 5000"
+)
 STAIRS = (
     "restricted_areas: no such place on the map, so nothing to keep out of: stairs, outside; places"
 )
@@ -46,54 +56,39 @@ def test_the_defaults_change_times_only_and_forget_nothing(effects) -> None:
     assert "all but the newest 99 are forgotten" in effects(max_memory_items=99).notes[0]
 
 
+def changed(*notes: str, profile: dict[str, Any] | None = None, **robot: Any) -> ParameterEffects:
+    return ParameterEffects(robot=robot, profile=profile or {}, notes=list(notes))
+
+
+def plans(further: int) -> ParameterEffects:
+    return changed(planning={"further_plans": further})
+
+
 @pytest.mark.parametrize(
-    ("given", "robot", "profile", "note"),
+    ("given", "expected"),
     [
-        ({"max_speed": 0.2}, {"base": {"max_speed_m_s": 0.2}}, {}, None),
-        (
-            *({"max_speed": 1.5}, {}, {}),
-            "max_speed: 0.5 m/s holds, not 1.5: the robot file allows no more",
-        ),
-        ({"plan_timeout": 12.0}, {}, {"within_s": 12.0}, None),
-        (
-            *({"plan_timeout": 0.2}, {}, {"within_s": 1.0}),
-            "plan_timeout: 1 s holds, not 0.2: it may be 1 to 300 s",
-        ),
-        (
-            *({"plan_timeout": 600.0}, {}, {"within_s": 300.0}),
-            "plan_timeout: 300 s holds, not 600: it may be 1 to 300 s",
-        ),
-        ({"action_timeout": 60.0}, {}, {}, None),  # the default leaves each skill its own
-        ({"action_timeout": 20.0}, {"planning": {"action_timeout_s": 20.0}}, {}, None),
-        ({"planning_rate": 1.0}, {}, {}, None),
-        (
-            *({"planning_rate": 5.0}, {}, {}),
-            "planning_rate: 5 Hz changes nothing: the planner acts when a command comes or a plan "
-            "fails, at no rate",
-        ),
-        ({"max_replan_attempts": 5}, {"planning": {"further_plans": 5}}, {}, None),
-        ({"max_replan_attempts": 0}, {"planning": {"further_plans": 0}}, {}, None),
-        ({"replan_on_failure": False}, {"planning": {"further_plans": 0}}, {}, None),
-        (
-            {"replan_on_failure": False, "max_replan_attempts": 5},
-            *({"planning": {"further_plans": 0}}, {}, None),
-        ),
-        ({"replan_on_failure": True, "max_replan_attempts": 3}, {}, {}, None),
-        ({"enable_memory": False, "max_memory_items": 10}, {}, {"remembered": 0}, None),
-        ({"enable_memory": False}, {}, {"remembered": 0}, None),
-        ({"enable_memory": True}, {}, {}, None),
-        ({"max_memory_items": 9000}, {}, {"remembered": 9000}, None),
-        (
-            *({"enable_memory": True, "max_memory_items": 10}, {}, {"remembered": 10}),
-            "max_memory_items: of the commands remembered, all but the newest 10 are forgotten; "
-            "profile desktop keeps 5000",
-        ),
+        ({"max_speed": 0.2}, changed(base={"max_speed_m_s": 0.2})),
+        ({"max_speed": 1.5}, changed(f"max_speed: 0.5 m/s holds, not 1.5: {NO_MORE}")),
+        ({"plan_timeout": 12.0}, changed(profile={"within_s": 12.0})),
+        ({"plan_timeout": 0.2}, changed(WITHIN.format(1, 0.2), profile={"within_s": 1.0})),
+        ({"plan_timeout": 600.0}, changed(WITHIN.format(300, 600), profile={"within_s": 300.0})),
+        ({"action_timeout": 60.0}, changed()),  # the default leaves each skill its own
+        ({"action_timeout": 20.0}, changed(planning={"action_timeout_s": 20.0})),
+        ({"planning_rate": 1.0}, changed()),
+        ({"planning_rate": 5.0}, changed(AT_NO_RATE)),
+        ({"max_replan_attempts": 5}, plans(5)),
+        ({"max_replan_attempts": 0}, plans(0)),
+        ({"replan_on_failure": False}, plans(0)),
+        ({"replan_on_failure": False, "max_replan_attempts": 5}, plans(0)),
+        ({"replan_on_failure": True, "max_replan_attempts": 3}, changed()),
+        ({"enable_memory": False}, changed(profile={"remembered": 0})),
+        ({"enable_memory": False, "max_memory_items": 10}, changed(profile={"remembered": 0})),
+        ({"enable_memory": True}, changed()),
+        ({"enable_memory": True, "max_memory_items": 10}, changed(CUT, profile={"remembered": 10})),
+        ({"max_memory_items": 9000}, changed(profile={"remembered": 9000})),
     ],
 )
-def test_each_changes_what_it_is_about(
-    effects, given: dict[str, Any], robot: dict[str, Any], profile: dict[str, Any], note: str | None
-) -> None:
-    expected = ParameterEffects(robot=robot, profile=profile, notes=[note] if note else [])
+def test_each_changes_what_it_is_about(effects, given, expected) -> None:
     assert effects(**given) == expected
 
 
