@@ -28,7 +28,7 @@ from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import RosSettings
-from vla_deploy.supervisor.processes.ros_launching import launch_environment
+from vla_deploy.supervisor.processes.ros_environment import launch_environment
 
 GOAL_CORE_SHARE: Final = 0.15
 RATE_HZ: Final = 100.0

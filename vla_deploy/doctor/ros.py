@@ -9,7 +9,7 @@ from typing import Any, Final
 from platforms.tree import ValueMissing
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
-from vla_deploy.gateways.ros.imports import IMPORTS, remedy
+from vla_deploy.gateways.ros.imports import IMPORTS, MESSAGES, remedy
 from vla_deploy.gateways.ros.shared_memory import find_leftovers
 from vla_deploy.robots.ros_settings import Accepts, RosSettings
 from vla_deploy.supervisor.errors import RosNotFound
@@ -115,9 +115,8 @@ def _imported(report: dict[str, Any]) -> Iterator[DoctorFinding]:
         yield ok("rclpy", report["rclpy"])
     for module, why in absent.items():
         yield fail(module, f"cannot be imported: {why}", remedy(module))
-    messages = [name for name, one in IMPORTS.items() if one.is_message_package]
     if not absent:
-        yield ok("ROS messages", f"all {len(messages)} packages")
+        yield ok("ROS messages", f"all {len(MESSAGES)} packages")
 
 
 def _middleware(report: dict[str, Any]) -> Iterator[DoctorFinding]:

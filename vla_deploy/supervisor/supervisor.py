@@ -30,7 +30,7 @@ from vla_deploy.supervisor.processes.lifecycle import (
     wind_down,
 )
 from vla_deploy.supervisor.processes.liveness import Vital
-from vla_deploy.supervisor.processes.ros_launching import require_environment
+from vla_deploy.supervisor.processes.ros_environment import require_environment
 from vla_deploy.supervisor.profiles.profile_change import Member
 from vla_deploy.supervisor.runs.log_files import complaint, last_words
 from vla_deploy.supervisor.runs.options import RunOptions

@@ -8,7 +8,7 @@ import pytest
 from vla_deploy.robots import RobotFileError, load_robot
 from vla_deploy.robots.loader import ROBOT_FILE, ROBOTS_DIR
 from vla_deploy.supervisor.errors import RosNotFound
-from vla_deploy.supervisor.processes.ros_launching import require_environment
+from vla_deploy.supervisor.processes.ros_environment import require_environment
 
 
 def with_ros(folder: Path, table: str) -> Path:

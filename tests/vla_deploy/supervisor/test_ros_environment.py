@@ -57,27 +57,25 @@ def find(tmp_path):
     return find_here
 
 
-def test_the_configured_interpreter_goes_before_everything(tmp_path, find) -> None:
-    chosen = make_wheels(tmp_path / "chosen")
-    other = make_wheels(tmp_path / "other")
-    make_wheels(tmp_path / "checkout" / ".venv-ros")
-    for named in (str(chosen), str(tmp_path / "chosen")):
-        found = find(named, **{VARIABLE: str(other)})
-        assert (found.python, "the robot file" in found.origin) == (chosen, True)
-
-
-def test_the_variable_goes_before_what_is_found(tmp_path, find) -> None:
-    other = make_wheels(tmp_path / "other")
-    make_wheels(tmp_path / "checkout" / ".venv-ros")
-    assert find(**{VARIABLE: str(other)}).python == other
-
-
-def test_wheels_beside_the_checkout_go_before_the_systems_ros(tmp_path, find) -> None:
-    wheels = make_wheels(tmp_path / "checkout" / ".venv-ros")
+@pytest.mark.parametrize(
+    ("laid_out", "configured", "variable", "found"),
+    [
+        (("chosen", "other", "checkout/.venv-ros"), "chosen/bin/python", "other", "chosen"),
+        (("chosen", "other", "checkout/.venv-ros"), "chosen", "other", "chosen"),
+        (("other", "checkout/.venv-ros"), "", "other", "other"),
+        (("checkout/.venv-ros",), "", "", "checkout/.venv-ros"),
+    ],
+)
+def test_what_is_configured_goes_before_the_variable_before_wheels_before_the_systems_ros(
+    tmp_path, find, laid_out, configured, variable, found
+) -> None:
     make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
-    found = find()
-    assert found.python == wheels
-    assert found.variables["PYTHONPATH"] == found.variables["AMENT_PREFIX_PATH"] == ""
+    wheels = {folder: make_wheels(tmp_path / folder) for folder in laid_out}
+    named = str(tmp_path / configured) if configured else ""
+    environment = find(named, **({VARIABLE: str(tmp_path / variable)} if variable else {}))
+    assert environment.python == wheels[found]
+    assert ("the robot file" in environment.origin) == bool(configured)
+    assert environment.variables["PYTHONPATH"] == environment.variables["AMENT_PREFIX_PATH"] == ""
 
 
 def test_wheels_that_are_not_whole_are_passed_over(tmp_path, find) -> None:
@@ -117,24 +115,26 @@ def test_an_interpreter_without_wheels_gets_the_systems_setup(tmp_path, find) ->
     assert (found.python, found.variables["ROS_DISTRO"]) == (Path(sys.executable), "jazzy")
 
 
-@pytest.mark.parametrize("named", ["absent", "folder", "file"])
-def test_what_is_named_but_no_interpreter_is_refused(tmp_path, find, named) -> None:
+@pytest.mark.parametrize(
+    ("configured", "workspace", "why"),
+    [
+        ("absent", "", "robot file names .*absent.* expected an interpreter"),
+        ("folder", "", "robot file names .*folder.* expected an interpreter"),
+        ("file", "", "robot file names .*file.* expected an interpreter"),
+        ("", "folder", "colcon build"),
+        ("wheels", "folder", "leave out one of"),
+    ],
+)
+def test_what_is_named_but_cannot_be_used_is_refused(
+    tmp_path, find, configured, workspace, why
+) -> None:
+    make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
+    make_wheels(tmp_path / "wheels")
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
-    with pytest.raises(RosNotFound, match=f"robot file names .*{named}.* expected an interpreter"):
-        find(str(tmp_path / named))
-
-
-def test_a_workspace_that_was_not_built_is_refused(tmp_path, find) -> None:
-    make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
-    with pytest.raises(RosNotFound, match="colcon build"):
-        find(workspace=str(tmp_path / "ws"))
-
-
-def test_a_workspace_over_wheels_is_refused(tmp_path, find) -> None:
-    wheels = make_wheels(tmp_path / "wheels")
-    with pytest.raises(RosNotFound, match="leave out one of"):
-        find(str(wheels), str(tmp_path / "ws"))
+    names = [str(tmp_path / name) if name else "" for name in (configured, workspace)]
+    with pytest.raises(RosNotFound, match=why):
+        find(*names)
 
 
 def test_a_setup_script_that_fails_is_told_in_its_own_words(tmp_path, find) -> None:

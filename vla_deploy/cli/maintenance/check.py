@@ -16,7 +16,7 @@ from vla_deploy.planning.planner import checked
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.processes.ros_launching import require_environment
+from vla_deploy.supervisor.processes.ros_environment import require_environment
 
 SCHEMAS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {
     "plan": plan_schema,

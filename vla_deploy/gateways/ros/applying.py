@@ -79,9 +79,7 @@ def holding(given: Values, robot: RobotDescription, profile: Profile) -> dict[st
 def _max_speed(given: Values, robot: RobotDescription, effects: ParameterEffects) -> None:
     asked_m_s, own_m_s = float(given["max_speed"]), robot.base.max_speed_m_s
     if asked_m_s > own_m_s:
-        effects.notes.append(
-            f"max_speed: {own_m_s:g} m/s holds, not {asked_m_s:g}: the robot file allows no more"
-        )
+        effects.notes.append(_no_more("max_speed", own_m_s, asked_m_s, "m/s"))
     elif asked_m_s < own_m_s:
         effects.robot["base"] = {"max_speed_m_s": asked_m_s}
 
@@ -100,16 +98,17 @@ def _require_confirmation(
 
 
 def _action_timeout(given: Values, robot: RobotDescription, effects: ParameterEffects) -> None:
-    asked_s = float(given["action_timeout"])
+    asked_s, own_s = float(given["action_timeout"]), robot.planning.action_timeout_s
     if asked_s == _DEFAULTS["action_timeout"]:
         return  # each skill has a time-out that suits it
-    if asked_s > robot.planning.action_timeout_s:
-        effects.notes.append(
-            f"action_timeout: {robot.planning.action_timeout_s:g} s holds, not {asked_s:g}: "
-            "the robot file allows no more"
-        )
-        return
-    _planning(effects)["action_timeout_s"] = asked_s
+    if asked_s > own_s:
+        effects.notes.append(_no_more("action_timeout", own_s, asked_s, "s"))
+    else:
+        _planning(effects)["action_timeout_s"] = asked_s
+
+
+def _no_more(name: str, own: float, asked: float, unit: str) -> str:
+    return f"{name}: {own:g} {unit} holds, not {asked:g}: the robot file allows no more"
 
 
 def _plan_timeout(given: Values, robot: RobotDescription, effects: ParameterEffects) -> None:

@@ -1,8 +1,8 @@
-"""Follow the commands of every source, for the parts that tell the graph what becomes of them."""
+"""Follow the commands of every source, for the parts that publish what becomes of them."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from vla_deploy.client.action_status import FINAL
@@ -23,10 +23,12 @@ class CommandNews:
 
 
 @dataclass(slots=True, kw_only=True)
-class _UnderWay:
-    text: str
-    plan: Mapping[str, Any]
-    statuses: dict[str, str]
+class PlanUnderWay:
+    """Hold the plan of a command, its words, and how each action stands, by its id."""
+
+    text: str = ""
+    actions: Sequence[Mapping[str, Any]] = ()
+    statuses: dict[str, str] = field(default_factory=dict)
     has_begun: bool = False
 
 
@@ -40,7 +42,7 @@ class RobotCommands:
         self.has_succeeded: bool | None = None
         self._ros_ns = ros_ns
         self._ended_ns = 0
-        self._under_way: dict[str, _UnderWay] = {}
+        self._under_way: dict[str, PlanUnderWay] = {}
         self._coming: list[CommandNews] = []
         self._history = CommandHistory(link, ros_ns, self._follow)
 
@@ -50,24 +52,16 @@ class RobotCommands:
         return (self._ros_ns() - self._ended_ns) / 1e9
 
     @property
-    def text(self) -> str:
-        """Return what is under way in words, "" where nothing is."""
-        return "" if self._current is None else self._current.text
-
-    @property
-    def actions(self) -> Sequence[Mapping[str, Any]]:
-        """Return the actions of the plan under way."""
-        return () if self._current is None else self._current.plan["actions"]
-
-    @property
-    def statuses(self) -> Mapping[str, str]:
-        """Return how each action of the plan under way stands, by its id."""
-        return {} if self._current is None else self._current.statuses
+    def current(self) -> PlanUnderWay:
+        """Return what the executor has begun, else what it was given; an empty one for nothing."""
+        found = list(self._under_way.values())
+        begun = (one for one in found if one.has_begun)
+        return next(begun, found[0] if found else PlanUnderWay())
 
     @property
     def actions_left(self) -> int:
         """Return how many actions of the plan under way have not ended."""
-        return sum(status not in FINAL for status in self.statuses.values())
+        return sum(status not in FINAL for status in self.current.statuses.values())
 
     def step(self, now_ns: int) -> None:
         """Take what is new; `news` is of this step alone."""
@@ -78,20 +72,14 @@ class RobotCommands:
         """Close the topics."""
         self._history.stop()
 
-    @property
-    def _current(self) -> _UnderWay | None:
-        """Return what the executor has begun; else what it was given."""
-        found = list(self._under_way.values())
-        return next((one for one in found if one.has_begun), found[0] if found else None)
-
     def _follow(self, record: CommandRecord, event: dict[str, Any]) -> None:
         self._coming.append(CommandNews(record=record, event=event))
         name, command_id = event.get("event"), record.command_id
         if name == "plan":
             plan = event["plan"]
-            self._under_way[command_id] = _UnderWay(
+            self._under_way[command_id] = PlanUnderWay(
                 text=record.text or str(plan["goal"]),
-                plan=plan,
+                actions=plan["actions"],
                 statuses={one["id"]: "pending" for one in plan["actions"]},
             )
         elif name == "action":

@@ -1,6 +1,6 @@
 """Show in the graph which parameters hold; none of them changes while the robot runs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from rcl_interfaces.msg import (
@@ -25,7 +25,7 @@ _NAMES: Final = frozenset(one.name for one in PARAMETERS)
 _HOW: Final = "set it in the parameter file and start again"
 
 
-class SteadyNode(Node):  # type: ignore[misc]  # rclpy tells no types
+class SteadyNode(Node):  # type: ignore[misc]  # rclpy has no types
     """Be a node whose parameters, those of the table, are set before it starts."""
 
     def __init__(self, name: str, values: Mapping[str, Any], **options: Any) -> None:
@@ -67,19 +67,13 @@ def _descriptor(parameter: RosParameter, value: Any) -> ParameterDescriptor:
     )
     if parameter.choices:
         descriptor.additional_constraints = parameter.expected
-    for kind, span in _ranges(parameter, value):
-        setattr(descriptor, kind, [span])
+    if parameter.low is not None and parameter.high is not None:
+        # What a robot file has set may lie beyond the parameter's range.
+        low, high = min(parameter.low, value), max(parameter.high, value)
+        if isinstance(parameter.default, int):
+            span = IntegerRange(from_value=int(low), to_value=int(high), step=1)
+            descriptor.integer_range = [span]
+        else:
+            span = FloatingPointRange(from_value=float(low), to_value=float(high))
+            descriptor.floating_point_range = [span]
     return descriptor
-
-
-def _ranges(parameter: RosParameter, value: Any) -> Iterator[tuple[str, Any]]:
-    """Return the range, if any; what a robot file has set may lie beyond it."""
-    if parameter.low is None or parameter.high is None:
-        return
-    low, high = min(parameter.low, value), max(parameter.high, value)
-    if isinstance(parameter.default, int):
-        span = IntegerRange(from_value=int(low), to_value=int(high), step=1)
-        yield "integer_range", span
-    else:
-        span = FloatingPointRange(from_value=float(low), to_value=float(high))
-        yield "floating_point_range", span

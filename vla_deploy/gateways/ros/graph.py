@@ -4,29 +4,35 @@ What comes in is handled in the node's step, in the order of arrival, so that on
 deals with the robot. A press of the stop does not wait for that.
 """
 
+import json
 import logging
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import rclpy
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
+    qos_profile_sensor_data,
 )
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from std_msgs.msg import String
 
 from vla_deploy.gateways.ros.declaring import SteadyNode
 
 NODE_NAME: Final = "vla_deploy"
+PUBLISHED_BY: Final = "published_by"
+"""Where a topic is published and subscribed here, the key by which we know our own."""
 MOST_WAITING: Final = 256
 """Of what comes in between two steps; what is more is dropped, and counted."""
 SOURCE: Final = "ros"
@@ -37,22 +43,11 @@ _LOOKS: Final = 4
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
 
-RELIABLE: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
-)
-SENSOR: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
-)
-LATCHED: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+RELIABLE: Final = QoSProfile(depth=10)
+SENSOR: Final = qos_profile_sensor_data
+LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # A subscription that takes from publishers of either reliability.
-ANY: Final = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.BEST_EFFORT
-)
+ANY: Final = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def named(nodes: Iterable[str]) -> str:
@@ -61,19 +56,7 @@ def named(nodes: Iterable[str]) -> str:
     return f"{SOURCE}:{listed}" if listed else SOURCE
 
 
-class Publisher(Protocol):
-    """Send messages of one topic."""
-
-    def publish(self, message: Any) -> None:
-        """Send one."""
-        ...
-
-    def get_subscription_count(self) -> int:
-        """Return how many listen."""
-        ...
-
-
-class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
+class _Waking(Future):  # type: ignore[misc]  # rclpy has no types
     """Wake the executor with the result: rclpy 7 looks at what awaits only when something comes."""
 
     def __init__(self, executor: SingleThreadedExecutor) -> None:
@@ -107,8 +90,7 @@ class GraphLink:
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
         """Return a publisher."""
-        made: Publisher = self.node.create_publisher(kind, topic, qos)
-        return made
+        return self.node.create_publisher(kind, topic, qos)
 
     def listen(
         self, kind: type, topic: str, take: Callable[[Any], None], qos: QoSProfile = ANY
@@ -122,7 +104,7 @@ class GraphLink:
         """Subscribe; each message is taken in a step, with who sent it."""
 
         def receive(message: Any) -> None:
-            sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
+            sender = self.sender(topic)  # now: who sends once may be gone in a moment
             if sender == SOURCE:
                 find = partial(self.sender, topic)
                 self.put(lambda: self.when_named(find, partial(take, message)))
@@ -136,7 +118,7 @@ class GraphLink:
     ) -> None:
         """Give `take`, in a step, the name that `find` returns.
 
-        DDS tells a node's name after its publishers and clients, so some steps are waited for it.
+        DDS has a node's name after its publishers and clients, so some steps are waited for it.
         """
         name = find()
         if name == SOURCE and looks:
@@ -145,7 +127,7 @@ class GraphLink:
             take(name)
 
     def sender(self, topic: str) -> str:
-        """Return who publishes a topic beside us, for logs and the audit trail.
+        """Return which other nodes publish a topic, for logs and the audit trail.
 
         rclpy does not say which publisher a message came from: of several all are named.
         """
@@ -157,7 +139,7 @@ class GraphLink:
         return named(self._others((one.node_name, one.node_namespace) for one in found))
 
     def caller(self, service: str) -> str:
-        """Return who has a client of a service beside us: its caller is among them."""
+        """Return which other nodes have a client of a service: its caller is among them."""
         callers = []
         for name, namespace in self.node.get_node_names_and_namespaces():
             try:
@@ -221,3 +203,36 @@ class GraphLink:
             self._executor.spin()
         except ExternalShutdownException:
             _log.info("left the ROS graph")
+
+
+class JsonTopic:
+    """Publish JSON documents as std_msgs/String, as nodes do that have no messages of their own.
+
+    Several topics get the same; numbers that JSON has no form for become null.
+    """
+
+    def __init__(self, graph: GraphLink, *topics: str) -> None:
+        self._publishers = [graph.publisher(String, topic) for topic in topics]
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anybody listens."""
+        return any(one.get_subscription_count() > 0 for one in self._publishers)
+
+    def publish(self, document: Any) -> None:
+        """Publish a document."""
+        text = json.dumps(_finite(document), separators=(",", ":"), ensure_ascii=False)
+        self.publish_text(text)
+
+    def publish_text(self, text: str) -> None:
+        """Publish a text as it is."""
+        for publisher in self._publishers:
+            publisher.publish(String(data=text))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,4 +1,4 @@
-"""Run the gateway: parts that tell, parts that take, and a word about how it is."""
+"""Run the gateway: parts that publish, parts that take, and how the gateway itself is."""
 
 import logging
 from collections.abc import Sequence
@@ -9,30 +9,44 @@ from platforms import load_profile
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.applying import holding
 from vla_deploy.gateways.ros.commands import RobotCommands
-from vla_deploy.gateways.ros.feedback import CommandFeedback
-from vla_deploy.gateways.ros.graph import SOURCE, GraphLink
+from vla_deploy.gateways.ros.conversions import RosTime
+from vla_deploy.gateways.ros.geometry import BodyFrames
+from vla_deploy.gateways.ros.graph import SOURCE, GraphLink, JsonTopic
 from vla_deploy.gateways.ros.inward.parts import inward_parts
 from vla_deploy.gateways.ros.outgoing.courier import Courier
 from vla_deploy.gateways.ros.outgoing.lending import Lending
-from vla_deploy.gateways.ros.outward.parts import outward_parts
+from vla_deploy.gateways.ros.outward.body import BodyTopics
+from vla_deploy.gateways.ros.outward.context_topics import ContextTopics
+from vla_deploy.gateways.ros.outward.maps import EnvironmentMap, StaticMap, read_robot_map
+from vla_deploy.gateways.ros.outward.markers import SceneMarkers
+from vla_deploy.gateways.ros.outward.planner_topics import PlannerTopics
+from vla_deploy.gateways.ros.outward.robot_state import (
+    EventsTopic,
+    HealthTopic,
+    StateTopic,
+    SupplyTopic,
+)
+from vla_deploy.gateways.ros.outward.scene import Locator, SceneObjects
+from vla_deploy.gateways.ros.outward.sensors import Images, Inertia, Scans
+from vla_deploy.gateways.ros.outward.voice import VoiceTopics
 from vla_deploy.gateways.ros.parameters import handed_over_parameters
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
-from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.ipc import CellWriter
+from vla_deploy.ipc.ros_goals import STATUS
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
-STATUS_TOPIC: Final = "ros_status"
-_TELL_HZ: Final = 2.0
+FEEDBACK_TOPICS: Final = ("/cognitive_planner/feedback", "/llm_planner/feedback")
+_STATUS_HZ: Final = 2.0
 _MOST_RATE_HZ: Final = 100.0
 _log = logging.getLogger(__name__)
 
 
 class RosGatewayNode:
-    """Step every part at the rate of the fastest, and tell twice a second how things are."""
+    """Step every part at the rate of the fastest, and publish twice a second how the gateway is."""
 
     def __init__(self, context: NodeContext) -> None:
         self._context = context
@@ -44,7 +58,7 @@ class RosGatewayNode:
         self._time = RosTime(context.clock)
         self._parts: Sequence[GatewayPart] = ()
         self._guard = PartGuard(_log)
-        self._tell_due = Due(_TELL_HZ)
+        self._status_due = Due(_STATUS_HZ)
         given, profile = handed_over_parameters(), load_profile(context.profile)
         self._parameters = holding(given, self._robot, profile)
         self._graph: GraphLink | None = None
@@ -52,7 +66,7 @@ class RosGatewayNode:
 
     def start(self) -> None:
         """Join the graph."""
-        self._status = self._link.space.cell_writer(STATUS_TOPIC)
+        self._status = self._link.space.cell_writer(STATUS)
         for leftover in remove_leftovers():
             _log.info("removed %s, which a killed process of ROS has left", leftover.name)
         self._graph = GraphLink(self._parameters)
@@ -63,7 +77,7 @@ class RosGatewayNode:
             robot=self._robot,
             settings=self._robot.ros,
             commands=RobotCommands(self._link, self._time.now_ns),
-            feedback=CommandFeedback(self._graph),
+            feedback=JsonTopic(self._graph, *FEEDBACK_TOPICS),
         )
         lending = Lending(self._link)
         # What is lent no longer is known before anything is taken from the graph.
@@ -85,18 +99,18 @@ class RosGatewayNode:
         self._guard.run("inbox", self._graph.take)
         for part in self._parts:
             self._guard.run(type(part).__name__, partial(part.step, self._context.clock.now_ns()))
-        if self._tell_due.is_now(self._context.clock.now_ns()):
-            self._tell(self._graph)
+        if self._status_due.is_now(self._context.clock.now_ns()):
+            self._publish_status(self._graph)
 
     def stop(self) -> None:
-        """End what is under way for the graph, tell it why, and leave."""
+        """End what is under way for the graph, with a reason, and leave."""
         for part in self._parts:
             part.stop()
         if self._graph is not None:
             self._graph.close()
         self._link.close()
 
-    def _tell(self, graph: GraphLink) -> None:
+    def _publish_status(self, graph: GraphLink) -> None:
         node = graph.node
         self._status.put_document(
             {
@@ -108,3 +122,27 @@ class RosGatewayNode:
                 "failures": dict(self._guard.failures),
             }
         )
+
+
+def outward_parts(gateway: Gateway) -> tuple[GatewayPart, ...]:
+    """Return the parts that publish; the commands' news come first, since others read them."""
+    locator = Locator(gateway.link, gateway.robot)
+    file, frames = read_robot_map(gateway), BodyFrames(gateway.robot)
+    return (
+        gateway.commands,
+        BodyTopics(gateway),
+        Scans(gateway),
+        Inertia(gateway),
+        Images(gateway),
+        StaticMap(gateway, file),
+        EnvironmentMap(gateway, frames, file),
+        SceneObjects(gateway, frames),
+        SceneMarkers(gateway, locator),
+        StateTopic(gateway),
+        SupplyTopic(gateway),
+        HealthTopic(gateway),
+        EventsTopic(gateway),
+        PlannerTopics(gateway, locator),
+        ContextTopics(gateway, locator, file),
+        VoiceTopics(gateway),
+    )

@@ -1,4 +1,4 @@
-"""Define what the parts of the gateway share: graph, robot, time, settings."""
+"""Define what the parts of the gateway share: graph, robot, time, settings, and their pace."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,18 +6,19 @@ from typing import Any, Final, Protocol
 
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.commands import RobotCommands
-from vla_deploy.gateways.ros.feedback import CommandFeedback
-from vla_deploy.gateways.ros.graph import GraphLink
-from vla_deploy.gateways.ros.stamps import RosTime
+from vla_deploy.gateways.ros.conversions import RosTime
+from vla_deploy.gateways.ros.graph import GraphLink, JsonTopic
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
 
+MAP: Final = "map"
+ODOM: Final = "odom"
 _STATUS_AGE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gateway:
-    """Hold for each part what it works with."""
+    """Hold for each part what it works with; `feedback` takes what becomes of commands."""
 
     graph: GraphLink
     link: RobotLink
@@ -25,7 +26,7 @@ class Gateway:
     robot: RobotDescription
     settings: RosSettings
     commands: RobotCommands
-    feedback: CommandFeedback
+    feedback: JsonTopic
 
     def control_status(self) -> Mapping[str, Any] | None:
         """Return how control is, or None where it is silent."""
@@ -33,15 +34,15 @@ class Gateway:
 
 
 class GatewayPart(Protocol):
-    """Do one thing for the graph; steps are called at the gateway's pace."""
+    """Do one thing for the graph; a part that is stepped or stopped for nothing inherits that."""
 
     def step(self, now_ns: int) -> None:
-        """Publish or handle what is due."""
-        ...
+        """Publish or handle what is due; called at the gateway's pace."""
+        return
 
     def stop(self) -> None:
         """End what is under way, with a reason."""
-        ...
+        return
 
 
 class Due:

@@ -1,7 +1,7 @@
 """Find and remove what Fast DDS leaves in /dev/shm when a process is killed.
 
 A segment is `fastrtps_<16 hex digits>`, a port `fastrtps_port<number>`. The owner of one holds a
-lock (flock) on a file beside it: `<name>_el` where it is the only one, `<name>_sl` where it shares
+lock (flock) on a file next to it: `<name>_el` where it is the only one, `<name>_sl` where it shares
 the port. The kernel releases the lock when the process ends, however it ends. So a lock file that
 is not locked belongs to a dead process: `fastdds shm clean` goes by the same rule.
 

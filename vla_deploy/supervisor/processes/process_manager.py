@@ -18,7 +18,7 @@ from vla_deploy.supervisor.errors import RosNotFound
 from vla_deploy.supervisor.processes.lifecycle import Action, ProcessAct, ProcessSeen
 from vla_deploy.supervisor.processes.liveness import Liveness, Readiness, Vital
 from vla_deploy.supervisor.processes.process import ChildProcess
-from vla_deploy.supervisor.processes.ros_launching import launch_environment
+from vla_deploy.supervisor.processes.ros_environment import launch_environment
 from vla_deploy.supervisor.runs.log_files import OUTPUT_SUFFIX
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE, end_leftovers

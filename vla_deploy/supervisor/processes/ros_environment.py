@@ -1,4 +1,4 @@
-"""Find the Python environment of ROS 2 Jazzy: the interpreter of the gateway, and its variables.
+"""Find the Python environment of ROS 2 Jazzy, and decide how the gateway is started in it.
 
 Of this project it sees three packages by links, never our own environment: ROS's Python may be of
 another version, and its NumPy another one.
@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.supervisor.errors import RosNotFound
 
 VARIABLE: Final = "VLA_DEPLOY_ROS_PYTHON"
@@ -25,11 +27,16 @@ SETUP_TIMEOUT_S: Final = 20.0
 _COMPLETE: Final = ".complete"  # scripts/ros-environment writes it last
 _BOOTSTRAPPER: Final = "lib/python3*/site-packages/ros_wheels_bootstrapper.pth"
 # Another ROS, or our own environment, may have set these for the supervisor. The bootstrapper of
-# the wheels restarts the interpreter to set LD_LIBRARY_PATH, unless it is told that it has.
+# the wheels restarts the interpreter to set LD_LIBRARY_PATH, unless this variable says that it has.
 _CLEARED: Final = ("PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
 # A setup.bash puts its folders in front of what it finds here.
 _PREFIXES: Final = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH")
 _OF_THE_SHELL: Final = frozenset({"_", "SHLVL", "PWD", "OLDPWD"})
+DOMAIN: Final = "ROS_DOMAIN_ID"
+DISCOVERY: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+PACKAGES_DIR: Final = "ros/packages"
+LOGS_DIR: Final = "logs/ros"
+TRANSPORT_PROFILE: Final = Path(__file__).with_name("fastdds_profile.xml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +71,12 @@ def find_environment(
     if named:
         origin = "the robot file" if configured else f"the variable {VARIABLE}"
         python = _interpreter(Path(named).expanduser(), origin)
-        if _has_wheels(python):
-            _refuse_workspace(workspace, python)
+        if any(python.parent.parent.glob(_BOOTSTRAPPER)):
+            if workspace:
+                raise RosNotFound(
+                    f"the workspace {workspace} cannot be laid over the wheels of {python}: it was "
+                    "built against another ROS; leave out one of [ros] python and workspace"
+                )
             return _of_wheels(python, f"{python}, named by {origin}")
         layers = [setup] if setup.is_file() else []
         return _of_setup(python, layers, workspace, inherited, f"named by {origin}")
@@ -90,7 +101,9 @@ def link_packages(folder: Path) -> Path:
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         if spec is None or not spec.submodule_search_locations:
-            raise RosNotFound(f"no package {name} beside {__file__}: the installation is not whole")
+            raise RosNotFound(
+                f"no package {name} next to {__file__}: the installation is not whole"
+            )
         target = Path(spec.submodule_search_locations[0]).resolve()
         link = folder / name
         if not link.is_symlink() or link.readlink() != target:
@@ -98,6 +111,47 @@ def link_packages(folder: Path) -> Path:
             fresh.symlink_to(target)
             fresh.replace(link)
     return folder
+
+
+def launch_environment(
+    settings: RosSettings, run_dir: Path, inherited: Mapping[str, str] = os.environ
+) -> tuple[Path, dict[str, str]]:
+    """Return the interpreter, and what its environment has on top of the supervisor's.
+
+    Raises:
+        RosNotFound: this computer has no ROS 2 Jazzy, or not where the robot file says.
+    """
+    found = find_environment(settings.python, settings.workspace)
+    variables = dict(found.variables)
+    packages = link_packages(run_dir / PACKAGES_DIR)
+    paths = (str(packages), variables.get("PYTHONPATH", ""))
+    variables["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    variables[DISCOVERY] = settings.discovery.upper()
+    if settings.domain_id is not None:
+        variables[DOMAIN] = str(settings.domain_id)
+    variables["ROS_LOG_DIR"] = str(run_dir / LOGS_DIR)
+    # An image is larger than the shared memory that Fast DDS takes by itself.
+    profile = inherited.get("FASTRTPS_DEFAULT_PROFILES_FILE", str(TRANSPORT_PROFILE))
+    variables["FASTRTPS_DEFAULT_PROFILES_FILE"] = profile
+    return found.python, variables
+
+
+def require_environment(robot: RobotDescription) -> None:
+    """See that a robot which is driven or moved over ROS can be.
+
+    Raises:
+        RosNotFound: it is, and this computer has no ROS 2 Jazzy, or not where the robot file says.
+    """
+    settings = robot.ros
+    if not settings.is_needed:
+        return
+    try:
+        find_environment(settings.python, settings.workspace)
+    except RosNotFound as error:
+        raise RosNotFound(
+            f"robot {robot.name}: [ros] says navigation = {settings.navigation!r} and arms = "
+            f'{settings.arms!r}, which needs ROS; set both to "own", or: {error}'
+        ) from error
 
 
 def _places() -> tuple[Path, ...]:
@@ -114,18 +168,6 @@ def _interpreter(named: Path, origin: str) -> Path:
             f"virtual environment, but {python} cannot be run; mend it, or leave it out"
         )
     return python.absolute()
-
-
-def _has_wheels(python: Path) -> bool:
-    return any(python.parent.parent.glob(_BOOTSTRAPPER))
-
-
-def _refuse_workspace(workspace: str, python: Path) -> None:
-    if workspace:
-        raise RosNotFound(
-            f"the workspace {workspace} cannot be laid over the wheels of {python}: it was built "
-            "against another ROS; leave out one of [ros] python and workspace"
-        )
 
 
 def _of_wheels(python: Path, origin: str) -> RosEnvironment:

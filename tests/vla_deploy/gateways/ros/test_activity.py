@@ -2,13 +2,13 @@
 
 import pytest
 
-from vla_deploy.gateways.ros.outward.activity import Activity, CapstoneState, PlanState
+from vla_deploy.gateways.ros.outward.activity import Activity, CapstoneState, PlanState, activity_of
 
 ARMED, AT_REST = {"state": "armed"}, {"state": "idle", "skill": None}
 
 
 def of(control=ARMED, executor=AT_REST, planner=None, speech=None, **ended):
-    return Activity.of(control, executor, planner, speech, **ended)
+    return activity_of(control, executor, planner, speech, **ended)
 
 
 def doing(skill, state="executing"):
@@ -31,6 +31,7 @@ def doing(skill, state="executing"):
         (of({"state": "stopped"}, doing("move")), "STOPPED", "paused"),
         (of({"state": "disarmed"}), "STOPPED", "idle"),
         (of(None, None), "STOPPED", "idle"),
+        (Activity(), "STOPPED", "idle"),
         (of(has_succeeded=True, ended_s=1.0), "COMPLETED", "completed"),
         (of(has_succeeded=True, ended_s=9.0), "IDLE", "completed"),
         (of(has_succeeded=False, ended_s=1.0), "IDLE", "failed"),

@@ -12,6 +12,16 @@ from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.plan_bounds import Confirm
 
 DEFAULTS = {one.name: one.default for one in PARAMETERS}
+NO_MORE = "the robot file allows no more"
+WITHIN = "plan_timeout: {:g} s holds, not {:g}: it may be 1 to 300 s"
+AT_NO_RATE = (
+    "planning_rate: 5 Hz changes nothing: "
+    "the planner acts when a command comes or a plan fails, at no rate"
+)
+CUT = (
+    "max_memory_items: of the commands remembered, all but the newest 10 are forgotten; "
+    "profile desktop keeps 5000"
+)
 STAIRS = (
     "restricted_areas: no such place on the map, so nothing to keep out of: stairs, outside; places"
 )
@@ -46,11 +56,40 @@ def test_the_defaults_change_times_only_and_forget_nothing(effects) -> None:
     assert "all but the newest 99 are forgotten" in effects(max_memory_items=99).notes[0]
 
 
-def test_a_lower_speed_holds_and_a_higher_one_does_not(effects) -> None:
-    assert effects(max_speed=0.2).robot == {"base": {"max_speed_m_s": 0.2}}
-    faster = effects(max_speed=1.5)
-    assert faster.robot == {}
-    assert faster.notes == ["max_speed: 0.5 m/s holds, not 1.5: the robot file allows no more"]
+def changed(*notes: str, profile: dict[str, Any] | None = None, **robot: Any) -> ParameterEffects:
+    return ParameterEffects(robot=robot, profile=profile or {}, notes=list(notes))
+
+
+def plans(further: int) -> ParameterEffects:
+    return changed(planning={"further_plans": further})
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"max_speed": 0.2}, changed(base={"max_speed_m_s": 0.2})),
+        ({"max_speed": 1.5}, changed(f"max_speed: 0.5 m/s holds, not 1.5: {NO_MORE}")),
+        ({"plan_timeout": 12.0}, changed(profile={"within_s": 12.0})),
+        ({"plan_timeout": 0.2}, changed(WITHIN.format(1, 0.2), profile={"within_s": 1.0})),
+        ({"plan_timeout": 600.0}, changed(WITHIN.format(300, 600), profile={"within_s": 300.0})),
+        ({"action_timeout": 60.0}, changed()),  # the default leaves each skill its own
+        ({"action_timeout": 20.0}, changed(planning={"action_timeout_s": 20.0})),
+        ({"planning_rate": 1.0}, changed()),
+        ({"planning_rate": 5.0}, changed(AT_NO_RATE)),
+        ({"max_replan_attempts": 5}, plans(5)),
+        ({"max_replan_attempts": 0}, plans(0)),
+        ({"replan_on_failure": False}, plans(0)),
+        ({"replan_on_failure": False, "max_replan_attempts": 5}, plans(0)),
+        ({"replan_on_failure": True, "max_replan_attempts": 3}, changed()),
+        ({"enable_memory": False}, changed(profile={"remembered": 0})),
+        ({"enable_memory": False, "max_memory_items": 10}, changed(profile={"remembered": 0})),
+        ({"enable_memory": True}, changed()),
+        ({"enable_memory": True, "max_memory_items": 10}, changed(CUT, profile={"remembered": 10})),
+        ({"max_memory_items": 9000}, changed(profile={"remembered": 9000})),
+    ],
+)
+def test_each_changes_what_it_is_about(effects, given, expected) -> None:
+    assert effects(**given) == expected
 
 
 def test_confirmation_is_of_risky_plans_or_of_none(effects, butler, desktop) -> None:
@@ -83,21 +122,6 @@ def test_where_the_robot_starts_cannot_be_restricted(effects) -> None:
     assert len(told.robot["home"]["zones"]) == 2
 
 
-def test_the_time_for_a_plan_is_kept_in_its_range(effects) -> None:
-    assert effects(plan_timeout=12.0).profile == {"within_s": 12.0}
-    for asked_s, within_s in ((0.2, 1.0), (600.0, 300.0)):
-        told = effects(plan_timeout=asked_s)
-        assert told.profile == {"within_s": within_s}
-        assert told.notes == [
-            f"plan_timeout: {within_s:g} s holds, not {asked_s:g}: it may be 1 to 300 s"
-        ]
-
-
-def test_the_time_for_an_action_at_its_default_leaves_each_skill_its_own(effects) -> None:
-    assert effects(action_timeout=60.0) == ParameterEffects()
-    assert effects(action_timeout=20.0).robot == {"planning": {"action_timeout_s": 20.0}}
-
-
 def test_the_time_for_an_action_is_never_above_the_robots_own(butler, desktop) -> None:
     robot = replace(butler, planning=replace(butler.planning, action_timeout_s=30.0))
     told = effects_of({"action_timeout": 90.0}, robot, desktop)
@@ -105,45 +129,9 @@ def test_the_time_for_an_action_is_never_above_the_robots_own(butler, desktop) -
     assert told.notes[0].startswith("action_timeout: 30 s holds, not 90")
 
 
-@pytest.mark.parametrize(
-    ("given", "further_plans"),
-    [
-        ({"max_replan_attempts": 5}, 5),
-        ({"max_replan_attempts": 0}, 0),
-        ({"replan_on_failure": False}, 0),
-        ({"replan_on_failure": False, "max_replan_attempts": 5}, 0),
-        ({"replan_on_failure": True, "max_replan_attempts": 3}, None),
-    ],
-)
-def test_further_plans(effects, given: dict[str, Any], further_plans: int | None) -> None:
-    planning = effects(**given).robot.get("planning", {})
-    assert planning.get("further_plans") == further_plans
-
-
-@pytest.mark.parametrize(
-    ("given", "remembered"),
-    [
-        ({"enable_memory": False}, 0),
-        ({"enable_memory": False, "max_memory_items": 10}, 0),
-        ({"enable_memory": True}, None),
-        ({"enable_memory": True, "max_memory_items": 10}, 10),
-        ({"max_memory_items": 9000}, 9000),
-    ],
-)
-def test_memory(effects, given: dict[str, Any], remembered: int | None) -> None:
-    assert effects(**given).profile.get("remembered") == remembered
-
-
 def test_memory_is_switched_on_where_the_profile_has_none(butler, desktop) -> None:
     profile = replace(desktop, planning=replace(desktop.planning, remembered=0))
     assert effects_of({"enable_memory": True}, butler, profile).profile == {"remembered": 100}
-
-
-def test_a_rate_of_planning_changes_nothing_and_says_so(effects) -> None:
-    assert effects(planning_rate=1.0) == ParameterEffects()
-    told = effects(planning_rate=5.0)
-    assert (told.robot, told.profile) == ({}, {})
-    assert told.notes[0].startswith("planning_rate: 5 Hz changes nothing")
 
 
 def test_what_holds_is_told_for_every_parameter_and_never_the_key(butler, desktop) -> None:

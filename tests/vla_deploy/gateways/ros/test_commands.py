@@ -40,15 +40,15 @@ def test_a_command_that_is_refused_meanwhile_leaves_the_one_under_way(robot) -> 
     robot.plan(first, "move", "speak")
     robot.action(first, "move", "active")
     robot.plan(second, "turn")
-    assert robot.commands.text == "tidy up"
+    assert robot.commands.current.text == "tidy up"
     robot.tell(second, "rejected", reason="busy")
-    assert dict(robot.commands.statuses) == {"move": "active", "speak": "pending"}
+    assert dict(robot.commands.current.statuses) == {"move": "active", "speak": "pending"}
     assert robot.commands.actions_left == 2
     robot.action(first, "move", "succeeded")
     assert robot.commands.actions_left == 1
     assert [one["skill"] for one in robot.commands.recent] == ["move"]
     robot.tell(first, "finished", success=True, error=None, actions=[])
-    assert (robot.commands.text, robot.commands.has_succeeded) == ("", True)
+    assert (robot.commands.current.text, robot.commands.has_succeeded) == ("", True)
 
 
 def test_another_plan_for_the_same_command_takes_the_place_of_the_failed_one(robot) -> None:
@@ -56,8 +56,8 @@ def test_another_plan_for_the_same_command_takes_the_place_of_the_failed_one(rob
     robot.plan(command, "move", "speak")
     robot.action(command, "move", "aborted")
     robot.plan(command, "turn")
-    assert dict(robot.commands.statuses) == {"turn": "pending"}
-    assert robot.commands.text == "tidy up"
+    assert dict(robot.commands.current.statuses) == {"turn": "pending"}
+    assert robot.commands.current.text == "tidy up"
 
 
 def test_a_stop_completes_nothing(robot) -> None:

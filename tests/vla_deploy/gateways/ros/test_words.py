@@ -4,8 +4,13 @@ import json
 
 import pytest
 
-from vla_deploy.gateways.ros.inward.orders import OrderInvalid
-from vla_deploy.gateways.ros.inward.words import is_stop_word, read_message, shown
+from vla_deploy.gateways.ros.inward.words import (
+    OrderInvalid,
+    is_stop_word,
+    parsed_plan,
+    read_message,
+    shown,
+)
 
 ACTION = {"action_type": "turn_left", "parameters": {"angle": 20}, "priority": 1}
 
@@ -62,6 +67,20 @@ def test_plans_are_found(document, plan) -> None:
 def test_what_is_no_command_is_refused(data, why) -> None:
     with pytest.raises(OrderInvalid, match=why):
         read_message(data)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{", "the plan is no JSON: Expecting"),
+        ('[{"distance": NaN}]', "NaN is no number"),
+        ("[" * 20_000, "nested too deeply"),
+        ("7", "expected an object or a list, got int"),
+    ],
+)
+def test_what_is_no_plan_is_refused(text, why) -> None:
+    with pytest.raises(OrderInvalid, match=why):
+        parsed_plan(text)
 
 
 def test_what_is_shown_is_short_and_plain() -> None:

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from drivers.clock import NS_PER_S
 from vla_deploy.client.acts import REACHED, why_not
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 from vla_deploy.ipc.stop_button import ESTOP
 
 EMERGENCY_STOP: Final = "/emergency_stop"
@@ -32,7 +32,7 @@ class _Asked:
     deadline_ns: int
 
 
-class Acts:
+class Acts(GatewayPart):
     """Hand acts to control, and answer when control shows them."""
 
     def __init__(self, gateway: Gateway, acts: tuple[str, ...]) -> None:

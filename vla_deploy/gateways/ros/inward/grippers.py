@@ -6,20 +6,20 @@ A position is the gap between the fingers in m, an effort the force of each fing
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from control_msgs.action import GripperCommand, ParallelGripperCommand
 from sensor_msgs.msg import JointState
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.motions import Claimed, JointView, Motions
-from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.pursuing import (
-    Begin,
+from vla_deploy.gateways.ros.inward.action_server import (
     Feedback,
     GoalEnding,
     GoalOutcome,
+    GoalRefused,
     GoalServer,
+    require_armed,
 )
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.robots import RobotDescription
@@ -29,12 +29,15 @@ REACHED_M: Final = 0.002
 STALLED_S: Final = 0.3
 STILL_M_S: Final = 0.002
 TIMEOUT_S: Final = 10.0
+_NO_CODE: Final = 0
+"""Neither action has codes or words in its results: the log has them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperJoint:
     """Describe a hand's fingers: their joint, the gap per joint value, the force of full effort."""
 
+    group: str
     joint: str
     gap_ratio: float
     most_n: float
@@ -47,6 +50,7 @@ class GripperJoint:
         joint = robot.group(described.gripper).joints[0]
         limits, ratio = robot.limits[joint], described.opening_ratio
         return cls(
+            group=described.gripper,
             joint=joint,
             gap_ratio=ratio,
             most_n=robot.stall_effort(joint),
@@ -65,173 +69,113 @@ class GripperState:
     stalled: bool
 
 
-class _Dialect(Protocol):
-    """Read goals and write results of one of the two actions."""
-
-    kind: Any
-
-    def wanted(self, goal: Any) -> tuple[float, float]:
-        """Return the wanted gap in m and the most force in N, 0 for the usual.
-
-        Raises:
-            ValueError: the goal is malformed.
-        """
-        ...
-
-    def result(self, state: GripperState | None) -> Any:
-        """Return the action's result."""
-        ...
-
-    def feedback(self, state: GripperState) -> Any:
-        """Return the action's feedback."""
-        ...
-
-
-class _Classic:
-    """Speak control_msgs/GripperCommand."""
-
-    kind = GripperCommand
-
-    def wanted(self, goal: Any) -> tuple[float, float]:
-        return float(goal.command.position), float(goal.command.max_effort)
-
-    def result(self, state: GripperState | None) -> Any:
-        return GripperCommand.Result(**self._told(state))
-
-    def feedback(self, state: GripperState) -> Any:
-        return GripperCommand.Feedback(**self._told(state))
-
-    def _told(self, state: GripperState | None) -> dict[str, Any]:
-        if state is None:
-            return {}
-        return {
-            "position": state.gap_m,
-            "effort": state.force_n,
-            "stalled": state.stalled,
-            "reached_goal": state.reached,
-        }
-
-
-class _Parallel:
-    """Speak control_msgs/ParallelGripperCommand, whose goal names the joint."""
-
-    kind = ParallelGripperCommand
-
-    def __init__(self, joint: str) -> None:
-        self._joint = joint
-
-    def wanted(self, goal: Any) -> tuple[float, float]:
-        command = goal.command
-        if list(command.name) not in ([], [self._joint]) or len(command.position) != 1:
-            raise ValueError(f"command: expected one position of {self._joint}")
-        if len(command.effort) > 1:
-            raise ValueError("command.effort: expected one value or none")
-        return float(command.position[0]), float(command.effort[0]) if command.effort else 0.0
-
-    def result(self, state: GripperState | None) -> Any:
-        if state is None:
-            return ParallelGripperCommand.Result()
-        return ParallelGripperCommand.Result(
-            state=self._state(state), stalled=state.stalled, reached_goal=state.reached
-        )
-
-    def feedback(self, state: GripperState) -> Any:
-        return ParallelGripperCommand.Feedback(state=self._state(state))
-
-    def _state(self, state: GripperState) -> JointState:
-        return JointState(
-            name=[self._joint],
-            position=[state.gap_m],
-            velocity=[state.speed_m_s],
-            effort=[state.force_n],
-        )
-
-
 def gripper_servers(gateway: Gateway, motions: Motions) -> Iterator[GoalServer]:
     """Yield the servers of every hand."""
     for hand, described in gateway.robot.hands.items():
         fingers = GripperJoint.of(gateway.robot, hand)
-        for dialect, name in (
-            (_Classic(), f"/{described.gripper}_controller/gripper_cmd"),
-            (_Parallel(fingers.joint), f"/{described.gripper}_parallel_controller/gripper_cmd"),
+        for action, name in (
+            (GripperAction(gateway, motions, fingers), "controller"),
+            (ParallelGripperAction(gateway, motions, fingers), "parallel_controller"),
         ):
-            server = GripperServer(gateway, motions, hand, fingers, dialect)
-            yield GoalServer(gateway.graph, dialect.kind, name, server.judge)
+            yield GoalServer(gateway, f"/{described.gripper}_{name}/gripper_cmd", action)
 
 
-class GripperServer:
-    """Judge the goals for one hand, and begin those that are sound."""
+class GripperAction:
+    """Judge the goals of GripperCommand for one hand, and begin those that are sound."""
 
-    def __init__(
-        self,
-        gateway: Gateway,
-        motions: Motions,
-        hand: str,
-        fingers: GripperJoint,
-        dialect: _Dialect,
-    ) -> None:
+    kind: Any = GripperCommand
+
+    def __init__(self, gateway: Gateway, motions: Motions, fingers: GripperJoint) -> None:
+        self.motions: Final = motions
+        self.fingers: Final = fingers
         self._gateway = gateway
-        self._motions = motions
-        self._fingers = fingers
-        self._dialect = dialect
-        group = gateway.robot.hands[hand].gripper
-        self._claim = Claimed(gateway.link, f"ros/{group}/{dialect.kind.__name__}", (group,))
+        holder = f"ros/{fingers.group}/{self.kind.__name__}"
+        self.claim: Final = Claimed(gateway.link, holder, (fingers.group,))
 
-    def judge(self, goal: Any) -> Begin | GoalOutcome:
-        """Return how to begin with a goal, or why not at all."""
-        try:
-            gap_m, force_n = self._dialect.wanted(goal)
-            self._check(gap_m, force_n)
-        except ValueError as error:
-            return self._refused(str(error))
-        why = refusal_of(self._gateway.control_status())
-        if why:
-            return self._refused(why)
-        return lambda feedback: self._begin(gap_m, force_n, feedback)
-
-    def _begin(self, gap_m: float, force_n: float, feedback: Feedback) -> "Gripping | GoalOutcome":
-        why = self._claim.why_not_taken()
-        if why:
-            return self._refused(why)
-        fingers = self._fingers
-        ratio = min(force_n / fingers.most_n, 1.0) if force_n else 1.0
-        joint = fingers.joint
-        motion_id = self._motions.go({joint: gap_m / fingers.gap_ratio}, {joint: ratio})
-        now_ns = self._gateway.link.clock.now_ns()
-        return Gripping(
-            self._motions, fingers, self._dialect, self._claim, feedback, motion_id, gap_m, now_ns
-        )
-
-    def _check(self, gap_m: float, force_n: float) -> None:
-        low, high = self._fingers.gap_m
+    def judge(self, goal: Any) -> tuple[float, float]:
+        """Return the wanted gap in m and the most force in N, 0 for the usual."""
+        gap_m, force_n = self._wanted(goal.command)
+        low, high = self.fingers.gap_m
         if not math.isfinite(gap_m) or not low - 1e-6 <= gap_m <= high + 1e-6:
-            raise ValueError(f"position: expected a gap in {low:g}..{high:g} m, got {gap_m}")
+            words = f"position: expected a gap in {low:g}..{high:g} m, got {gap_m}"
+            raise GoalRefused(_NO_CODE, words)
         if not math.isfinite(force_n) or force_n < 0.0:
-            raise ValueError(f"max_effort: expected 0 or more N, got {force_n}")
+            raise GoalRefused(_NO_CODE, f"max_effort: expected 0 or more N, got {force_n}")
+        require_armed(self._gateway, _NO_CODE)
+        return gap_m, force_n
 
-    def _refused(self, why: str) -> GoalOutcome:
-        self._gateway.graph.node.get_logger().warning(f"{self._fingers.joint}: {why}")
-        return GoalOutcome(ending=GoalEnding.ABORTED, result=self._dialect.result(None))
+    def begin(self, judged: tuple[float, float], feedback: Feedback) -> "Gripping":
+        """Take the hand and begin."""
+        gap_m, force_n = judged
+        why = self.claim.why_not_taken()
+        if why:
+            raise GoalRefused(_NO_CODE, why)
+        fingers = self.fingers
+        ratio = min(force_n / fingers.most_n, 1.0) if force_n else 1.0
+        motion_id = self.motions.go(
+            {fingers.joint: gap_m / fingers.gap_ratio}, {fingers.joint: ratio}
+        )
+        return Gripping(self, feedback, motion_id, gap_m, self._gateway.link.clock.now_ns())
+
+    def refused(self, refusal: GoalRefused) -> Any:
+        """Log why, and return a result that says nothing."""
+        self._gateway.graph.node.get_logger().warning(f"{self.fingers.joint}: {refusal}")
+        return self.kind.Result()
+
+    def result(self, state: GripperState) -> Any:
+        """Return the action's result."""
+        return self.kind.Result(**self._fields(state), **self._ends(state))
+
+    def feedback(self, state: GripperState) -> Any:
+        """Return the action's feedback, which says whether it ends, too."""
+        return self.kind.Feedback(**self._fields(state), **self._ends(state))
+
+    def _wanted(self, command: Any) -> tuple[float, float]:
+        return float(command.position), float(command.max_effort)
+
+    def _fields(self, state: GripperState) -> dict[str, Any]:
+        return {"position": state.gap_m, "effort": state.force_n}
+
+    def _ends(self, state: GripperState) -> dict[str, Any]:
+        return {"stalled": state.stalled, "reached_goal": state.reached}
+
+
+class ParallelGripperAction(GripperAction):
+    """Do the same for ParallelGripperCommand, whose goal names the joint."""
+
+    kind: Any = ParallelGripperCommand
+
+    def feedback(self, state: GripperState) -> Any:
+        """Return the action's feedback."""
+        return self.kind.Feedback(**self._fields(state))
+
+    def _wanted(self, command: Any) -> tuple[float, float]:
+        if list(command.name) not in ([], [self.fingers.joint]) or len(command.position) != 1:
+            words = f"command: expected one position of {self.fingers.joint}"
+            raise GoalRefused(_NO_CODE, words)
+        if len(command.effort) > 1:
+            raise GoalRefused(_NO_CODE, "command.effort: expected one value or none")
+        return float(command.position[0]), float(command.effort[0]) if command.effort else 0.0
+
+    def _fields(self, state: GripperState) -> dict[str, Any]:
+        joint_state = JointState(
+            name=[self.fingers.joint],
+            position=[state.gap_m],
+            velocity=[state.speed_m_s],
+            effort=[state.force_n],
+        )
+        return {"state": joint_state}
 
 
 class Gripping:
     """Pursue one goal of a hand until its fingers are there, or rest on something."""
 
     def __init__(
-        self,
-        motions: Motions,
-        fingers: GripperJoint,
-        dialect: _Dialect,
-        claim: Claimed,
-        feedback: Feedback,
-        motion_id: int,
-        gap_m: float,
-        now_ns: int,
+        self, action: GripperAction, feedback: Feedback, motion_id: int, gap_m: float, now_ns: int
     ) -> None:
-        self._motions = motions
-        self._fingers = fingers
-        self._dialect = dialect
-        self._claim = claim
+        self._action = action
+        self._motions = action.motions
+        self._fingers = action.fingers
         self._feedback = feedback
         self._motion_id = motion_id
         self._gap_m = gap_m
@@ -258,14 +202,16 @@ class Gripping:
             self._motions.cancel(self._motion_id)
             return self._finish(GoalEnding.ABORTED, state)
         if self._due.is_now(now_ns):
-            self._feedback(self._dialect.feedback(state))
+            self._feedback(self._action.feedback(state))
         return None
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """End it where the fingers are, or leave them to its successor."""
-        if superseded or self._done:
+        if superseded:
             self._motions.forget(self._motion_id)
-            return GoalOutcome(ending=GoalEnding.CANCELED, result=self._dialect.result(None))
+            return GoalOutcome(ending=GoalEnding.CANCELED, result=self._action.kind.Result())
+        if self._done:
+            return self._finish(GoalEnding.CANCELED, None)
         self._ends_as = GoalEnding.CANCELED
         self._motions.cancel(self._motion_id)
         return None
@@ -290,5 +236,7 @@ class Gripping:
         )
 
     def _finish(self, ending: GoalEnding, state: GripperState | None) -> GoalOutcome:
-        self._claim.release()
-        return GoalOutcome(ending=ending, result=self._dialect.result(state))
+        self._action.claim.release()
+        kind = self._action.kind
+        result = kind.Result() if state is None else self._action.result(state)
+        return GoalOutcome(ending=ending, result=result)

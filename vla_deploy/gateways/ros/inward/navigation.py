@@ -4,24 +4,22 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from builtin_interfaces.msg import Duration
-from geometry_msgs.msg import PoseStamped
 from nav2_msgs.action import NavigateToPose
+from rclpy.duration import Duration
 
-from drivers.clock import NS_PER_S
 from vla_deploy.client.following import Event
-from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.geometry.planar import Planar, inverse, joined, planar_of
-from vla_deploy.gateways.ros.geometry.rotation import quaternion_of, yaw_of
-from vla_deploy.gateways.ros.inward.orders import (
-    CommandOrder,
-    CommandOrders,
-    OrderInvalid,
-    error_of,
+from vla_deploy.gateways.ros.conversions import quaternion_of, yaw_of
+from vla_deploy.gateways.ros.geometry import pose_of
+from vla_deploy.gateways.ros.inward.action_server import (
+    Feedback,
+    GoalEnding,
+    GoalOutcome,
+    GoalRefused,
+    require_armed,
 )
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
-from vla_deploy.gateways.ros.outward.body import MAP, ODOM
-from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
+from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME
 
 FAILED: Final = 9000
@@ -31,67 +29,63 @@ MOST_M: Final = 10_000.0
 _AGE_S: Final = 0.5
 
 
-def _failed(text: str) -> GoalOutcome:
-    result = NavigateToPose.Result(error_code=FAILED, error_msg=text)
-    return GoalOutcome(ending=GoalEnding.ABORTED, result=result)
-
-
-class NavigationServer:
+class NavigationAction:
     """Judge poses to drive to, and give sound ones to the planner."""
+
+    kind = NavigateToPose
 
     def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
         self._gateway = gateway
         self._orders = orders
 
-    def judge(self, goal: Any) -> Begin | GoalOutcome:
-        """Return how to begin with a goal, or why not at all."""
-        try:
-            target = self._target(goal)
-        except OrderInvalid as error:
-            return _failed(str(error))
-        why = refusal_of(self._gateway.control_status())
-        if why:
-            return _failed(why)
-        return lambda feedback: self._begin(target, feedback)
-
-    def _begin(self, target: Planar, feedback: Feedback) -> "Driving | GoalOutcome":
-        x_m, y_m, yaw_rad = target
-        action = {
-            "id": "navigate",
-            "skill": "navigate_to",
-            "parameters": {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad},
-        }
-        plan = {"goal": f"drive to {x_m:.2f}, {y_m:.2f} of the map", "actions": [action]}
-        return Driving(self._gateway, self._orders.give(plan=plan), target, feedback)
-
-    def _target(self, goal: Any) -> Planar:
+    def judge(self, goal: Any) -> Pose2D:
+        """Return the pose that a goal names, in the map."""
         if goal.behavior_tree:
-            raise OrderInvalid("behavior_tree: this robot has none; leave it empty")
-        pose, frame = goal.pose.pose, goal.pose.header.frame_id
+            raise GoalRefused(FAILED, "behavior_tree: this robot has none; leave it empty")
+        pose = goal.pose.pose
         numbers = (
             *(pose.position.x, pose.position.y, pose.position.z),
             *(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w),
         )
         if not all(math.isfinite(one) and abs(one) < MOST_M for one in numbers):
-            raise OrderInvalid(f"pose: expected finite numbers below {MOST_M:g}")
+            raise GoalRefused(FAILED, f"pose: expected finite numbers below {MOST_M:g}")
         if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
-            raise OrderInvalid("pose.orientation: expected a quaternion of length 1")
-        wanted = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
-        if frame in ("", MAP):
-            return wanted
-        return joined(self._frame(frame), wanted)
+            raise GoalRefused(FAILED, "pose.orientation: expected a quaternion of length 1")
+        wanted = Pose2D(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+        target = self._frame(goal.pose.header.frame_id).compose(wanted)
+        require_armed(self._gateway, FAILED)
+        return target
 
-    def _frame(self, frame: str) -> Planar:
+    def begin(self, judged: Pose2D, feedback: Feedback) -> "Driving":
+        """Give it to the planner."""
+        x_m, y_m = judged.x_m, judged.y_m
+        action = {
+            "id": "navigate",
+            "skill": "navigate_to",
+            "parameters": {"x_m": x_m, "y_m": y_m, "yaw_rad": judged.yaw_rad},
+        }
+        plan = {"goal": f"drive to {x_m:.2f}, {y_m:.2f} of the map", "actions": [action]}
+        return Driving(self._gateway, self._orders.give(plan=plan), judged, feedback)
+
+    def refused(self, refusal: GoalRefused) -> Any:
+        """Return the code and why."""
+        return NavigateToPose.Result(error_code=refusal.code, error_msg=str(refusal))
+
+    def _frame(self, frame: str) -> Pose2D:
+        """Return where a frame is in the map."""
+        if frame in ("", MAP):
+            return ORIGIN
         link = self._gateway.link
         pose, base = link.fresh("pose", _AGE_S), link.fresh("base_state", _AGE_S)
         if pose is None or base is None:
-            raise OrderInvalid(f"the robot does not know its place now, by which {frame} is known")
+            words = f"the robot does not know its place now, by which {frame} is known"
+            raise GoalRefused(FAILED, words)
         if frame == BASE_FRAME:
-            return planar_of(pose)
+            return pose_of(pose)
         if frame == ODOM:
-            return joined(planar_of(pose), inverse(planar_of(base)))
-        raise OrderInvalid(
-            f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE_FRAME}, got {frame!r}"
+            return pose_of(pose).compose(ORIGIN.relative_to(pose_of(base)))
+        raise GoalRefused(
+            FAILED, f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE_FRAME}, got {frame!r}"
         )
 
 
@@ -99,7 +93,7 @@ class Driving:
     """Pursue one pose."""
 
     def __init__(
-        self, gateway: Gateway, order: CommandOrder, target: Planar, feedback: Feedback
+        self, gateway: Gateway, order: CommandOrder, target: Pose2D, feedback: Feedback
     ) -> None:
         self._gateway = gateway
         self._order = order
@@ -118,7 +112,7 @@ class Driving:
         if self._order.last is not None:
             return self._finish(self._order.last)
         if self._due.is_now(now_ns):
-            self._tell(now_ns)
+            self._report(now_ns)
         return None
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
@@ -138,43 +132,41 @@ class Driving:
 
     def _finish(self, last: Event) -> GoalOutcome:
         why = error_of(last)
-        if not why and not self._cancelled:
-            return GoalOutcome(ending=GoalEnding.SUCCEEDED, result=NavigateToPose.Result())
-        return self._given_up(self._cancelled) if self._cancelled else _failed(why)
+        if self._cancelled:
+            return self._given_up(self._cancelled)
+        if why:
+            result = NavigateToPose.Result(error_code=FAILED, error_msg=why)
+            return GoalOutcome(ending=GoalEnding.ABORTED, result=result)
+        return GoalOutcome(ending=GoalEnding.SUCCEEDED, result=NavigateToPose.Result())
 
     def _given_up(self, reason: str) -> GoalOutcome:
         result = NavigateToPose.Result(error_code=FAILED, error_msg=reason)
         return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
-    def _tell(self, now_ns: int) -> None:
+    def _report(self, now_ns: int) -> None:
         link = self._gateway.link
         sample = link.fresh("pose", _AGE_S)
         if sample is None:
             return
-        x_m, y_m, yaw_rad = planar_of(sample)
+        here = pose_of(sample)
+        left_m = self._left_m((here.x_m, here.y_m), link.document("executor_status", 1.0) or {})
+        seconds = left_m / self._gateway.robot.base.max_speed_m_s
         message = NavigateToPose.Feedback(
-            current_pose=PoseStamped(), number_of_recoveries=self._retries
+            number_of_recoveries=self._retries,
+            distance_remaining=left_m,
+            estimated_time_remaining=Duration(seconds=seconds).to_msg(),
+            navigation_time=Duration(nanoseconds=now_ns - self._began_ns).to_msg(),
         )
         message.current_pose.header.frame_id = MAP
         message.current_pose.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
-        position = message.current_pose.pose.position
-        position.x, position.y = x_m, y_m
-        message.current_pose.pose.orientation = quaternion_of(0.0, 0.0, yaw_rad)
-        left_m = self._left_m((x_m, y_m), link.document("executor_status", 1.0) or {})
-        message.distance_remaining = left_m
-        seconds = left_m / self._gateway.robot.base.max_speed_m_s
-        message.estimated_time_remaining = _duration(seconds)
-        message.navigation_time = _duration((now_ns - self._began_ns) / NS_PER_S)
+        pose = message.current_pose.pose
+        pose.position.x, pose.position.y = here.x_m, here.y_m
+        pose.orientation = quaternion_of(here.yaw_rad)
         self._feedback(message)
 
     def _left_m(self, here: tuple[float, float], executor: Mapping[str, Any]) -> float:
         """Return the length of the way that is left: of the planned one from the nearest point."""
-        way = executor.get("way_m") or [self._target[:2]]
+        way = executor.get("way_m") or [(self._target.x_m, self._target.y_m)]
         nearest = min(range(len(way)), key=lambda i: math.dist(way[i], here))
         rest = way[nearest:]
         return math.dist(here, rest[0]) + sum(map(math.dist, rest, rest[1:]))
-
-
-def _duration(seconds: float) -> Duration:
-    whole = int(seconds)
-    return Duration(sec=whole, nanosec=int((seconds - whole) * NS_PER_S))

@@ -1,15 +1,13 @@
 """Give commands to the planner as everybody does, and follow them to their end."""
 
-import json
 from collections import deque
-from collections.abc import Mapping
 from typing import Any, Final
 
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Event, Following
 from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.inward.words import OrderInvalid
 from vla_deploy.ipc.errors import BadPayload
 
-CANCELLED: Final = "cancelled on request"
 _STATUS_AGE_S: Final = 2.0
 
 
@@ -28,18 +26,13 @@ class CommandOrder:
             link.clock,
         )
 
-    @property
-    def has_ended(self) -> bool:
-        """Return whether the last event is there."""
-        return self.last is not None
-
     def cancel(self) -> None:
         """Ask for its end; its last event follows."""
         self._link.utter(command_id=self._following.command_id, cancel=True)
 
     def take(self, events: list[Event]) -> None:
-        """Take what was told since the last step, and find out whether nobody works on it."""
-        if self.has_ended:
+        """Take what came since the last step, and find out whether nobody works on it."""
+        if self.last is not None:
             return
         why = self._following.why_lost()
         self.news.extend(self._following.take(events))
@@ -58,7 +51,7 @@ class CommandOrder:
 
 
 class CommandOrders:
-    """Give commands and hand each what was told of it."""
+    """Give commands, and hand each its events."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
@@ -89,11 +82,11 @@ class CommandOrders:
         return order
 
     def step(self) -> None:
-        """Hand out what was told."""
+        """Hand out the events that came."""
         events = [event.payload for event in self._events.drain()]
         for order in list(self._orders):
             order.take(events)
-            if order.has_ended:
+            if order.last is not None:
                 self._orders.remove(order)
 
     def close(self) -> None:
@@ -103,27 +96,8 @@ class CommandOrders:
         self._events.close()
 
 
-class OrderInvalid(ValueError):
-    """Report why something is no command."""
-
-
 def error_of(last: Event) -> str:
     """Return in words why a command failed; "" where it did not."""
     if last["event"] == "rejected":
         return str(last.get("reason") or "rejected")
     return "" if last.get("success") else str(last.get("error") or "failed")
-
-
-def parsed_plan(text: str) -> Mapping[str, Any] | list[Any]:
-    """Return a plan's JSON.
-
-    Raises:
-        OrderInvalid: it is no JSON object or list.
-    """
-    try:
-        plan = json.loads(text)
-    except ValueError as error:
-        raise OrderInvalid(f"the plan is no JSON: {error}") from error
-    if not isinstance(plan, dict | list):
-        raise OrderInvalid(f"the plan: expected an object or a list, got {type(plan).__name__}")
-    return plan

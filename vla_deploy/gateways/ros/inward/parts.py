@@ -1,69 +1,60 @@
 """List what the gateway takes from the graph, as far as the robot file permits it."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
-from control_msgs.action import FollowJointTrajectory
-from nav2_msgs.action import NavigateToPose
-from vla_deploy_msgs.action import ExecutePlan
-
 from vla_deploy.client.motions import Claimed, Motions
+from vla_deploy.gateways.ros.inward.action_server import GoalServer
 from vla_deploy.gateways.ros.inward.acts import Acts
-from vla_deploy.gateways.ros.inward.claiming import Borrowed, PartsHold
-from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
 from vla_deploy.gateways.ros.inward.grippers import gripper_servers
-from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
-from vla_deploy.gateways.ros.inward.navigation import NavigationServer
+from vla_deploy.gateways.ros.inward.navigation import NavigationAction
 from vla_deploy.gateways.ros.inward.orders import CommandOrders
-from vla_deploy.gateways.ros.inward.plans import PlanServer
-from vla_deploy.gateways.ros.inward.pursuing import GoalServer
-from vla_deploy.gateways.ros.inward.say_topic import SayTopic
-from vla_deploy.gateways.ros.inward.trajectories import TrajectoryServer
-from vla_deploy.gateways.ros.inward.velocity import Velocity
-from vla_deploy.gateways.ros.outgoing.lending import Lending
+from vla_deploy.gateways.ros.inward.plans import PlanAction
+from vla_deploy.gateways.ros.inward.streams import JointCommands, Velocity
+from vla_deploy.gateways.ros.inward.text_topics import CommandTopics, SayTopic
+from vla_deploy.gateways.ros.inward.trajectories import TrajectoryAction
+from vla_deploy.gateways.ros.outgoing.lending import Borrowed, Lending
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.ros_settings import Accepts
 
-ALL_ACTS: Final = (ESTOP, "reset", "arm", "disarm")
+ACTS: Final = {Accepts.STOP: (ESTOP,), Accepts.ALL: (ESTOP, "reset", "arm", "disarm")}
 WHOLE_BODY: Final = "joint_trajectory_controller"
 OWN: Final = "/vla_deploy"
 """Before the names of the robot's own servers where servers beyond it have theirs."""
 BASE: Final = "base"
 
 
-def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
-    """Return the parts that take; which they are is the robot file's `accept`.
+def inward_parts(gateway: Gateway, lending: Lending) -> Iterator[GatewayPart]:
+    """Yield the parts that take; which they are is the robot file's `accept`.
 
     Where servers beyond the robot drive it or move its arms, these parts take from them what moves
     what they are lent, whatever is accepted from others, and nothing else.
     """
-    accept, settings = gateway.settings.accept, gateway.settings
-    graph, link = gateway.graph, gateway.link
+    settings, link = gateway.settings, gateway.link
     motions = Motions(link, gateway.robot.joint_index, "ros")
     motions.end_those_of_one_before()
     orders = CommandOrders(link)
-    acts = {Accepts.STOP: (ESTOP,), Accepts.ALL: ALL_ACTS}.get(accept)
-    parts: list[GatewayPart] = [] if acts is None else [Acts(gateway, acts)]
-    takes_all = accept is Accepts.ALL
+    takes_all = settings.accept is Accepts.ALL
+    if settings.accept in ACTS:
+        yield Acts(gateway, ACTS[settings.accept])
     if settings.is_driven_by_nav2:
-        parts.append(Velocity(gateway, Borrowed(lending, (BASE,), driving=True)))
+        yield Velocity(gateway, Borrowed(lending, (BASE,), driving=True))
     elif takes_all:
-        parts.append(Velocity(gateway, Claimed(link, "ros/cmd_vel", (BASE,))))
+        yield Velocity(gateway, Claimed(link, "ros/cmd_vel", (BASE,)))
     if takes_all or settings.are_arms_beyond:
-        parts.append(Shared(motions, orders))
-        parts += _trajectory_servers(gateway, motions, lending)
+        yield Shared(motions, orders)
+        yield from _trajectory_servers(gateway, motions, lending)
     if takes_all:
-        navigation = NavigationServer(gateway, orders)
-        plans = PlanServer(gateway, orders)
+        yield from gripper_servers(gateway, motions)
         navigating = f"{OWN if settings.is_driven_by_nav2 else ''}/navigate_to_pose"
-        parts += gripper_servers(gateway, motions)
-        parts.append(GoalServer(graph, NavigateToPose, navigating, navigation.judge))
-        parts.append(GoalServer(graph, ExecutePlan, f"{OWN}/execute_plan", plans.judge))
-        parts += [CommandTopics(gateway, orders), SayTopic(gateway)]
+        yield GoalServer(gateway, navigating, NavigationAction(gateway, orders))
+        yield GoalServer(gateway, f"{OWN}/execute_plan", PlanAction(gateway, orders))
+        yield CommandTopics(gateway, orders)
+        yield SayTopic(gateway)
         if not settings.are_arms_beyond:
-            parts.append(JointCommands(gateway, motions))
-    return tuple(parts)
+            yield JointCommands(gateway, motions)
 
 
 class Shared:
@@ -74,7 +65,7 @@ class Shared:
         self._orders = orders
 
     def step(self, now_ns: int) -> None:
-        """Take in what control and planner have told."""
+        """Take in what control and planner have published."""
         self._motions.step()
         self._orders.step()
 
@@ -95,23 +86,20 @@ def _trajectory_servers(
     robot, settings = gateway.robot, gateway.settings
     arms = {hand.arm for hand in robot.hands.values()} if settings.are_arms_beyond else set()
 
-    def hold(holder: str, groups: Sequence[str]) -> PartsHold:
+    def hold(name: str, groups: Sequence[str]) -> Claimed | Borrowed:
         if arms.isdisjoint(groups):
-            return Claimed(gateway.link, holder, groups)
+            return Claimed(gateway.link, f"ros/{name}", groups)
         return Borrowed(lending, groups)
 
-    joints = {name: group.joints for name, group in robot.groups.items()}
-    named = {f"{name}_controller": (name, of) for name, of in joints.items()}
-    if settings.accept is not Accepts.ALL:
-        named = {name: row for name, row in named.items() if row[0] in arms}
-    servers = {
-        name: TrajectoryServer(gateway, motions, name, of, hold)
-        for name, (_, of) in named.items()
-        if set(of) <= set(robot.joint_names)
+    served = {
+        f"{name}_controller": group.joints
+        for name, group in robot.groups.items()
+        if (settings.accept is Accepts.ALL or name in arms)
+        and set(group.joints) <= set(robot.joint_names)
     }
-    servers[WHOLE_BODY] = TrajectoryServer(
-        gateway, motions, WHOLE_BODY, robot.joint_names, hold, partial=True
-    )
-    for name, server in servers.items():
-        action = f"{OWN if arms else ''}/{name}/follow_joint_trajectory"
-        yield GoalServer(gateway.graph, FollowJointTrajectory, action, server.judge)
+    for name, joints in (served | {WHOLE_BODY: robot.joint_names}).items():
+        action = TrajectoryAction(
+            gateway, motions, joints, partial(hold, name), partial=name == WHOLE_BODY
+        )
+        path = f"{OWN if arms else ''}/{name}/follow_joint_trajectory"
+        yield GoalServer(gateway, path, action)

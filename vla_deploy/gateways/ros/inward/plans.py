@@ -1,74 +1,83 @@
 """Serve ExecutePlan: a command in words, or a plan, carried out as one from anybody else."""
 
 import json
+from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy_msgs.action import ExecutePlan
 
 from vla_deploy.client.following import Event
-from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.graph import named
-from vla_deploy.gateways.ros.inward.orders import (
-    CommandOrder,
-    CommandOrders,
-    OrderInvalid,
-    error_of,
-    parsed_plan,
+from vla_deploy.gateways.ros.inward.action_server import (
+    Feedback,
+    GoalEnding,
+    GoalOutcome,
+    GoalRefused,
+    require_armed,
 )
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
-from vla_deploy.gateways.ros.inward.words import shown
+from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
+from vla_deploy.gateways.ros.inward.words import OrderInvalid, parsed_plan, shown
 from vla_deploy.gateways.ros.part import Gateway
 
 Result: Final = ExecutePlan.Result
-Told: Final = ExecutePlan.Feedback
+News: Final = ExecutePlan.Feedback
 _BUSY: Final = "the robot is busy"
 _STATES: Final = {
-    "queued": Told.PLANNING,
-    "planning": Told.PLANNING,
-    "asked": Told.ASKED,
-    "accepted": Told.EXECUTING,
-    "plan": Told.EXECUTING,
-    "action": Told.EXECUTING,
-    "said": Told.EXECUTING,
-    "setback": Told.RECOVERING,
+    "queued": News.PLANNING,
+    "planning": News.PLANNING,
+    "asked": News.ASKED,
+    "accepted": News.EXECUTING,
+    "plan": News.EXECUTING,
+    "action": News.EXECUTING,
+    "said": News.EXECUTING,
+    "setback": News.RECOVERING,
 }
 
 
-class PlanServer:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Order:
+    text: str
+    plan: Any
+    source: str
+
+
+class PlanAction:
     """Judge what is to be carried out, and hand it to the planner."""
+
+    kind = ExecutePlan
 
     def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
         self._gateway = gateway
         self._orders = orders
 
-    def judge(self, goal: Any) -> Begin | GoalOutcome:
-        """Return how to begin with a goal, or why not at all."""
+    def judge(self, goal: Any) -> _Order:
+        """Return the command or the plan that a goal holds."""
         if bool(goal.command.strip()) == bool(goal.plan_json.strip()):
-            return _refused(Result.INVALID_PLAN, "fill in one of command and plan_json")
-        status = self._gateway.control_status()
-        why = refusal_of(status)
-        if why:
-            disarmed = status is not None and status["state"] == "disarmed"
-            return _refused(Result.NOT_ARMED if disarmed else Result.REJECTED, why)
+            raise GoalRefused(Result.INVALID_PLAN, "fill in one of command and plan_json")
+        require_armed(self._gateway, Result.REJECTED, disarmed=Result.NOT_ARMED)
         try:
             plan = parsed_plan(goal.plan_json) if goal.plan_json.strip() else None
         except OrderInvalid as error:
-            return _refused(Result.INVALID_PLAN, str(error))
+            raise GoalRefused(Result.INVALID_PLAN, str(error)) from error
         source = named([shown(goal.source)] if goal.source else [])
-        return lambda feedback: self._begin(goal.command, plan, source, feedback)
+        return _Order(text=goal.command, plan=plan, source=source)
 
-    def _begin(
-        self, text: str, plan: Any, source: str, feedback: Feedback
-    ) -> "Carrying | GoalOutcome":
+    def begin(self, judged: _Order, feedback: Feedback) -> "Carrying":
+        """Give it to the planner."""
+        text, plan, source = judged.text, judged.plan, judged.source
         try:
             order = self._orders.give(text=text, plan=plan, source=source)
         except OrderInvalid as error:
-            return _refused(Result.INVALID_PLAN, str(error))
+            raise GoalRefused(Result.INVALID_PLAN, str(error)) from error
         return Carrying(order, feedback, of_plan=plan is not None)
+
+    def refused(self, refusal: GoalRefused) -> Any:
+        """Return the code and why."""
+        return Result(error_code=refusal.code, error=str(refusal))
 
 
 class Carrying:
-    """Pursue one command, and tell each action's news."""
+    """Pursue one command, and publish each action's news."""
 
     def __init__(self, order: CommandOrder, feedback: Feedback, *, of_plan: bool) -> None:
         self._order = order
@@ -86,7 +95,7 @@ class Carrying:
                 self._places = {one["id"]: place for place, one in enumerate(actions)}
             state = _STATES.get(event["event"])
             if state is not None:
-                self._feedback(self._told(state, event))
+                self._feedback(self._message(state, event))
         return None if self._order.last is None else self._finish(self._order.last)
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
@@ -98,9 +107,9 @@ class Carrying:
         result = Result(error_code=Result.CANCELLED, error=reason)
         return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
-    def _told(self, state: str, event: Event) -> Any:
+    def _message(self, state: str, event: Event) -> Any:
         action_id = str(event.get("action_id") or "")
-        return Told(
+        return News(
             state=state,
             action_id=action_id,
             skill=str(event.get("skill") or ""),
@@ -141,7 +150,3 @@ class Carrying:
                 return int(Result.BUSY)
             return int(Result.INVALID_PLAN if self._of_plan else Result.REJECTED)
         return int(Result.LOST if why.startswith("lost") else Result.ABORTED)
-
-
-def _refused(code: int, why: str) -> GoalOutcome:
-    return GoalOutcome(ending=GoalEnding.ABORTED, result=Result(error_code=code, error=why))

@@ -8,76 +8,63 @@ from control_msgs.action import FollowJointTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from drivers.clock import NS_PER_S
-from vla_deploy.client.motions import Ended, JointView, Motions
-from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.claiming import PartsHold
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
-from vla_deploy.gateways.ros.inward.trajectory_goal import (
+from vla_deploy.client.motions import Claimed, Ended, JointView, Motions
+from vla_deploy.gateways.ros.inward.action_server import (
+    Feedback,
+    GoalEnding,
+    GoalOutcome,
     GoalRefused,
-    Result,
-    TrajectoryGoal,
-    judged_goal,
+    require_armed,
 )
+from vla_deploy.gateways.ros.inward.trajectory_goal import Result, TrajectoryGoal, judged_goal
+from vla_deploy.gateways.ros.outgoing.lending import Borrowed
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.ipc.errors import BadPayload
 
 FEEDBACK_HZ: Final = 20.0
-GOAL_TOLERANCE: Final = 0.05
-"""Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
 
 
-def _outcome(ending: GoalEnding, code: int, text: str = "") -> GoalOutcome:
-    return GoalOutcome(ending=ending, result=Result(error_code=code, error_string=text))
-
-
-class TrajectoryServer:
+class TrajectoryAction:
     """Judge the goals for some joints, and begin those that are sound."""
+
+    kind = FollowJointTrajectory
 
     def __init__(
         self,
         gateway: Gateway,
         motions: Motions,
-        name: str,
         joints: Sequence[str],
-        hold: Callable[[str, Sequence[str]], PartsHold],
+        hold: Callable[[Sequence[str]], Claimed | Borrowed],
         *,
         partial: bool = False,
     ) -> None:
-        """Serve some joints; `hold` makes what holds their groups, by its name and theirs."""
-        self.joints = tuple(joints)
+        """Serve some joints, with `partial` any of them; `hold` makes what holds their groups."""
         self._gateway = gateway
         self._motions = motions
-        self._name = name
+        self._joints = tuple(joints)
         self._partial = partial
         self._hold = hold
-        self._claim: PartsHold | None = None
+        self._claim: Claimed | Borrowed | None = None
 
-    def judge(self, goal: Any) -> Begin | GoalOutcome:
-        """Return how to begin with a goal, or why not at all."""
-        try:
-            sound = judged_goal(
-                goal,
-                self.joints,
-                partial=self._partial,
-                time=self._gateway.time,
-                goal_tolerance=GOAL_TOLERANCE,
-            )
-        except GoalRefused as error:
-            return _outcome(GoalEnding.ABORTED, error.code, str(error))
-        why = refusal_of(self._gateway.control_status())
-        if why:
-            return _outcome(GoalEnding.ABORTED, Result.INVALID_GOAL, why)
-        return lambda feedback: self._begin(sound, feedback)
+    def judge(self, goal: Any) -> TrajectoryGoal:
+        """Return the goal in the form in which it is pursued."""
+        judged = judged_goal(goal, self._joints, partial=self._partial, time=self._gateway.time)
+        require_armed(self._gateway, Result.INVALID_GOAL)
+        return judged
 
-    def _begin(self, goal: TrajectoryGoal, feedback: Feedback) -> "TrajectoryPursuit | GoalOutcome":
-        groups = self._gateway.robot.groups_moving(goal.joints)
+    def begin(self, judged: TrajectoryGoal, feedback: Feedback) -> "TrajectoryPursuit":
+        """Take the joints' groups and begin."""
         if self._claim is not None:
             self._claim.release()
-        self._claim = self._hold(f"ros/{self._name}", groups)
+        self._claim = self._hold(self._gateway.robot.groups_moving(judged.joints))
         why = self._claim.why_not_taken()
         if why:
-            return _outcome(GoalEnding.ABORTED, Result.INVALID_GOAL, why)
-        return TrajectoryPursuit(self._gateway, self._motions, goal, feedback, self._claim)
+            raise GoalRefused(Result.INVALID_GOAL, why)
+        return TrajectoryPursuit(self._gateway, self._motions, judged, feedback, self._claim)
+
+    def refused(self, refusal: GoalRefused) -> Any:
+        """Return the code and why."""
+        return Result(error_code=refusal.code, error_string=str(refusal))
 
 
 class TrajectoryPursuit:
@@ -89,7 +76,7 @@ class TrajectoryPursuit:
         motions: Motions,
         goal: TrajectoryGoal,
         feedback: Feedback,
-        claim: PartsHold,
+        claim: Claimed | Borrowed,
     ) -> None:
         self._gateway = gateway
         self._motions = motions
@@ -117,7 +104,7 @@ class TrajectoryPursuit:
         if self._settle_by_ns is not None:
             return self._settle(view, now_ns)
         if self._due.is_now(now_ns):
-            self._feedback(self._told(view))
+            self._feedback(self._message(view))
         self._watch(view)
         return None
 
@@ -128,8 +115,7 @@ class TrajectoryPursuit:
             self._motions.forget(self._motion_id)
         if superseded or self._motion_id is None or self._settle_by_ns is not None:
             return self._finish(GoalEnding.CANCELED, code, reason, keep_claim=superseded)
-        self._ends_as = (GoalEnding.CANCELED, code, reason)
-        self._motions.cancel(self._motion_id)
+        self._end_as(GoalEnding.CANCELED, code, reason)
         return None
 
     def _start(self, view: JointView, now_ns: int) -> GoalOutcome | None:
@@ -150,19 +136,19 @@ class TrajectoryPursuit:
         """End a motion whose joints may be moved no longer."""
         why = self._claim.why_over() if self._ends_as is None else ""
         if why and self._settle_by_ns is None:
-            self._ends_as = GoalEnding.ABORTED, Result.INVALID_GOAL, why
-            self._motions.cancel(self._motion_id or 0)
+            self._end_as(GoalEnding.ABORTED, Result.INVALID_GOAL, why)
 
     def _watch(self, view: JointView) -> None:
-        """End a motion that has left its path; its end is told when the joints rest."""
+        """End a motion that has left its path; it has ended when the joints rest."""
         error = np.abs(view.setpoint - view.position)
         if self._ends_as is None and (error > self._goal.path_tolerance).any():
-            self._ends_as = (
-                GoalEnding.ABORTED,
-                Result.PATH_TOLERANCE_VIOLATED,
-                self._exceeded(error, self._goal.path_tolerance, "off its path"),
-            )
-            self._motions.cancel(self._motion_id or 0)
+            text = self._exceeded(error, self._goal.path_tolerance, "off its path")
+            self._end_as(GoalEnding.ABORTED, Result.PATH_TOLERANCE_VIOLATED, text)
+
+    def _end_as(self, ending: GoalEnding, code: int, text: str) -> None:
+        """Have control end the motion; `step` returns this outcome when its joints rest."""
+        self._ends_as = ending, code, text
+        self._motions.cancel(self._motion_id or 0)
 
     def _settle(self, view: JointView, now_ns: int) -> GoalOutcome | None:
         error = np.abs(self._goal.positions[-1] - view.position)
@@ -186,14 +172,15 @@ class TrajectoryPursuit:
     ) -> GoalOutcome:
         if not keep_claim:
             self._claim.release()
-        return _outcome(ending, code, text)
+        result = Result(error_code=code, error_string=text)
+        return GoalOutcome(ending=ending, result=result)
 
     def _exceeded(self, error: Any, tolerance: Any, what: str) -> str:
         worst = int(np.argmax(error - tolerance))
         joint = self._goal.joints[worst]
         return f"{joint} is {error[worst]:.4f} {what}, tolerance {tolerance[worst]:.4f}"
 
-    def _told(self, view: JointView) -> Any:
+    def _message(self, view: JointView) -> Any:
         message = FollowJointTrajectory.Feedback(joint_names=list(self._goal.joints))
         message.header.stamp = self._gateway.time.stamp(view.stamp_ns)
         message.desired = JointTrajectoryPoint(positions=view.setpoint.tolist())

@@ -8,9 +8,11 @@ from typing import Any, Final
 import numpy as np
 from control_msgs.action import FollowJointTrajectory
 from numpy.typing import NDArray
+from rclpy.duration import Duration
 
 from drivers.clock import NS_PER_S
-from vla_deploy.gateways.ros.stamps import RosTime
+from vla_deploy.gateways.ros.conversions import RosTime
+from vla_deploy.gateways.ros.inward.action_server import GoalRefused
 
 Result: Final = FollowJointTrajectory.Result
 MOST_POINTS: Final = 255
@@ -18,18 +20,12 @@ MOST_POINTS: Final = 255
 MOST_AGE_S: Final = 0.5
 MOST_AHEAD_S: Final = 10.0
 LONGEST_S: Final = 600.0
+GOAL_TOLERANCE: Final = 0.05
+"""Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
 DEFAULT_GOAL_TIME_S: Final = 0.5
 _UNRESTRICTED: Final = -1.0
 
 Floats = NDArray[np.float64]
-
-
-class GoalRefused(ValueError):
-    """Report why a goal is not taken up, with the action's code."""
-
-    def __init__(self, code: int, text: str) -> None:
-        super().__init__(text)
-        self.code = code
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +45,7 @@ class TrajectoryGoal:
 
 
 def judged_goal(
-    goal: Any, joints: Sequence[str], *, partial: bool, time: RosTime, goal_tolerance: float
+    goal: Any, joints: Sequence[str], *, partial: bool, time: RosTime
 ) -> TrajectoryGoal:
     """Return a goal for some joints in the form in which it is pursued.
 
@@ -67,7 +63,7 @@ def judged_goal(
         positions=positions,
         start_ns=_start_ns(trajectory.header.stamp, float(times_s[-1]), time),
         path_tolerance=_tolerances(goal.path_tolerance, named, math.inf),
-        goal_tolerance=_tolerances(goal.goal_tolerance, named, goal_tolerance),
+        goal_tolerance=_tolerances(goal.goal_tolerance, named, GOAL_TOLERANCE),
         goal_time_s=_seconds(goal.goal_time_tolerance) or DEFAULT_GOAL_TIME_S,
     )
 
@@ -75,9 +71,9 @@ def judged_goal(
 def _joints(named: Sequence[str], known: Sequence[str], *, partial: bool) -> tuple[str, ...]:
     unknown = [name for name in named if name not in known]
     if unknown or not named or len(set(named)) != len(named):
-        told = f"{', '.join(unknown[:8])} unknown" if unknown else f"got {list(named)[:8]}"
+        found = f"{', '.join(unknown[:8])} unknown" if unknown else f"got {list(named)[:8]}"
         raise GoalRefused(
-            Result.INVALID_JOINTS, f"joint_names: {told}; expected, each once: {', '.join(known)}"
+            Result.INVALID_JOINTS, f"joint_names: {found}; expected, each once: {', '.join(known)}"
         )
     if not partial and len(named) != len(known):
         missing = ", ".join(name for name in known if name not in named)
@@ -143,16 +139,16 @@ def _tolerances(given: Sequence[Any], joints: Sequence[str], default: float) -> 
         raise GoalRefused(
             Result.INVALID_JOINTS, f"tolerance of {', '.join(unknown)}: no joint of the trajectory"
         )
-    told = []
+    found = []
     for joint in joints:
         value = by_name.get(joint, 0.0)
         if math.isnan(value) or (value < 0.0 and value != _UNRESTRICTED):
             raise GoalRefused(
                 Result.INVALID_GOAL, f"tolerance of {joint}: expected above 0, 0 or -1, got {value}"
             )
-        told.append(math.inf if value == _UNRESTRICTED else value or default)
-    return np.array(told)
+        found.append(math.inf if value == _UNRESTRICTED else value or default)
+    return np.array(found)
 
 
 def _seconds(duration: Any) -> float:
-    return float(duration.sec) + float(duration.nanosec) / NS_PER_S
+    return float(Duration.from_msg(duration).nanoseconds / NS_PER_S)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.client.command_record import MOST_CHARACTERS
-from vla_deploy.gateways.ros.inward.orders import OrderInvalid
 
 MOST_BYTES: Final = 32_000
 """Of one message: more than any plan that the planner takes has."""
@@ -16,6 +15,10 @@ PLAN_KEYS: Final = ("actions", "action_sequence", "plan", "steps", "primitives")
 STOP_WORDS: Final = frozenset({"stop", "halt", "freeze", "cancel"})
 _BLANKS: Final = frozenset("\t\n\r")
 _SHOWN: Final = 80
+
+
+class OrderInvalid(ValueError):
+    """Report why something is no command."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +43,18 @@ def read_message(data: str) -> CommandMessage:
         _check_letters(data)
         return _read_json(data.strip())
     return CommandMessage(text=checked_text(data))
+
+
+def parsed_plan(text: str) -> dict[str, Any] | list[Any]:
+    """Return a plan's JSON.
+
+    Raises:
+        OrderInvalid: it is no JSON object or list.
+    """
+    plan = _parsed(text, "the plan is no JSON")
+    if not isinstance(plan, dict | list):
+        raise OrderInvalid(f"the plan: expected an object or a list, got {type(plan).__name__}")
+    return plan
 
 
 def checked_text(data: str) -> str:
@@ -81,13 +96,17 @@ def _is_plain(letter: str) -> bool:
     return unicodedata.category(letter) not in ("Cc", "Cs")
 
 
-def _read_json(text: str) -> CommandMessage:
+def _parsed(text: str, fault: str) -> Any:
     try:
-        found = json.loads(text, parse_constant=_refuse_constant)
+        return json.loads(text, parse_constant=_refuse_constant)
     except RecursionError:
         raise OrderInvalid("the JSON is nested too deeply") from None
     except ValueError as error:
-        raise OrderInvalid(f"expected JSON, as it begins with {text[0]!r}: {error}") from error
+        raise OrderInvalid(f"{fault}: {error}") from error
+
+
+def _read_json(text: str) -> CommandMessage:
+    found = _parsed(text, f"expected JSON, as it begins with {text[0]!r}")
     if isinstance(found, list):
         if not found:
             raise OrderInvalid("expected a plan of one action or more, got an empty list")

@@ -6,8 +6,7 @@ from typing import Any, Final
 
 from rclpy.action import ActionClient
 
-from vla_deploy.gateways.ros.outgoing.exchange import GoalExchange
-from vla_deploy.gateways.ros.outgoing.goal import OutgoingGoal
+from vla_deploy.gateways.ros.outgoing.goal import GoalExchange, OutgoingGoal
 from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outgoing.messages import ACTIONS, goal_of
 from vla_deploy.gateways.ros.part import Gateway
@@ -81,7 +80,7 @@ class Courier:
             return
         graph, client = self._gateway.graph, self._client(request)
         exchange = GoalExchange(graph, client, goal_of(request, self._gateway.time))
-        goal = OutgoingGoal(request, client, exchange, self._lending, self._tell)
+        goal = OutgoingGoal(request, client, exchange, self._lending, self._answer)
         self._goals[request.request_id] = goal
 
     def _cancel(self, request_id: str, reason: str) -> None:
@@ -99,9 +98,9 @@ class Courier:
         return self._clients[key]
 
     def _refuse(self, request_id: str, why: str) -> None:
-        self._tell(GoalAnswer(request_id=request_id, state=GoalState.REJECTED, text=why))
+        self._answer(GoalAnswer(request_id=request_id, state=GoalState.REJECTED, text=why))
 
-    def _tell(self, answer: GoalAnswer) -> None:
+    def _answer(self, answer: GoalAnswer) -> None:
         if answer.text:
             _log.info("goal %s %s: %s", answer.request_id, answer.state.value, answer.text)
         self._gateway.link.publish(ANSWER, answer.document())

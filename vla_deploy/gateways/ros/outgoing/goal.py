@@ -2,16 +2,20 @@
 
 A cancel is done when the server has answered it and the goal has its final status. Where either
 does not come, the goal ends as lost: what it was lent has been taken back before.
+
+What is sent and comes back does so in the graph's thread; steps of the gateway read it.
 """
 
 from collections.abc import Callable
 from enum import Enum
-from typing import Final
+from typing import Any, Final
 
 from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
+from rclpy.task import Future
 
 from drivers.clock import NS_PER_S
-from vla_deploy.gateways.ros.outgoing.exchange import GoalExchange
+from vla_deploy.gateways.ros.graph import GraphLink
 from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outgoing.messages import left_of, state_of
 from vla_deploy.gateways.ros.part import Due
@@ -34,6 +38,74 @@ class _Stage(Enum):
     ENDED = "has ended"
 
 
+class GoalExchange:
+    """Send a goal and its cancel, and keep what the server says to them.
+
+    Each attribute is set once, but for the feedback.
+    """
+
+    def __init__(self, graph: GraphLink, client: ActionClient, goal: Any) -> None:
+        self.is_accepted: bool | None = None
+        self.is_cancelling: bool | None = None
+        """What the server said to the cancel, None before it said anything."""
+        self.result: Any = None
+        """The answer with the final status and the result."""
+        self.feedback: Any = None
+        self.error = ""
+        """Why it cannot go on, in words."""
+        self._graph = graph
+        self._client = client
+        self._goal = goal
+        self._handle: ClientGoalHandle | None = None
+        self._wants_cancel = False
+
+    def send(self) -> None:
+        """Queue the goal."""
+        self._graph.perform(self._guarded(self._send))
+
+    def cancel(self) -> None:
+        """Queue the cancel of the goal; one not answered yet is cancelled once it is accepted."""
+        self._graph.perform(self._guarded(self._cancel))
+
+    def _guarded(self, work: Callable[..., None]) -> Callable[..., None]:
+        def run(*arguments: Any) -> None:
+            try:
+                work(*arguments)
+            except Exception as error:  # else the graph's thread ends, and with it the gateway
+                self.error = f"{type(error).__name__}: {error}"
+
+        return run
+
+    def _send(self) -> None:
+        sent = self._client.send_goal_async(self._goal, self._feed)
+        sent.add_done_callback(self._guarded(self._answered))
+
+    def _answered(self, sent: Future) -> None:
+        handle = sent.result()
+        if handle.accepted:
+            self._handle = handle
+            handle.get_result_async().add_done_callback(self._guarded(self._ended))
+            if self._wants_cancel:
+                self._cancel()
+        self.is_accepted = handle.accepted
+
+    def _cancel(self) -> None:
+        self._wants_cancel = True
+        if self._handle is not None and self.result is None:
+            asked = self._handle.cancel_goal_async()
+            asked.add_done_callback(self._guarded(self._cancel_answered))
+
+    def _cancel_answered(self, asked: Future) -> None:
+        # A refusal comes with code 0 and an empty list: so the list is asked.
+        self.is_cancelling = bool(asked.result().goals_canceling)
+
+    def _ended(self, got: Future) -> None:
+        self.result = got.result()
+
+    def _feed(self, message: Any) -> None:
+        self.feedback = message.feedback
+
+
 class OutgoingGoal:
     """Pursue one request; `step` is called until `has_ended`."""
 
@@ -43,25 +115,25 @@ class OutgoingGoal:
         client: ActionClient,
         exchange: GoalExchange,
         lending: Lending,
-        tell: Callable[[GoalAnswer], None],
+        publish: Callable[[GoalAnswer], None],
     ) -> None:
         self.request = request
         self._client = client
         self._exchange = exchange
         self._lending = lending
-        self._tell = tell
+        self._publish = publish
         self._stage = _Stage.WAITING
         self._begun_ns = 0
         self._since_ns = 0
         self._seen_ns = 0
         self._cancelled = ""
         self._ends_as = GoalState.CANCELLED
-        self._cancel_is_told = False
+        self._cancel_is_published = False
         self._due = Due(FEEDBACK_HZ)
 
     @property
     def has_ended(self) -> bool:
-        """Return whether the final state is told."""
+        """Return whether the final state is published."""
         return self._stage is _Stage.ENDED
 
     def step(self, now_ns: int) -> None:
@@ -143,8 +215,8 @@ class OutgoingGoal:
             self._end(GoalState.REJECTED, f"{self._name} rejected the goal")
             return
         answer = self._exchange.is_cancelling
-        if answer is not None and not self._cancel_is_told:
-            self._cancel_is_told = True
+        if answer is not None and not self._cancel_is_published:
+            self._cancel_is_published = True
             words = "" if answer else f"{self._name} rejected the cancel"
             self._say(GoalState.CANCELLING if answer else GoalState.CANCEL_REJECTED, words)
         if self._is_over(FINAL_WAIT_S if answer else ANSWER_WAIT_S, now_ns):
@@ -185,4 +257,4 @@ class OutgoingGoal:
 
     def _say(self, state: GoalState, text: str = "", left_m: float | None = None) -> None:
         request_id = self.request.request_id
-        self._tell(GoalAnswer(request_id=request_id, state=state, text=text, left_m=left_m))
+        self._publish(GoalAnswer(request_id=request_id, state=state, text=text, left_m=left_m))

@@ -34,7 +34,8 @@ class PlanState(StrEnum):
     FAILED = "failed"
 
 
-_AT_REST: Final = frozenset({"disarmed", "stopping", "stopped", "fault"})
+_AT_REST: Final = frozenset({"", "disarmed", "stopping", "stopped", "fault"})
+_UNDER_WAY: Final = frozenset({"executing", "recovering"})
 _BY_SKILL: Final[Mapping[str, CapstoneState]] = {
     **dict.fromkeys(("navigate_to", "move", "turn", "find_object"), CapstoneState.NAVIGATING),
     **dict.fromkeys(
@@ -46,77 +47,52 @@ _BY_SKILL: Final[Mapping[str, CapstoneState]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Activity:
-    """Hold what the processes say; a silent control or executor counts as "".
+    """Hold what the robot does, and how its newest plan stands; it starts out of reach."""
+
+    capstone: CapstoneState = CapstoneState.STOPPED
+    plan: PlanState = PlanState.IDLE
+
+
+def activity_of(
+    control: Document,
+    executor: Document,
+    planner: Document,
+    speech: Document,
+    *,
+    has_succeeded: bool | None = None,
+    ended_s: float = 0.0,
+) -> Activity:
+    """Return what the newest documents say; None is a process that is silent.
 
     `has_succeeded` is of the command that ended last, `ended_s` ago; None before any has.
     """
-
-    control: str = ""
-    executor: str = ""
-    skill: str = ""
-    is_planning: bool = False
-    has_asked: bool = False
-    is_heard: bool = False
-    has_succeeded: bool | None = None
-    ended_s: float = 0.0
-
-    @classmethod
-    def of(
-        cls,
-        control: Document,
-        executor: Document,
-        planner: Document,
-        speech: Document,
-        *,
-        has_succeeded: bool | None = None,
-        ended_s: float = 0.0,
-    ) -> "Activity":
-        """Return what the newest documents say; None is a process that is silent."""
-        control, executor = control or {}, executor or {}
-        planner, speech = planner or {}, speech or {}
-        return cls(
-            control=str(control.get("state") or ""),
-            executor=str(executor.get("state") or ""),
-            skill=str(executor.get("skill") or ""),
-            is_planning=bool(planner.get("commands")),
-            has_asked=bool(planner.get("question")),
-            is_heard=speech.get("state") in ("hearing", "transcribing"),
-            has_succeeded=has_succeeded,
-            ended_s=ended_s,
-        )
-
-    @property
-    def is_executing(self) -> bool:
-        """Return whether a plan is under way."""
-        return self.executor in ("executing", "recovering")
-
-    @property
-    def capstone(self) -> CapstoneState:
-        """Return the state of the whole robot."""
-        if self.control in _AT_REST or not self.control:
-            return CapstoneState.STOPPED
-        if self.is_executing:
-            return _BY_SKILL.get(self.skill, CapstoneState.PROCESSING)
-        if self.has_asked or self.is_heard:
-            return CapstoneState.LISTENING
-        if self.is_planning:
-            return CapstoneState.PROCESSING
-        if self.has_succeeded and self.ended_s < COMPLETED_S:
-            return CapstoneState.COMPLETED
-        return CapstoneState.IDLE
-
-    @property
-    def plan(self) -> PlanState:
-        """Return how the newest plan stands; how the last one ended stays until the next."""
-        if self.executor == "recovering":
-            return PlanState.BLOCKED
-        if self.is_executing:
-            at_rest = self.control != "armed"
-            return PlanState.PAUSED if at_rest else PlanState.EXECUTING
-        if self.has_asked:
-            return PlanState.PAUSED
-        if self.is_planning:
-            return PlanState.PLANNING
-        if self.has_succeeded is None:
-            return PlanState.IDLE
-        return PlanState.COMPLETED if self.has_succeeded else PlanState.FAILED
+    state = str((control or {}).get("state") or "")
+    executing = str((executor or {}).get("state") or "")
+    has_asked = bool((planner or {}).get("question"))
+    is_planning = bool((planner or {}).get("commands"))
+    if state in _AT_REST:
+        capstone = CapstoneState.STOPPED
+    elif executing in _UNDER_WAY:
+        skill = str((executor or {}).get("skill") or "")
+        capstone = _BY_SKILL.get(skill, CapstoneState.PROCESSING)
+    elif has_asked or (speech or {}).get("state") in ("hearing", "transcribing"):
+        capstone = CapstoneState.LISTENING
+    elif is_planning:
+        capstone = CapstoneState.PROCESSING
+    elif has_succeeded and ended_s < COMPLETED_S:
+        capstone = CapstoneState.COMPLETED
+    else:
+        capstone = CapstoneState.IDLE
+    if executing == "recovering":
+        plan = PlanState.BLOCKED
+    elif executing in _UNDER_WAY:
+        plan = PlanState.EXECUTING if state == "armed" else PlanState.PAUSED
+    elif has_asked:
+        plan = PlanState.PAUSED
+    elif is_planning:
+        plan = PlanState.PLANNING
+    elif has_succeeded is None:
+        plan = PlanState.IDLE
+    else:  # how the last one ended stays until the next
+        plan = PlanState.COMPLETED if has_succeeded else PlanState.FAILED
+    return Activity(capstone=capstone, plan=plan)

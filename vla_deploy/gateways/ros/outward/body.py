@@ -1,33 +1,33 @@
 """Publish /joint_states, /odom, /tf, /tf_static, /robot_description, and the twin's /clock."""
 
-import math
 from array import array
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Quaternion, TransformStamped
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from vla_deploy.gateways.ros.geometry.planar import inverse, joined, planar_of
+from vla_deploy.gateways.ros.conversions import quaternion_of
+from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
-from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway, GatewayPart
 from vla_deploy.ipc import Sample
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
 from vla_deploy.robots.kinematics.urdf import urdf_of
 
-MAP: Final = "map"
-ODOM: Final = "odom"
-_TOLD_AGE_S: Final = 0.5
+_POSE_AGE_S: Final = 0.5
 _JOINT_AGE_S: Final = 0.25
 # Of wheel odometry, per metre and per radian driven, as REP-105 leaves to the robot: what the pose
 # filter reckons with is of the map; this says only that z, roll and pitch are not measured.
 _UNMEASURED: Final = 1e6
+_COVARIANCE: Final = np.diag([1e-3, 1e-3, _UNMEASURED, _UNMEASURED, _UNMEASURED, 3e-3]).ravel()
 
 
 class Frames:
@@ -51,28 +51,28 @@ class Frames:
         self._body = [_named(*one[:2]) for one in self._tree.transforms({})]
         self._odom, self._map = _named(ODOM, BASE_FRAME), _named(MAP, ODOM)
 
-    def tell(self, joints: Sample | None, base: Sample | None, pose: Sample | None) -> None:
+    def publish(self, joints: Sample | None, base: Sample | None, pose: Sample | None) -> None:
         """Publish where everything is, in one message."""
-        told = []
+        known = []
         if joints is not None:
             values = joints.data["position"][: len(self._names)].tolist()
             found = self._tree.transforms(dict(zip(self._names, values, strict=True)))
             stamp = self._time.stamp(joints.stamp_ns)
             for message, one in zip(self._body, found, strict=True):
                 _fill(message, stamp, one.xyz, one.quaternion)
-            told += self._body
+            known += self._body
         if base is not None:
-            odom, stamp = planar_of(base), self._time.stamp(base.stamp_ns)
-            _fill(self._odom, stamp, *_place(*odom))
-            told.append(self._odom)
+            odom, stamp = pose_of(base), self._time.stamp(base.stamp_ns)
+            _stand(self._odom, stamp, odom)
+            known.append(self._odom)
             if pose is not None:
-                _fill(self._map, stamp, *_place(*joined(planar_of(pose), inverse(odom))))
-                told.append(self._map)
-        if told:
-            self._moving.publish(TFMessage(transforms=told))
+                _stand(self._map, stamp, pose_of(pose).compose(ORIGIN.relative_to(odom)))
+                known.append(self._map)
+        if known:
+            self._moving.publish(TFMessage(transforms=known))
 
 
-class BodyTopics:
+class BodyTopics(GatewayPart):
     """Publish joints and odometry at their rates, and with odometry the frames."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -100,17 +100,14 @@ class BodyTopics:
         odometry_due = self._odometry_due.is_now(now_ns)
         joints = link.fresh("joint_state", _JOINT_AGE_S) if joints_due or odometry_due else None
         if joints_due and joints is not None:
-            self._tell_joints(joints)
+            self._publish_joints(joints)
         if odometry_due:
-            base = link.fresh("base_state", _TOLD_AGE_S)
+            base = link.fresh("base_state", _POSE_AGE_S)
             if base is not None:
-                self._tell_odometry(base)
-            self._frames.tell(joints, base, link.fresh("pose", _TOLD_AGE_S))
+                self._publish_odometry(base)
+            self._frames.publish(joints, base, link.fresh("pose", _POSE_AGE_S))
 
-    def stop(self) -> None:
-        """Leave nothing under way."""
-
-    def _tell_joints(self, sample: Sample) -> None:
+    def _publish_joints(self, sample: Sample) -> None:
         count, data = len(self._names), sample.data
         message = JointState()
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
@@ -121,38 +118,18 @@ class BodyTopics:
         message.effort = array("d", effort.tobytes())
         self._joints.publish(message)
 
-    def _tell_odometry(self, sample: Sample) -> None:
-        data = sample.data
-        x_m, y_m, yaw_rad = planar_of(sample)
+    def _publish_odometry(self, sample: Sample) -> None:
+        data, pose = sample.data, pose_of(sample)
         message = Odometry(child_frame_id=BASE_FRAME)
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
         message.header.frame_id = ODOM
         position = message.pose.pose.position
-        position.x, position.y = x_m, y_m
-        message.pose.pose.orientation = _turned(yaw_rad)
+        position.x, position.y = pose.x_m, pose.y_m
+        message.pose.pose.orientation = quaternion_of(pose.yaw_rad)
         message.twist.twist.linear.x = float(data["v_m_s"])
         message.twist.twist.angular.z = float(data["w_rad_s"])
         message.pose.covariance = message.twist.covariance = _COVARIANCE
         self._odometry.publish(message)
-
-
-def _covariance() -> np.ndarray:
-    diagonal = [1e-3, 1e-3, _UNMEASURED, _UNMEASURED, _UNMEASURED, 3e-3]
-    return np.diag(diagonal).ravel()
-
-
-_COVARIANCE: Final = _covariance()
-
-
-def _place(
-    x_m: float, y_m: float, yaw_rad: float
-) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    half = yaw_rad / 2.0
-    return (x_m, y_m, 0.0), (0.0, 0.0, math.sin(half), math.cos(half))
-
-
-def _turned(yaw_rad: float) -> Quaternion:
-    return Quaternion(z=math.sin(yaw_rad / 2.0), w=math.cos(yaw_rad / 2.0))
 
 
 def _named(parent: str, child: str) -> TransformStamped:
@@ -174,3 +151,10 @@ def _fill(
     translation, rotation = message.transform.translation, message.transform.rotation
     translation.x, translation.y, translation.z = xyz
     rotation.x, rotation.y, rotation.z, rotation.w = quaternion
+
+
+def _stand(message: TransformStamped, stamp: Time, pose: Pose2D) -> None:
+    message.header.stamp = stamp
+    translation = message.transform.translation
+    translation.x, translation.y = pose.x_m, pose.y_m
+    message.transform.rotation = quaternion_of(pose.yaw_rad)

@@ -1,16 +1,15 @@
-"""Publish what planning nodes ask for beside plans: state, surroundings, what the robot does."""
+"""Publish the robot's state, its surroundings and what it does, as planning nodes read them."""
 
 from collections.abc import Mapping
 from typing import Any, Final
 
-from vla_deploy.gateways.ros.geometry.locator import Locator
-from vla_deploy.gateways.ros.geometry.planar import planar_of
-from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
-from vla_deploy.gateways.ros.json_topic import JsonTopic
-from vla_deploy.gateways.ros.outward.activity import Activity
-from vla_deploy.gateways.ros.outward.objects import described, latest_last
+from vla_deploy.gateways.ros.conversions import quaternion_of
+from vla_deploy.gateways.ros.geometry import pose_of
+from vla_deploy.gateways.ros.graph import JsonTopic
+from vla_deploy.gateways.ros.outward.activity import Activity, activity_of
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
-from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.outward.scene import Locator, described, latest_last
+from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.robots.maps.map_file import MapFile
 
 STATE: Final = "/robot/state"
@@ -26,7 +25,7 @@ _STATUS_AGE_S: Final = 2.0
 _LOST: Final = 2
 
 
-class ContextTopics:
+class ContextTopics(GatewayPart):
     """Publish /robot/state and /environment/context every second, two statuses also on change."""
 
     def __init__(self, gateway: Gateway, locator: Locator, file: MapFile | None) -> None:
@@ -41,30 +40,30 @@ class ContextTopics:
         self._due = Due(STATE_HZ)
         self._status_due = Due(STATUS_HZ)
         self._look_due = Due(LOOK_HZ)
-        self._told: tuple[Any, ...] = ()
+        self._published: tuple[Any, ...] = ()
 
     def step(self, now_ns: int) -> None:
         """Publish what is due or new."""
         if self._due.is_now(now_ns):
             state = self._robot_state()
-            self._state.tell(state)
-            self._context.tell(self._surroundings(state))
+            self._state.publish(state)
+            self._context.publish(self._surroundings(state))
         if not self._look_due.is_now(now_ns):
             return
         activity = self._activity()
         commands = self._gateway.commands
-        key = (activity.capstone, activity.plan, tuple(commands.statuses.values()))
-        if key != self._told or self._status_due.is_now(now_ns):
-            self._told = key
-            self._tell_statuses(activity)
+        key = (activity.capstone, activity.plan, tuple(commands.current.statuses.values()))
+        if key != self._published or self._status_due.is_now(now_ns):
+            self._published = key
+            self._publish_statuses(activity)
 
     def stop(self) -> None:
         """Publish last that the robot is out of reach."""
-        self._tell_statuses(Activity())
+        self._publish_statuses(Activity())
 
     def _activity(self) -> Activity:
         link, commands = self._gateway.link, self._gateway.commands
-        return Activity.of(
+        return activity_of(
             self._gateway.control_status(),
             link.document("executor_status", _AGE_S),
             link.document("planner_status", _STATUS_AGE_S),
@@ -73,12 +72,12 @@ class ContextTopics:
             ended_s=commands.ended_s,
         )
 
-    def _tell_statuses(self, activity: Activity) -> None:
+    def _publish_statuses(self, activity: Activity) -> None:
         commands = self._gateway.commands
-        self._capstone.tell_text(f"State: {activity.capstone}, Tasks: {commands.actions_left}")
-        statuses = list(commands.statuses.values())
+        self._capstone.publish_text(f"State: {activity.capstone}, Tasks: {commands.actions_left}")
+        statuses = list(commands.current.statuses.values())
         index = next((i for i, one in enumerate(statuses) if one in ("active", "pending")), 0)
-        self._plan.tell(
+        self._plan.publish(
             {
                 "status": activity.plan,
                 "current_action_index": index,
@@ -89,10 +88,11 @@ class ContextTopics:
 
     def _brief(self) -> dict[str, Any]:
         """Return the state that goes with a plan: place, gripper, what is held, battery."""
-        pose = self._gateway.link.fresh("pose", _AGE_S)
+        sample = self._gateway.link.fresh("pose", _AGE_S)
         executor = self._gateway.link.document("executor_status", _AGE_S) or {}
         held = [one for one in (executor.get("holding") or {}).values() if one]
-        place = "" if pose is None else self._locator.place_at(*planar_of(pose)[:2])
+        pose = None if sample is None else pose_of(sample)
+        place = "" if pose is None else self._locator.place_at(pose.x_m, pose.y_m)
         return {
             "location": place or "unknown",
             "gripper_state": "closed" if held else "open",
@@ -111,7 +111,7 @@ class ContextTopics:
             "detected_objects": [described(one) for one in latest_last(scene.get("objects", ()))],
             "available_tools": [hand.gripper for hand in hands],
             "battery_level": None,
-            "current_task": commands.text,
+            "current_task": commands.current.text,
             "recent_actions": [self._recent(one) for one in commands.recent],
             **self._brief(),
         }
@@ -132,9 +132,9 @@ class ContextTopics:
         sample = self._gateway.link.fresh("pose", _AGE_S)
         if sample is None or int(sample.data["state"]) >= _LOST:
             return None, None
-        x_m, y_m, yaw_rad = planar_of(sample)
-        turned = quaternion_of(0.0, 0.0, yaw_rad)
-        return [x_m, y_m, 0.0], [turned.x, turned.y, turned.z, turned.w]
+        pose = pose_of(sample)
+        turned = quaternion_of(pose.yaw_rad)
+        return [pose.x_m, pose.y_m, 0.0], [turned.x, turned.y, turned.z, turned.w]
 
     def _surroundings(self, state: Mapping[str, Any]) -> dict[str, Any]:
         scene = self._locator.scene() or {}

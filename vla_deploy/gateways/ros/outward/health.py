@@ -1,4 +1,4 @@
-"""Judge the robot's parts from what its processes tell, for people who look at diagnostics."""
+"""Judge the robot's parts from what its processes publish, for people who look at diagnostics."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Any, Final
 
 Json = dict[str, Any]
 Documents = Mapping[str, Json | None]
-"""By the name of the topic; None where nobody has told anything lately."""
+"""By the name of the topic; None where nobody has published lately."""
 
 TOPICS: Final[Mapping[str, float]] = {
     "process_table": 3.0,
@@ -20,7 +20,7 @@ TOPICS: Final[Mapping[str, float]] = {
     "budget_stop": 3.0,
     "board": 3.0,
 }
-"""Which topics are asked for, and how old in s what they tell may be."""
+"""Which topics are read, and how old in s they may be."""
 
 
 class HealthLevel(IntEnum):
@@ -34,7 +34,7 @@ class HealthLevel(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartHealth:
-    """Describe how one part does; `values` are shown beside it."""
+    """Describe how one part does; `values` are shown with it."""
 
     name: str
     level: HealthLevel
@@ -68,14 +68,18 @@ _BUS_COUNTS: Final = (
 
 def health_of(documents: Documents) -> list[PartHealth]:
     """Return how every part does: processes, control, buses, budgets, eyes, planner, speech."""
-    return [health for judge in _JUDGES for health in judge(documents)]
+    found: list[PartHealth] = []
+    for topic, part, judge in _JUDGES:
+        document = documents[topic]
+        if document is not None:
+            found += judge(document, documents)
+        elif part:
+            silent = _SILENT.get(part, "it is silent")
+            found.append(PartHealth(name=part, level=HealthLevel.STALE, message=silent))
+    return found
 
 
-def _processes(documents: Documents) -> Iterator[PartHealth]:
-    table = documents["process_table"]
-    if table is None:
-        yield _silent("supervisor")
-        return
+def _processes(table: Json, documents: Documents) -> Iterator[PartHealth]:
     for row in table["processes"]:
         level = _PROCESS.get(row["state"], HealthLevel.WARN)
         alarms = list(row.get("alarms", ()))
@@ -90,11 +94,7 @@ def _processes(documents: Documents) -> Iterator[PartHealth]:
         )
 
 
-def _control(documents: Documents) -> Iterator[PartHealth]:
-    status = documents["control_status"]
-    if status is None:
-        yield _silent("control")
-        return
+def _control(status: Json, documents: Documents) -> Iterator[PartHealth]:
     latched = bool(status["estop_latched"])
     level = HealthLevel.ERROR if latched else _CONTROL.get(status["state"], HealthLevel.WARN)
     if status.get("cause"):
@@ -120,23 +120,22 @@ def _most(status: Json, name: str, of: Callable[[list[float]], float]) -> float 
     return of(values) if values else None
 
 
-def _buses(documents: Documents) -> Iterator[PartHealth]:
-    status = documents["control_status"]
-    for name, told in ({} if status is None else status.get("buses", {})).items():
-        budget = told.get("budget", {})
+def _buses(status: Json, documents: Documents) -> Iterator[PartHealth]:
+    for name, bus in status.get("buses", {}).items():
+        budget = bus.get("budget", {})
         level = _BUS.get(budget.get("bus", "ok"), HealthLevel.WARN)
         words = [f"{key}: {', '.join(map(str, budget[key]))}" for key in _UNWELL if budget.get(key)]
-        words += [str(one) for one in told.get("faults", ())]
-        words += [f"{told[key]} {key}" for key in _UNWELL_NODES if told.get(key)]
+        words += [str(one) for one in bus.get("faults", ())]
+        words += [f"{bus[key]} {key}" for key in _UNWELL_NODES if bus.get(key)]
         if words:
             level = max(level, HealthLevel.WARN)
-        if budget.get("lost") or told.get("lost_nodes"):
+        if budget.get("lost") or bus.get("lost_nodes"):
             level = HealthLevel.ERROR
         yield PartHealth(
             name=f"bus {name}",
             level=level,
             message="; ".join(words) or "ok",
-            values={key: told[key] for key in _BUS_COUNTS if key in told},
+            values={key: bus[key] for key in _BUS_COUNTS if key in bus},
         )
 
 
@@ -144,11 +143,8 @@ _UNWELL: Final = ("degraded", "lost")
 _UNWELL_NODES: Final = ("degraded_nodes", "lost_nodes", "bus_degraded")
 
 
-def _budgets(documents: Documents) -> Iterator[PartHealth]:
-    budget, stop = documents["budget"], documents["budget_stop"] or {}
-    if budget is None:
-        yield _silent("budgets")
-        return
+def _budgets(budget: Json, documents: Documents) -> Iterator[PartHealth]:
+    stop = documents["budget_stop"] or {}
     over = [row for row in budget["rows"] if row.get("over")]
     taken = budget.get("ladder", {}).get("taken", ())
     level = HealthLevel.WARN if over or taken else HealthLevel.OK
@@ -166,11 +162,7 @@ def _budgets(documents: Documents) -> Iterator[PartHealth]:
     )
 
 
-def _eyes(documents: Documents) -> Iterator[PartHealth]:
-    scene = documents["scene"]
-    if scene is None:
-        yield _silent("perception")
-        return
+def _eyes(scene: Json, documents: Documents) -> Iterator[PartHealth]:
     away, image, sight = (scene.get(key) or {} for key in ("away", "image", "sight"))
     words = [f"{sensor}: {why}" for sensor, why in away.items()]
     level = HealthLevel.ERROR if words else HealthLevel.OK
@@ -191,35 +183,27 @@ def _eyes(documents: Documents) -> Iterator[PartHealth]:
     )
 
 
-def _planner(documents: Documents) -> Iterator[PartHealth]:
-    planner, executor = documents["planner_status"], documents["executor_status"]
-    if planner is None:
-        yield _silent("planner")
-    else:
-        away = planner.get("away") or {}
-        yield PartHealth(
-            name="planner",
-            level=HealthLevel.WARN if away else HealthLevel.OK,
-            message="; ".join(f"{rung}: {why}" for rung, why in away.items()) or "ok",
-            values={key: planner.get(key) for key in ("heard", "planned", "refused", "failed")},
-        )
-    if executor is None:
-        yield _silent("executor")
-    else:
-        recovering = executor["state"] == "recovering"
-        yield PartHealth(
-            name="executor",
-            level=HealthLevel.WARN if recovering else HealthLevel.OK,
-            message=str(executor["state"]),
-            values={key: executor.get(key) for key in ("command_id", "action_id", "skill")},
-        )
+def _planner(planner: Json, documents: Documents) -> Iterator[PartHealth]:
+    away = planner.get("away") or {}
+    yield PartHealth(
+        name="planner",
+        level=HealthLevel.WARN if away else HealthLevel.OK,
+        message="; ".join(f"{rung}: {why}" for rung, why in away.items()) or "ok",
+        values={key: planner.get(key) for key in ("heard", "planned", "refused", "failed")},
+    )
 
 
-def _speech(documents: Documents) -> Iterator[PartHealth]:
-    speech = documents["speech_status"]
-    if speech is None:
-        yield PartHealth(name="speech", level=HealthLevel.STALE, message="no speech process runs")
-        return
+def _executor(executor: Json, documents: Documents) -> Iterator[PartHealth]:
+    recovering = executor["state"] == "recovering"
+    yield PartHealth(
+        name="executor",
+        level=HealthLevel.WARN if recovering else HealthLevel.OK,
+        message=str(executor["state"]),
+        values={key: executor.get(key) for key in ("command_id", "action_id", "skill")},
+    )
+
+
+def _speech(speech: Json, documents: Documents) -> Iterator[PartHealth]:
     voice = speech.get("voice") or {}
     words = [speech["state"], *filter(None, (speech.get("why"), voice.get("why")))]
     deaf = speech["state"] == "deaf" or voice.get("state") != "ready"
@@ -231,10 +215,15 @@ def _speech(documents: Documents) -> Iterator[PartHealth]:
     )
 
 
-def _silent(name: str) -> PartHealth:
-    return PartHealth(name=name, level=HealthLevel.STALE, message="it is silent")
-
-
-_JUDGES: Final[tuple[Callable[[Documents], Iterator[PartHealth]], ...]] = (
-    *(_processes, _control, _buses, _budgets, _eyes, _planner, _speech),
+_JUDGES: Final[tuple[tuple[str, str, Callable[[Json, Documents], Iterator[PartHealth]]], ...]] = (
+    ("process_table", "supervisor", _processes),
+    ("control_status", "control", _control),
+    ("control_status", "", _buses),
+    ("budget", "budgets", _budgets),
+    ("scene", "perception", _eyes),
+    ("planner_status", "planner", _planner),
+    ("executor_status", "executor", _executor),
+    ("speech_status", "speech", _speech),
 )
+"""By topic: what is stale where nobody publishes it, and who judges what is published."""
+_SILENT: Final = {"speech": "no speech process runs"}

@@ -23,7 +23,19 @@ _REFERRING: Final = ("object", "destination", "place")
 def ranked_actions(plan: Mapping[str, Any], where: Where) -> list[Json]:
     """Return the actions of a plan; those with the same priority may run side by side."""
     depths = _depths(plan["actions"])
-    return [_ranked(one, depths[one["id"]], where) for one in plan["actions"]]
+    ranked = []
+    for action in plan["actions"]:
+        name, parameters = ranked_name(action["skill"], action.get("parameters", {}), where)
+        ranked.append(
+            {
+                "action_type": name,
+                "parameters": parameters,
+                "priority": depths[action["id"]],
+                "estimated_duration": float(action.get("estimated_duration_s", 0.0)),
+                "feasibility_score": float(action.get("feasibility_score", 1.0)),
+            }
+        )
+    return ranked
 
 
 def terse_plan(plan: Mapping[str, Any]) -> Json:
@@ -50,40 +62,19 @@ def terse_action(action: Mapping[str, Any]) -> Json:
     return {"action": name, "params": params, "description": description}
 
 
-def resolution_notes(plan: Mapping[str, Any]) -> dict[str, str]:
-    """Return for each action, by its id, how what it refers to was understood.
+def resolved_actions(plan: Mapping[str, Any], where: Where) -> tuple[list[Json], list[str]]:
+    """Return ranked actions with their `resolution_notes`, and the log of all resolutions.
 
     The planner's log is the plan's `reasoning`: what was asked, what was chosen, and why.
     """
     decisions = list(_decisions(str(plan.get("reasoning", ""))))
-    notes = {
-        action["id"]: "; ".join(dict.fromkeys(_notes(action, decisions)))
-        for action in plan["actions"]
-    }
-    return {name: note for name, note in notes.items() if note}
-
-
-def resolved_actions(plan: Mapping[str, Any], where: Where) -> tuple[list[Json], list[str]]:
-    """Return ranked actions with their `resolution_notes`, and the log of all resolutions."""
-    notes = resolution_notes(plan)
     actions, log = ranked_actions(plan, where), []
     for action, own in zip(actions, plan["actions"], strict=True):
-        note = notes.get(own["id"])
+        note = "; ".join(dict.fromkeys(_notes(own, decisions)))
         if note:
             action["resolution_notes"] = note
             log.append(f"Action {action['action_type']}: {note}")
     return actions, log
-
-
-def _ranked(action: Mapping[str, Any], depth: int, where: Where) -> Json:
-    name, parameters = ranked_name(action["skill"], action.get("parameters", {}), where)
-    return {
-        "action_type": name,
-        "parameters": parameters,
-        "priority": depth,
-        "estimated_duration": float(action.get("estimated_duration_s", 0.0)),
-        "feasibility_score": float(action.get("feasibility_score", 1.0)),
-    }
 
 
 def ranked_name(skill: str, given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
@@ -94,10 +85,8 @@ def ranked_name(skill: str, given: Mapping[str, Any], where: Where) -> tuple[str
 
 def _depths(actions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     """Return at which turn each action can come, 1 first: one more than what it waits for."""
-    depths: dict[str, int] = {}
-    for action in actions:  # a validated plan has no cycles, but need not be in order
-        depths[action["id"]] = 1
-    for _ in actions:
+    depths = {str(action["id"]): 1 for action in actions}
+    for _ in actions:  # a validated plan has no cycles, but need not be in order
         for action in actions:
             before = [depths[name] for name in action.get("depends_on", ()) if name in depths]
             depths[action["id"]] = 1 + max(before, default=0)
@@ -116,32 +105,10 @@ def _navigate(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
     return "navigate_to", {**_at(name, where), **named, **rest}
 
 
-def _pick_up(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
-    return "pick_up", {"target_object": given.get("object", ""), **_arm(given)}
-
-
 def _place(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
     name = str(given.get("destination", ""))
     how = {"destination": name, "placement_type": given.get("relation", "on")}
     return "place_down", {**_at(name, where), **how, **_arm(given)}
-
-
-def _find(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
-    return "find_object", {"object_type": given.get("object", "")}
-
-
-def _look_at(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
-    if "direction" in given:
-        return "look_at", {"direction": given["direction"]}
-    return "look_at", {"target_object": given.get("object", "")}
-
-
-def _speak(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
-    return "speak", {"text_to_speak": given.get("text", "")}
-
-
-def _wait(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
-    return "wait", {"duration": float(given.get("duration_s", 0.0))}
 
 
 def _move(given: Mapping[str, Any], where: Where) -> tuple[str, Json]:
@@ -165,12 +132,20 @@ def _at(name: str, where: Where) -> Json:
 
 _RANKED: Final[Mapping[str, Callable[[Mapping[str, Any], Where], tuple[str, Json]]]] = {
     "navigate_to": _navigate,
-    "pick_up": _pick_up,
+    "pick_up": lambda given, _: (
+        "pick_up",
+        {"target_object": given.get("object", ""), **_arm(given)},
+    ),
     "place": _place,
-    "find_object": _find,
-    "look_at": _look_at,
-    "speak": _speak,
-    "wait": _wait,
+    "find_object": lambda given, _: ("find_object", {"object_type": given.get("object", "")}),
+    "look_at": lambda given, _: (
+        "look_at",
+        {"direction": given["direction"]}
+        if "direction" in given
+        else {"target_object": given.get("object", "")},
+    ),
+    "speak": lambda given, _: ("speak", {"text_to_speak": given.get("text", "")}),
+    "wait": lambda given, _: ("wait", {"duration": float(given.get("duration_s", 0.0))}),
     "move": _move,
     "turn": _turn,
 }

@@ -1,5 +1,9 @@
-"""Publish how the robot is: /vla_deploy/state, /battery_state, /diagnostics."""
+"""Publish how the robot is, and what happens to it.
 
+/vla_deploy/state, /battery_state, /diagnostics, /vla_deploy/events.
+"""
+
+import json
 import math
 import statistics
 from collections.abc import Mapping
@@ -7,11 +11,11 @@ from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import BatteryState
-from vla_deploy_msgs.msg import RobotState
+from vla_deploy_msgs.msg import RobotEvent, RobotState
 
-from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
+from vla_deploy.gateways.ros.graph import LATCHED, SENSOR
 from vla_deploy.gateways.ros.outward.health import TOPICS, PartHealth, health_of
-from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 
 STATE_HZ: Final = 2.0
 LOOK_HZ: Final = 10.0
@@ -22,9 +26,21 @@ _EXECUTOR_AGE_S: Final = 1.0
 _POSE_AGE_S: Final = 0.5
 _PLACES: Final = ("tracking", "unsure", "lost")
 _UNMEASURED: Final = math.nan
+_NOT_MEASURED: Final = (
+    *("temperature", "current", "charge", "capacity", "design_capacity", "percentage"),
+)
+EVENT_SOURCES: Final = {
+    "task_event": "event",
+    "operator": "act",
+    "voice_event": "event",
+    "heard": "verdict",
+    "motion_result": "status",
+    "flight_event": "event",
+}
+"""By the topic of shared memory, the key whose value is the kind of event."""
 
 
-class StateTopic:
+class StateTopic(GatewayPart):
     """Publish /vla_deploy/state twice a second, and when something of it changes."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -32,7 +48,7 @@ class StateTopic:
         self._state = gateway.graph.publisher(RobotState, "/vla_deploy/state", LATCHED)
         self._due = Due(STATE_HZ)
         self._look_due = Due(LOOK_HZ)
-        self._told: tuple[Any, ...] = ()
+        self._published: tuple[Any, ...] = ()
 
     def step(self, now_ns: int) -> None:
         """Publish what is due or new."""
@@ -41,12 +57,12 @@ class StateTopic:
         control = self._gateway.control_status()
         executor = self._gateway.link.document("executor_status", _EXECUTOR_AGE_S)
         key = _what_changes(control or {}, executor or {})
-        if key != self._told or self._due.is_now(now_ns):
-            self._told = key
+        if key != self._published or self._due.is_now(now_ns):
+            self._published = key
             self._state.publish(self._message(control, executor or {}))
 
     def stop(self) -> None:
-        """Publish last that nobody tells how the robot is."""
+        """Publish last that the robot's state is unknown."""
         self._state.publish(self._message(None, {}))
 
     def _message(
@@ -79,7 +95,7 @@ def _what_changes(control: Mapping[str, Any], executor: Mapping[str, Any]) -> tu
     )
 
 
-class SupplyTopic:
+class SupplyTopic(GatewayPart):
     """Publish /battery_state where the servos measure their supply; nobody measures its charge."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -97,18 +113,10 @@ class SupplyTopic:
         if volts:
             self._battery.publish(self._message(statistics.median(volts)))
 
-    def stop(self) -> None:
-        """Leave nothing under way."""
-
     def _message(self, volts: float) -> BatteryState:
         message = BatteryState(
             voltage=volts,
-            temperature=_UNMEASURED,
-            current=_UNMEASURED,
-            charge=_UNMEASURED,
-            capacity=_UNMEASURED,
-            design_capacity=_UNMEASURED,
-            percentage=_UNMEASURED,
+            **dict.fromkeys(_NOT_MEASURED, _UNMEASURED),
             power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
             power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
             power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
@@ -119,12 +127,12 @@ class SupplyTopic:
         return message
 
 
-class HealthTopic:
+class HealthTopic(GatewayPart):
     """Publish /diagnostics once a second."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
-        self._array = gateway.graph.publisher(DiagnosticArray, "/diagnostics", RELIABLE)
+        self._array = gateway.graph.publisher(DiagnosticArray, "/diagnostics")
         self._due = Due(DIAGNOSTICS_HZ)
 
     def step(self, now_ns: int) -> None:
@@ -139,9 +147,6 @@ class HealthTopic:
         message.header.stamp = gateway.time.now()
         self._array.publish(message)
 
-    def stop(self) -> None:
-        """Leave nothing under way."""
-
 
 def _status(health: PartHealth, robot: str) -> DiagnosticStatus:
     return DiagnosticStatus(
@@ -155,3 +160,30 @@ def _status(health: PartHealth, robot: str) -> DiagnosticStatus:
 
 def _text(value: Any) -> str:
     return "none" if value is None else str(value)
+
+
+class EventsTopic(GatewayPart):
+    """Publish every event of those topics, in their order within each."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._events = gateway.graph.publisher(RobotEvent, "/vla_deploy/events")
+        self._rings = {source: gateway.link.events(source) for source in EVENT_SOURCES}
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is new."""
+        for source, ring in self._rings.items():
+            for event in ring.drain():
+                self._events.publish(
+                    RobotEvent(
+                        stamp=self._gateway.time.stamp(event.stamp_ns),
+                        kind=str(event.payload.get(EVENT_SOURCES[source]) or source),
+                        source=source,
+                        json=json.dumps(event.payload, separators=(",", ":"), ensure_ascii=False),
+                    )
+                )
+
+    def stop(self) -> None:
+        """Close the topics."""
+        for ring in self._rings.values():
+            ring.close()

@@ -1,15 +1,17 @@
 """Publish what lidar, IMU and camera measure, in the field's own messages."""
 
 from array import array
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from geometry_msgs.msg import Vector3
+from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 
-from vla_deploy.gateways.ros.geometry.rotation import quaternion_of
+from drivers.camera.protocol import Intrinsics
+from vla_deploy.gateways.ros.conversions import quaternion_of
 from vla_deploy.gateways.ros.graph import SENSOR
-from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.ipc import Frame, Sample
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.ipc.topics import SCAN_BEAMS
@@ -17,13 +19,14 @@ from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPT
 
 # Datasheet of the LD19, table 2: 0.02 to 12 m.
 _RANGE_M: Final = (0.02, 12.0)
+IMU_HZ: Final = 50.0
 _PLUMB_BOB: Final = 5
 _RATIONAL: Final = 8
 _UNKNOWN: Final = -1.0
 """In the first place of a covariance: there is no estimate of this at all (sensor_msgs/Imu)."""
 
 
-class Scans:
+class Scans(GatewayPart):
     """Publish /scan, each measured once."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -38,9 +41,6 @@ class Scans:
             return
         self._sequence = sample.sequence
         self._scan.publish(self._message(sample))
-
-    def stop(self) -> None:
-        """Leave nothing under way."""
 
     def _message(self, sample: Sample) -> LaserScan:
         ranges = np.array(sample.data["range_m"], dtype=np.float32)
@@ -63,15 +63,13 @@ class Scans:
         return message
 
 
-class Inertia:
+class Inertia(GatewayPart):
     """Publish /imu/data, each measurement once and at most so often."""
-
-    RATE_HZ: Final = 50.0
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._imu = gateway.graph.publisher(Imu, "/imu/data", SENSOR)
-        self._due = Due(self.RATE_HZ)
+        self._due = Due(IMU_HZ)
         self._sequence = 0
 
     def step(self, now_ns: int) -> None:
@@ -85,22 +83,17 @@ class Inertia:
         data = sample.data
         message = Imu()
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
-        message.header.frame_id = (
-            BASE_FRAME  # perception turns what the sensor tells into this frame
-        )
+        message.header.frame_id = BASE_FRAME  # perception turns what the sensor says into it
         message.orientation = quaternion_of(
-            float(data["roll_rad"]), float(data["pitch_rad"]), float(data["yaw_rad"])
+            float(data["yaw_rad"]), float(data["pitch_rad"]), float(data["roll_rad"])
         )
         message.angular_velocity_covariance[0] = _UNKNOWN
         x, y, z = (float(one) for one in data["acceleration_m_s2"])
         message.linear_acceleration = Vector3(x=x, y=y, z=z)
         self._imu.publish(message)
 
-    def stop(self) -> None:
-        """Leave nothing under way."""
 
-
-class Images:
+class Images(GatewayPart):
     """Publish colours, depths and the lens, where somebody listens."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -112,7 +105,7 @@ class Images:
             graph.publisher(CameraInfo, f"/camera/{kind}/camera_info", SENSOR)
             for kind in ("color", "depth")
         ]
-        self._info = camera_info(gateway)
+        self._info = _camera_info(gateway.robot.camera.intrinsics)
         self._due = Due(gateway.settings.image_rate_hz)
         self._stamp_ns = 0
 
@@ -134,35 +127,29 @@ class Images:
                 message.header.stamp, message.header.frame_id = stamp, OPTICAL_FRAME
                 publisher.publish(message)
 
-    def stop(self) -> None:
-        """Leave nothing under way."""
-
 
 def _colour(frame: Frame) -> Image:
-    data = array("B", colours(frame).tobytes())
-    return _image(frame, "rgb8", 3, data)
+    return _image(frame, "rgb8", 3, colours(frame))
 
 
 def _depth(frame: Frame) -> Image:
     """Return depths in millimetres, as REP-118 has them for OpenNI's cameras."""
-    data = array("B", depths_mm(frame).tobytes())
-    return _image(frame, "16UC1", 2, data)
+    return _image(frame, "16UC1", 2, depths_mm(frame))
 
 
-def _image(frame: Frame, encoding: str, pixel_bytes: int, data: "array[int]") -> Image:
+def _image(frame: Frame, encoding: str, pixel_bytes: int, pixels: NDArray[Any]) -> Image:
     return Image(
         height=frame.height,
         width=frame.width,
         encoding=encoding,
         is_bigendian=0,
         step=frame.width * pixel_bytes,
-        data=data,
+        data=array("B", pixels.tobytes()),
     )
 
 
-def camera_info(gateway: Gateway) -> CameraInfo:
+def _camera_info(lens: Intrinsics) -> CameraInfo:
     """Return the camera's lens as sensor_msgs has it; without a calibration it is a pinhole."""
-    lens = gateway.robot.camera.intrinsics
     rows = [[lens.fx, 0.0, lens.cx], [0.0, lens.fy, lens.cy], [0.0, 0.0, 1.0]]
     several = len(lens.distortion) > _PLUMB_BOB
     count = _RATIONAL if several else _PLUMB_BOB

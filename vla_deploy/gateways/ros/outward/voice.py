@@ -4,25 +4,22 @@
 the robot are taken on another topic, else it would answer itself.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from vla_deploy.client.command_record import Kind
 from vla_deploy.gateways.ros.commands import CommandNews
-from vla_deploy.gateways.ros.graph import NODE_NAME
-from vla_deploy.gateways.ros.json_topic import PUBLISHED_BY, JsonTopic
-from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.gateways.ros.graph import NODE_NAME, PUBLISHED_BY, JsonTopic
+from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 
 PARSED: Final = "/voice_command/parsed"
 SAID: Final = "/tts/say"
 VOICE: Final = "voice"
 _STOP: Final = "stop"
 _UNKNOWN: Final = "unknown"
-_THING_KEYS: Final = ("object",)
-_PLACE_KEYS: Final = ("place", "destination")
 
 
-class VoiceTopics:
+class VoiceTopics(GatewayPart):
     """Publish commands that came by voice once they are understood, and texts to be said."""
 
     def __init__(self, gateway: Gateway) -> None:
@@ -39,13 +36,13 @@ class VoiceTopics:
         for event in self._say.drain():
             text = str(event.payload.get("text") or "")
             if text and not event.payload.get("cancel"):
-                self._said.tell_text(text)
+                self._said.publish_text(text)
         for event in self._heard.drain():
             self._note(event.payload)
         for news in self._gateway.commands.news:
             record = news.record
             if record.source == VOICE and record.kind is Kind.COMMAND:
-                self._tell(news)
+                self._take(news)
 
     def stop(self) -> None:
         """Close the topics."""
@@ -57,41 +54,39 @@ class VoiceTopics:
         text = str(heard.get("text", ""))
         self._confidence = {text: heard.get("confidence")}
         if heard.get("verdict") == _STOP:
-            self._publish(text, intent=_STOP, things=[], location=None, stamp_s=None)
+            self._publish(text, intent=_STOP)
 
-    def _tell(self, news: CommandNews) -> None:
+    def _take(self, news: CommandNews) -> None:
         record, name = news.record, news.event.get("event")
         if name == "plan":
             plan = news.event["plan"]
             given = [one["parameters"] for one in plan["actions"]]
             self._publish(
                 record.text,
-                intent=intent_of(plan),
-                things=_named(given, _THING_KEYS),
-                location=next(iter(_named(given, _PLACE_KEYS)), None),
+                intent=_intent_of(plan),
+                things=_named(given, "object"),
+                location=next(iter(_named(given, "place", "destination")), None),
                 stamp_s=record.given_s,
             )
         elif name == "rejected":
-            self._publish(
-                record.text, intent=_UNKNOWN, things=[], location=None, stamp_s=record.given_s
-            )
+            self._publish(record.text, intent=_UNKNOWN, stamp_s=record.given_s)
 
     def _publish(
         self,
         text: str,
         *,
         intent: str,
-        things: list[str],
-        location: str | None,
-        stamp_s: float | None,
+        things: Sequence[str] = (),
+        location: str | None = None,
+        stamp_s: float | None = None,
     ) -> None:
         now = self._gateway.time.now()
-        self._parsed.tell(
+        self._parsed.publish(
             {
                 "original_command": text,
                 "text": text,
                 "intent": intent,
-                "objects": things,
+                "objects": list(things),
                 "location": location,
                 "confidence": self._confidence.get(text),
                 "timestamp": now.sec + now.nanosec / 1e9 if stamp_s is None else stamp_s,
@@ -100,7 +95,7 @@ class VoiceTopics:
         )
 
 
-def intent_of(plan: Mapping[str, Any]) -> str:
+def _intent_of(plan: Mapping[str, Any]) -> str:
     """Return what a plan is for: the planner's own word for it, else by its last skill."""
     first = str(plan.get("summary", "")).partition(":")[0].split(",")[0].strip()
     if first in _INTENTS:
@@ -121,6 +116,6 @@ _BY_SKILL: Final = {
 }
 
 
-def _named(given: list[Mapping[str, Any]], keys: tuple[str, ...]) -> list[str]:
+def _named(given: list[Mapping[str, Any]], *keys: str) -> list[str]:
     found = [str(one[key]) for one in given for key in keys if key in one]
     return list(dict.fromkeys(found))

@@ -10,6 +10,20 @@ from vla_deploy.ipc.ros_goals import GoalState
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(180)]
 
 
+@pytest.fixture
+def under_way(gateway, serve, drive):
+    """Start a server with a goal that it has accepted."""
+
+    def begin(mode: str, **changed):
+        server = serve("nav", "navigate_to_pose", mode)
+        gateway.claim("base")
+        gateway.send(drive(**changed))
+        gateway.wait_for(GoalState.ACCEPTED)
+        return server
+
+    return begin
+
+
 @pytest.mark.parametrize(
     ("mode", "state", "words"),
     [
@@ -17,6 +31,7 @@ pytestmark = [pytest.mark.stack, pytest.mark.timeout(180)]
         ("abort", GoalState.ABORTED, "error code 7"),
         ("code", GoalState.ABORTED, "error code 9"),
         ("reject", GoalState.REJECTED, "rejected the goal"),
+        ("mute", GoalState.LOST, "did not answer the goal within 5 s"),
     ],
 )
 def test_a_goal_ends_as_its_server_says(gateway, serve, drive, mode, state, words) -> None:
@@ -45,15 +60,6 @@ def test_a_server_that_comes_in_time_gets_the_goal(gateway, serve, drive) -> Non
     assert gateway.final().state is GoalState.SUCCEEDED
 
 
-def test_a_server_that_never_answers_has_lost_the_goal(gateway, serve, drive) -> None:
-    serve("nav", "navigate_to_pose", "mute")
-    gateway.claim("base")
-    gateway.send(drive())
-    ended = gateway.final()
-    assert ended.state is GoalState.LOST
-    assert "did not answer the goal within 5 s" in ended.text
-
-
 def test_a_cancel_is_done_when_the_server_has_ended_the_goal(gateway, serve, reach) -> None:
     server = serve("fjt", "left_arm_controller/follow_joint_trajectory", "hang")
     gateway.claim("left_arm")
@@ -65,58 +71,51 @@ def test_a_cancel_is_done_when_the_server_has_ended_the_goal(gateway, serve, rea
     assert [server.stdout.readline() for _ in range(3)] == ["goal\n", "cancel\n", "canceled\n"]
 
 
-def test_a_cancel_that_is_rejected_is_told(gateway, serve, drive) -> None:
-    serve("nav", "navigate_to_pose", "refuse_cancel")
-    gateway.claim("base")
-    gateway.send(drive())
-    gateway.wait_for(GoalState.ACCEPTED)
+@pytest.mark.parametrize(
+    ("mode", "answer", "words", "why"),
+    [
+        (
+            *("refuse_cancel", GoalState.CANCEL_REJECTED, "rejected the cancel"),
+            "moves nothing of this robot",
+        ),
+        ("ignore_cancel", GoalState.CANCELLING, "", "has not ended it within 10 s"),
+    ],
+)
+def test_a_cancel_that_is_not_followed_ends_the_goal_as_lost(
+    gateway, under_way, mode, answer, words, why
+) -> None:
+    under_way(mode)
     gateway.ask("cancel")
-    assert "rejected the cancel" in gateway.wait_for(GoalState.CANCEL_REJECTED).text
+    assert words in gateway.wait_for(answer).text
     ended = gateway.final()
     assert ended.state is GoalState.LOST
-    assert "moves nothing of this robot" in ended.text
+    assert why in ended.text
 
 
-def test_a_cancel_that_is_ignored_ends_the_goal_as_lost(gateway, serve, drive) -> None:
-    serve("nav", "navigate_to_pose", "ignore_cancel")
-    gateway.claim("base")
-    gateway.send(drive())
-    gateway.wait_for(GoalState.ACCEPTED)
-    gateway.ask("cancel")
-    gateway.wait_for(GoalState.CANCELLING)
-    ended = gateway.final()
-    assert ended.state is GoalState.LOST
-    assert "has not ended it within 10 s" in ended.text
-
-
-def test_a_goal_that_takes_too_long_is_cancelled_and_aborted(gateway, serve, drive) -> None:
-    server = serve("nav", "navigate_to_pose", "hang")
-    gateway.claim("base")
-    gateway.send(drive(timeout_s=1.0))
+def test_a_goal_that_takes_too_long_is_cancelled_and_aborted(gateway, under_way) -> None:
+    server = under_way("hang", timeout_s=1.0)
     ended = gateway.final()
     assert ended.state is GoalState.ABORTED
     assert "took longer than 1 s" in ended.text
     assert [server.stdout.readline() for _ in range(3)] == ["goal\n", "cancel\n", "canceled\n"]
 
 
-def test_a_second_goal_waits_until_its_server_has_ended_the_first(gateway, serve, drive) -> None:
-    server = serve("nav", "navigate_to_pose", "hang")
-    gateway.claim("base")
-    gateway.send(drive("g1"))
+def test_a_second_goal_waits_until_its_server_has_ended_the_first(
+    gateway, under_way, drive
+) -> None:
+    server = under_way("hang", request_id="g1")
     gateway.send(drive("g2"))
-    gateway.wait_for(GoalState.ACCEPTED)
     gateway.ask("cancel", "g1")
     assert gateway.final().request_id == "g1"
-    assert gateway.wait_until(lambda: _is_accepted(gateway, "g2"))
+
+    def is_second_accepted() -> bool:
+        gateway.wait_for(GoalState.ACCEPTED)
+        return ("g2", GoalState.ACCEPTED) in [(one.request_id, one.state) for one in gateway.told]
+
+    assert gateway.wait_until(is_second_accepted)
     gateway.ask("cancel", "g2")
     lines = [server.stdout.readline() for _ in range(4)]
     assert lines == ["goal\n", "cancel\n", "canceled\n", "goal\n"]
-
-
-def _is_accepted(gateway, request_id: str) -> bool:
-    gateway.wait_for(GoalState.ACCEPTED)
-    answers = [(one.request_id, one.state) for one in gateway.told]
-    return (request_id, GoalState.ACCEPTED) in answers
 
 
 def test_a_goal_without_its_claim_is_not_sent(gateway, serve, drive) -> None:
@@ -128,11 +127,8 @@ def test_a_goal_without_its_claim_is_not_sent(gateway, serve, drive) -> None:
     assert "does not hold base" in ended.text
 
 
-def test_a_goal_whose_claim_is_given_back_is_cancelled(gateway, serve, drive) -> None:
-    server = serve("nav", "navigate_to_pose", "hang")
-    gateway.claim("base")
-    gateway.send(drive())
-    gateway.wait_for(GoalState.ACCEPTED)
+def test_a_goal_whose_claim_is_given_back_is_cancelled(gateway, under_way) -> None:
+    server = under_way("hang")
     gateway.claims.release("navigate_to (c1, a1)")
     assert gateway.final().state is GoalState.CANCELLED
     assert [server.stdout.readline() for _ in range(3)] == ["goal\n", "cancel\n", "canceled\n"]
@@ -145,11 +141,8 @@ def test_a_request_that_makes_no_sense_is_rejected(gateway, drive) -> None:
     assert "expected x, y, yaw" in ended.text
 
 
-def test_a_server_that_is_killed_has_lost_its_goal(gateway, serve, drive) -> None:
-    server = serve("nav", "navigate_to_pose", "hang")
-    gateway.claim("base")
-    gateway.send(drive())
-    gateway.wait_for(GoalState.ACCEPTED)
+def test_a_server_that_is_killed_has_lost_its_goal(gateway, under_way) -> None:
+    server = under_way("hang")
     os.kill(server.pid, signal.SIGKILL)
     ended = gateway.final(timeout_s=60.0)
     assert ended.state is GoalState.LOST

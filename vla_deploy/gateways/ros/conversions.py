@@ -1,13 +1,15 @@
-"""Turn the run's monotonic stamps into ROS time, and back.
+"""Turn the run's times and angles into fields of messages, and back.
 
 On a robot ROS time is the computer's wall clock; on the twin it is the twin's time, which goes out
 on /clock. Where the wall clock is set meanwhile, later stamps follow it.
 """
 
+import math
 import time
 from typing import Final
 
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
@@ -47,3 +49,23 @@ class RosTime:
     def is_unset(self, stamp: Time) -> bool:
         """Return whether a sender has left the stamp out."""
         return not (stamp.sec or stamp.nanosec)
+
+
+def quaternion_of(yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float = 0.0) -> Quaternion:
+    """Return a rotation by yaw, then pitch, then roll, each about the axis as turned so far."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return Quaternion(
+        w=cr * cp * cy + sr * sp * sy,
+        x=sr * cp * cy - cr * sp * sy,
+        y=cr * sp * cy + sr * cp * sy,
+        z=cr * cp * sy - sr * sp * cy,
+    )
+
+
+def yaw_of(rotation: Quaternion) -> float:
+    """Return a rotation's angle about the vertical axis, in rad."""
+    siny = 2.0 * (rotation.w * rotation.z + rotation.x * rotation.y)
+    cosy = 1.0 - 2.0 * (rotation.y * rotation.y + rotation.z * rotation.z)
+    return math.atan2(siny, cosy)

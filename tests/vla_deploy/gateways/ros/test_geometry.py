@@ -5,17 +5,18 @@ import numpy as np
 import pytest
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.gateways.ros.geometry.body_frames import BodyFrames
-from vla_deploy.gateways.ros.geometry.points import (
+from vla_deploy.gateways.ros.geometry import (
+    BodyFrames,
     beam_points,
     depth_points,
     mark_seen,
     moved,
     near_segments,
     pixels_of,
-    planar_pose,
+    standing,
     thinned,
 )
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.kinematics.model import RobotModel
 
@@ -54,7 +55,7 @@ def test_beams_lie_counter_clockwise_from_the_front() -> None:
     ranges[[0, 90, 180]] = 1.0, 2.0, 30.0
     found = beam_points(ranges, far_m=8.0)
     assert np.allclose(found, [(1, 0, 0), (0, 2, 0)])
-    assert np.allclose(moved(found, planar_pose(1.0, 1.0, np.pi / 2)), [(1, 2, 0), (-1, 1, 0)])
+    assert np.allclose(moved(found, standing(Pose2D(1.0, 1.0, np.pi / 2))), [(1, 2, 0), (-1, 1, 0)])
 
 
 def test_a_cloud_is_thinned_evenly() -> None:

@@ -12,9 +12,11 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
-from vla_deploy.gateways.ros.graph import GraphLink
+from vla_deploy.client.readiness import refusal_of
+from vla_deploy.gateways.ros.part import Gateway
 
 MOST_AT_A_TIME: Final = 8
+Feedback = Callable[[Any], None]
 
 
 class GoalEnding(Enum):
@@ -33,6 +35,14 @@ class GoalOutcome:
     result: Any
 
 
+class GoalRefused(Exception):
+    """Report why a goal is not taken up, with the action's code."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
 class Pursuit(Protocol):
     """Pursue one goal."""
 
@@ -41,17 +51,53 @@ class Pursuit(Protocol):
         ...
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
-        """End it for a reason; None where `step` tells the outcome later.
+        """End it for a reason; None where `step` returns the outcome later.
 
         One that is superseded leaves what it moves to its successor.
         """
         ...
 
 
-Feedback = Callable[[Any], None]
-Begin = Callable[[Feedback], "Pursuit | GoalOutcome"]
-Judge = Callable[[Any], "Begin | GoalOutcome"]
-"""Return how to begin with a goal, or how it ended already: it was refused."""
+class ServedAction(Protocol):
+    """Judge the goals of one action, and begin those that are sound."""
+
+    @property
+    def kind(self) -> Any:
+        """Return the type of the action."""
+        ...
+
+    def judge(self, goal: Any) -> Any:
+        """Return what of a goal `begin` needs; nothing moves by that.
+
+        Raises:
+            GoalRefused: it is malformed, or the robot may not move now.
+        """
+        ...
+
+    def begin(self, judged: Any, feedback: Feedback) -> Pursuit:
+        """Begin with a goal.
+
+        Raises:
+            GoalRefused: what it needs is not free.
+        """
+        ...
+
+    def refused(self, refusal: GoalRefused) -> Any:
+        """Return the result of a goal that is not taken up."""
+        ...
+
+
+def require_armed(gateway: Gateway, code: int, *, disarmed: int | None = None) -> None:
+    """Refuse a goal with a code, or with the one for a robot that is `disarmed`.
+
+    Raises:
+        GoalRefused: the robot may not move now.
+    """
+    status = gateway.control_status()
+    why = refusal_of(status)
+    if why:
+        is_disarmed = status is not None and status["state"] == "disarmed"
+        raise GoalRefused(code if disarmed is None or not is_disarmed else disarmed, why)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -65,15 +111,14 @@ class _Goal:
 class GoalServer:
     """Take the goals of one action; a sound new goal ends the one before it, as usual in ROS."""
 
-    def __init__(self, graph: GraphLink, kind: Any, name: str, judge: Judge) -> None:
-        self._graph = graph
-        self._kind = kind
-        self._judge = judge
+    def __init__(self, gateway: Gateway, name: str, action: ServedAction) -> None:
+        self._graph = gateway.graph
+        self._action = action
         self._goals: list[_Goal] = []
-        graph.act(
+        self._graph.act(
             ActionServer(
-                graph.node,
-                kind,
+                self._graph.node,
+                action.kind,
                 name,
                 execute_callback=self._execute,
                 goal_callback=self._admit,
@@ -94,10 +139,7 @@ class GoalServer:
 
     def stop(self) -> None:
         """End every goal, because the gateway ends."""
-        for goal in list(self._goals):
-            outcome = goal.pursuit.cancel("the gateway was stopped")
-            if outcome is not None:
-                self._end(goal, outcome)
+        self._cancel_all("the gateway was stopped")
 
     def _admit(self, _request: Any) -> GoalResponse:
         full = len(self._goals) >= MOST_AT_A_TIME
@@ -107,7 +149,7 @@ class GoalServer:
         done = self._graph.future()
         if not self._graph.put(lambda: self._start(handle, done)):
             handle.abort()
-            return self._kind.Result()
+            return self._action.kind.Result()
         outcome: GoalOutcome = await done
         state = outcome.ending
         # A goal that ends by itself while its cancelling is asked for may end as it did.
@@ -117,19 +159,21 @@ class GoalServer:
         return outcome.result
 
     def _start(self, handle: ServerGoalHandle, done: Future) -> None:
-        judged = self._judge(handle.request)
-        if isinstance(judged, GoalOutcome):
-            done.set_result(judged)
+        try:
+            judged = self._action.judge(handle.request)
+            self._cancel_all("a newer goal took its place", superseded=True)
+            pursuit = self._action.begin(judged, handle.publish_feedback)
+        except GoalRefused as refusal:
+            result = self._action.refused(refusal)
+            done.set_result(GoalOutcome(ending=GoalEnding.ABORTED, result=result))
             return
-        for before in list(self._goals):
-            outcome = before.pursuit.cancel("a newer goal took its place", superseded=True)
+        self._goals.append(_Goal(handle=handle, done=done, pursuit=pursuit))
+
+    def _cancel_all(self, reason: str, *, superseded: bool = False) -> None:
+        for goal in list(self._goals):
+            outcome = goal.pursuit.cancel(reason, superseded=superseded)
             if outcome is not None:
-                self._end(before, outcome)
-        begun = judged(handle.publish_feedback)
-        if isinstance(begun, GoalOutcome):
-            done.set_result(begun)
-            return
-        self._goals.append(_Goal(handle=handle, done=done, pursuit=begun))
+                self._end(goal, outcome)
 
     def _end(self, goal: _Goal, outcome: GoalOutcome) -> None:
         self._goals.remove(goal)

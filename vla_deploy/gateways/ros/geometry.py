@@ -1,10 +1,11 @@
-"""Turn depth images and scans into points, and points into cells; NumPy alone does it.
+"""Place the body's frames, turn depth images and scans into points, and points into cells.
 
-The optical frame has z forward, x right, y down. Poses are 4 x 4, lengths are metres.
+NumPy alone does it. The optical frame has z forward, x right, y down. Poses are 4 x 4, lengths
+are metres.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -12,6 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.ipc import Sample
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
+from vla_deploy.robots.kinematics.orientation import matrix
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,15 +29,52 @@ _UNDOING: Final = 20
 _COEFFICIENTS: Final = 8
 FREE: Final = 0
 OCCUPIED: Final = 100
+BODY_RADIUS_M: Final = 0.12
+"""How far from the line between two of its frames a link reaches."""
 
 
-def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Floats:
-    """Return the pose of a frame that stands on the floor."""
-    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
-    pose = np.eye(4)
-    pose[:2, :2] = ((cosine, -sine), (sine, cosine))
-    pose[:2, 3] = x_m, y_m
-    return pose
+def pose_of(sample: Sample) -> Pose2D:
+    """Return the pose on the floor that a cell holds."""
+    data = sample.data
+    return Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
+
+
+def standing(pose: Pose2D) -> Floats:
+    """Return the 4 x 4 pose of a frame that stands on the floor."""
+    cosine, sine = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    stands = np.eye(4)
+    stands[:2, :2] = ((cosine, -sine), (sine, cosine))
+    stands[:2, 3] = pose.x_m, pose.y_m
+    return stands
+
+
+class BodyFrames:
+    """Answer for joint values where each frame is in the base frame, as a 4 x 4 pose."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        self._tree = FrameTree.of(robot)
+        self._names = robot.joint_names
+        self._fixed = {one.child: one for one in self._tree.fixed}
+
+    def poses(self, positions: NDArray[np.floating]) -> Mapping[str, Floats]:
+        """Return every frame's pose; `positions` are in the joint order, more do not count."""
+        values = dict(zip(self._names, positions[: len(self._names)].tolist(), strict=True))
+        moving = {one.child: one for one in self._tree.transforms(values)}
+        poses: dict[str, Floats] = {BASE_FRAME: np.eye(4)}
+        for joint in self._tree.joints:  # a parent comes before what hangs on it
+            transform = moving.get(joint.child) or self._fixed[joint.child]
+            poses[joint.child] = poses[joint.parent] @ _placed(transform)
+        return poses
+
+    def segments(self, poses: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+        """Return the lines from each frame to the next, begins and ends n x 3, in the base."""
+        pairs = [
+            (poses[joint.parent][:3, 3], poses[joint.child][:3, 3])
+            for joint in self._tree.moving
+            if joint.parent != BASE_FRAME
+        ]
+        begins, ends = zip(*pairs, strict=True) if pairs else ((), ())
+        return np.array(begins).reshape(-1, 3), np.array(ends).reshape(-1, 3)
 
 
 def moved(points: Floats, pose: Floats) -> Floats:
@@ -126,6 +169,13 @@ def _inside(
     columns, rows = cells.T
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     return rows[inside], columns[inside]
+
+
+def _placed(transform: FrameTransform) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3] = matrix(np.array(transform.quaternion))
+    pose[:3, 3] = transform.xyz
+    return pose
 
 
 @lru_cache(maxsize=4)

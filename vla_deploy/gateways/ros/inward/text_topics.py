@@ -1,4 +1,4 @@
-"""Take commands from topics: words or plans go to the planner as everybody's do.
+"""Take texts from topics: words or plans go to the planner as everybody's do, others to the voice.
 
 Who sends is named in the command's source. What is no command is refused in words on the planners'
 feedback topics, and nothing else happens by it.
@@ -12,11 +12,17 @@ from typing import Any, Final
 
 from std_msgs.msg import String
 
-from vla_deploy.gateways.ros.graph import NODE_NAME, RELIABLE
-from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, OrderInvalid
-from vla_deploy.gateways.ros.inward.words import is_stop_word, read_message, shown
-from vla_deploy.gateways.ros.json_topic import PUBLISHED_BY
-from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.gateways.ros.graph import NODE_NAME, PUBLISHED_BY
+from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders
+from vla_deploy.gateways.ros.inward.words import (
+    OrderInvalid,
+    checked_text,
+    is_stop_word,
+    read_message,
+    shown,
+)
+from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.ipc.announcer import Announcer
 
 COMMAND_TOPICS: Final[Mapping[str, str]] = {
     "/natural_language/command": "a command in words",
@@ -27,6 +33,7 @@ COMMAND_TOPICS: Final[Mapping[str, str]] = {
 """Every topic that takes commands, and what it is for; each takes words and JSON alike."""
 MOST_OPEN: Final = 16
 """Of commands from topics at a time; a stop is taken beyond that."""
+SAY: Final = "/vla_deploy/say"
 _OURS: Final = f"/{NODE_NAME}"
 _log = logging.getLogger(__name__)
 
@@ -38,7 +45,7 @@ class _Open:
     has_asked: bool = False
 
 
-class CommandTopics:
+class CommandTopics(GatewayPart):
     """Give what comes to the planner, and answers to what the robot has asked on that topic."""
 
     def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
@@ -46,19 +53,15 @@ class CommandTopics:
         self._orders = orders
         self._open: list[_Open] = []
         for topic in COMMAND_TOPICS:
-            gateway.graph.hear(String, topic, partial(self._take, topic), RELIABLE)
+            gateway.graph.hear(String, topic, partial(self._take, topic))
 
     def step(self, now_ns: int) -> None:
         """Follow the commands that are under way, to know which of them wait for an answer."""
         for one in list(self._open):
             while one.order.news:
                 one.has_asked = one.order.news.popleft()["event"] == "asked"
-            if one.order.has_ended:
+            if one.order.last is not None:
                 self._open.remove(one)
-
-    def stop(self) -> None:
-        """Leave what is under way to the orders' end."""
-        self._open.clear()
 
     def _take(self, topic: str, message: Any, sender: str) -> None:
         try:
@@ -73,10 +76,48 @@ class CommandTopics:
             )
         except OrderInvalid as error:
             _log.warning("%s from %s refused: %s", topic, sender, error)
-            self._gateway.feedback.refuse(shown(message.data), sender, topic, str(error))
+            self._refuse(shown(message.data), sender, topic, str(error))
             return
         _log.info("%s from %s: %s", topic, sender, shown(message.data))
         self._open.append(_Open(topic=topic, order=order))
 
+    def _refuse(self, command: str, source: str, topic: str, why: str) -> None:
+        """Publish why something is no command; nothing was done by it."""
+        self._gateway.feedback.publish(
+            {
+                "status": "error",
+                "stage": "planning",
+                "command": command,
+                "command_id": "",
+                "source": source,
+                "topic": topic,
+                "error": why,
+            }
+        )
+
     def _is_asked(self, topic: str) -> bool:
         return any(one.topic == topic and one.has_asked for one in self._open)
+
+
+class SayTopic(GatewayPart):
+    """Pass to the robot's voice what comes on the topic."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        link = gateway.link
+        self._voice = Announcer(link.space, link.source, link.clock)
+        gateway.graph.hear(String, SAY, self._take)
+
+    def stop(self) -> None:
+        """Close the topics."""
+        self._voice.close()
+
+    def _take(self, message: Any, sender: str) -> None:
+        try:
+            text = checked_text(message.data)
+        except OrderInvalid as error:
+            _log.warning("%s from %s refused: %s", SAY, sender, error)
+            return
+        why = self._voice.why_silent()
+        if why:
+            _log.warning("%s from %s will not be heard: %s", SAY, sender, why)
+        self._voice.say(text)
