@@ -9,10 +9,9 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.navigation.maps.distance_field import DistanceField
 from vla_deploy.navigation.maps.grid_map import GridMap
-from vla_deploy.navigation.pose import Points, Pose2D
+from vla_deploy.robots.floor_pose import Points, Pose2D, wrap_angle
 
 HISTORY_NS = 2_000_000_000
 ODOMETRY_JUMP_M = 0.3

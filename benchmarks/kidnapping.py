@@ -11,7 +11,7 @@ from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.navigation.maps.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 CLEARANCE_M: Final = 0.27
 WRONG_M: Final = 0.3

@@ -26,8 +26,8 @@ from vla_deploy.navigation.localising.scan_match import INLIER_M, ScanPoints, fi
 from vla_deploy.navigation.maps.distance_field import DistanceField
 from vla_deploy.navigation.maps.grid_map import GridMap, load_map
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 Points = NDArray[np.float64]
 Matcher = Callable[[ScanPoints, Pose2D], Pose2D]

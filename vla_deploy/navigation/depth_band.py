@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.floor_pose import Points
 
 STRIDE_PX: Final = 3
 NEAR_M, FAR_M = 0.25, 2.5

@@ -7,10 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-
-def wrap_angle(angle_rad: float) -> float:
-    """Return the same angle within (-pi, pi]."""
-    return math.pi - (math.pi - angle_rad) % (2 * math.pi)
+from vla_deploy.robots.floor_pose import wrap_angle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,11 +11,11 @@ from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.navigation.maps.mapping import Mapper
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
 from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 FRESH_YAW_NS: Final = NS_PER_S // 10
@@ -60,9 +60,8 @@ class MapRecorder:
         moved = self._base_state.latest()
         if moved is None or not self._is_new("base_state", moved.stamp_ns):
             return
-        x_m, y_m, yaw_rad = (float(moved.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
-        yaw = self._imu_yaw_rad(moved.stamp_ns)
-        self.mapper.predict(moved.stamp_ns, Pose2D(x_m, y_m, yaw_rad), yaw)
+        yaw_rad = self._imu_yaw_rad(moved.stamp_ns)
+        self.mapper.predict(moved.stamp_ns, Pose2D.of(moved.data), yaw_rad)
         scan = self._scan.latest()
         if scan is not None and self._is_new("scan", scan.stamp_ns):
             ages_ns = np.rint(scan.data["beam_age_s"] * NS_PER_S).astype(np.int64)
@@ -116,4 +115,4 @@ def _tracked_pose(sample: Sample | None) -> Pose2D | None:
     """Return the robot's pose on its present map, None where it is not tracked."""
     if sample is None or int(sample.data["state"]) != PlaceState.TRACKING:
         return None
-    return Pose2D(*(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+    return Pose2D.of(sample.data)

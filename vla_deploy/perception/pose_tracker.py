@@ -6,8 +6,8 @@ from drivers.lidar.base import Scan
 from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.maps.grid_map import load_map
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 # Without a new yaw for this long, the wheels give the turn.
@@ -45,9 +45,8 @@ class PoseTracker:
         sample = self._base_state.latest()
         if sample is not None and sample.stamp_ns != self._base_stamp_ns:
             self._base_stamp_ns = sample.stamp_ns
-            data = sample.data
-            odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
-            self.localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
+            odometry, yaw_rad = Pose2D.of(sample.data), self._fresh_yaw_rad(now_ns)
+            self.localiser.predict(sample.stamp_ns, odometry, yaw_rad)
         pose = self.localiser.pose
         self._writer.put(
             x_m=pose.x_m,
@@ -70,7 +69,4 @@ class PoseTracker:
 
 def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
     last = space.cell_reader("pose").latest()
-    if last is not None:
-        return Pose2D(*(float(last.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
-    start = robot.start_pose
-    return Pose2D(start.x_m, start.y_m, start.yaw_rad)
+    return robot.start_pose if last is None else Pose2D.of(last.data)

@@ -148,18 +148,12 @@ def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
 
 
 def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> GraspStand:
-    if robot is not None and is_in_reach(_from(robot, thing)):
+    if robot is not None and is_in_reach(robot.local(thing.position_m)):
         return GraspStand.HERE
     if body.is_free is None:
         return GraspStand.AFTER_DRIVING
     has_stand = next(stands_around(thing.position_m, body.is_free), None) is not None
     return GraspStand.AFTER_DRIVING if has_stand else GraspStand.NONE
-
-
-def _from(robot: Viewpoint, thing: Thing) -> tuple[float, float]:
-    dx, dy = thing.position_m[0] - robot.x_m, thing.position_m[1] - robot.y_m
-    c, s = math.cos(robot.yaw_rad), math.sin(robot.yaw_rad)
-    return c * dx + s * dy, c * dy - s * dx
 
 
 def _in_corridor(thing: Thing, grasps: list[Grasp], snapshot: Snapshot) -> list[Obstacle]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.maps.grid_map import GridMap
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 RESOLUTION_M: Final = 0.05
 ORIGIN_M: Final = (-0.25, -0.25)

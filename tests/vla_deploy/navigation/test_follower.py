@@ -6,13 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vla_deploy.navigation.follower import (
-    DriveLimits,
-    FollowerPhase,
-    PathFollower,
-    Twist,
-    wrap_angle,
-)
+from vla_deploy.navigation.follower import DriveLimits, FollowerPhase, PathFollower, Twist
+from vla_deploy.robots.floor_pose import wrap_angle
 
 LIMITS = DriveLimits(
     speed_m_s=0.5, turn_rate_rad_s=1.0, acceleration_m_s2=0.5, turn_acceleration_rad_s2=2.0

@@ -17,7 +17,7 @@ from vla_deploy.navigation.maps.map_file import (
 )
 from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.navigation.maps.occupancy import OccupancyGrid
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 if TYPE_CHECKING:
     from conftest import TracedFlat

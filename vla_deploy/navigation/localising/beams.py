@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.scan_match import ScanPoints
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 MAX_BEAM_M: Final = 8.0
 MIN_BEAM_M: Final = 0.25

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.localising.scan_match import Match, ScanPoints, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import ORIGIN, Points, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
 
 Floats = NDArray[np.float32]
 

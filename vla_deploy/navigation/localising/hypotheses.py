@@ -10,7 +10,7 @@ from typing import Final
 from vla_deploy.navigation.localising.global_search import GlobalSearch, WallImage, local_points
 from vla_deploy.navigation.localising.scan_match import Match, ScanPoints, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 HEADINGS_PER_STEP: Final = 4
 # A place is believed only where the scan fits as well as this, and clearly better than elsewhere.

@@ -25,7 +25,7 @@ from vla_deploy.navigation.localising.pose_filter import GATE, PoseFilter
 from vla_deploy.navigation.localising.scan_match import MIN_POINTS, Match, ScanPoints, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
 from vla_deploy.navigation.maps.grid_map import GridMap
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 # However often it is measured, no pose is better known than the map is drawn.
 MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))

@@ -9,9 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.navigation.localising.dead_reckoning import OdometryStep
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import Points, Pose2D
+from vla_deploy.robots.floor_pose import Points, Pose2D, wrap_angle
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.maps.grid_map import GridMap
-from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.floor_pose import Points
 
 Floats = NDArray[np.float64]
 

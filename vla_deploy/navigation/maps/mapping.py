@@ -15,7 +15,7 @@ from vla_deploy.navigation.localising.pose_filter import GATE, PoseFilter
 from vla_deploy.navigation.localising.scan_match import MIN_POINTS, ScanPoints, fit
 from vla_deploy.navigation.maps.occupancy import OccupancyGrid
 from vla_deploy.navigation.maps.surface_field import SurfaceField
-from vla_deploy.navigation.pose import ORIGIN, Points, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
 
 # A scan is added when the robot has moved so far since the last one.
 KEY_WAY_M: Final = 0.4

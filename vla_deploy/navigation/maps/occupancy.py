@@ -18,7 +18,7 @@ from vla_deploy.navigation.maps.map_file import (
     UNKNOWN_SHADE,
     MapFile,
 )
-from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.floor_pose import Points
 
 Floats = NDArray[np.float64]
 

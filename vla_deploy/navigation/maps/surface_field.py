@@ -12,7 +12,7 @@ from vla_deploy.navigation.localising.scan_match import ScanPoints
 from vla_deploy.navigation.maps.cell_window import CellWindow
 from vla_deploy.navigation.maps.distance_field import DistanceField
 from vla_deploy.navigation.maps.occupancy import surface_normals
-from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.floor_pose import Points
 
 # Known before the surface and, less far, behind it: walls are thin, and seen from both sides.
 BEFORE_M: Final = 0.25

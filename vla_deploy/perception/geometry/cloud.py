@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.lens import ray_table
+from vla_deploy.robots.floor_pose import Pose2D
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]

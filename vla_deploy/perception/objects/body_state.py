@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellReader, SharedSpace
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.geometry.rotation import yaw_rotation
 from vla_deploy.perception.objects.hands import Hands, Hold
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import PosedImage
 from vla_deploy.perception.geometry.lens import project, ray_table
 from vla_deploy.perception.geometry.rotation import yaw_rotation
+from vla_deploy.robots.floor_pose import Pose2D
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]

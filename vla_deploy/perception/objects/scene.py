@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import PosedImage, make_cloud
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.geometry.supports import (
@@ -27,6 +26,7 @@ from vla_deploy.perception.objects.hands import Hold
 from vla_deploy.perception.objects.in_view import is_in_clear_view
 from vla_deploy.perception.objects.track import Sighting, Track
 from vla_deploy.perception.objects.tracker import Tracker
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.world.document import read_snapshot
 from vla_deploy.world.resting import BEGIN, LET_GO, RelationBounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
@@ -76,7 +76,9 @@ class Scene:
         in_view = [
             track
             for track in self._tracker.tracks
-            if is_in_clear_view(_local(track, base), track.size_m, cloud, found)
+            if is_in_clear_view(
+                (*base.local(track.position_m), track.position_m[2]), track.size_m, cloud, found
+            )
         ]
         self._tracker.update(sightings, in_view, stamp_ns)
         self.stamp_ns = stamp_ns
@@ -89,10 +91,9 @@ class Scene:
 
         What it has put down rests below it; what it has lost may be anywhere near.
         """
-        placed = base.compose(Pose2D(grip[0], grip[1], 0.0))
         before = held = self._tracker.held_by(hand)
         if hold.kind:
-            grip_m = (placed.x_m, placed.y_m, grip[2])
+            grip_m = (*base.outward(grip[0], grip[1]), grip[2])
             held = self._tracker.carry(hand, hold.kind, grip_m, stamp_ns)
         elif before is not None and hold.is_lost:
             self._tracker.lose(hand, f"the {hand} hand lost it: {hold.cause}")
@@ -122,8 +123,7 @@ class Scene:
     def _surface(self, support: Support, base: Pose2D) -> dict[str, Any]:
         """Return a surface for the scene topic: the part in view, in the map frame."""
         x, y = (float(v) for v in support.outline.mean(axis=0))
-        corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
-        polygon_m = [(corner.x_m, corner.y_m) for corner in corners]
+        polygon_m = [base.outward(float(u), float(v)) for u, v in support.outline]
         height_m = support.height_m(x, y)
         return {
             "name": self._book.look(height_m, polygon_m),
@@ -145,10 +145,9 @@ def _size(documents: list[dict[str, Any]]) -> int:
 def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
     """Return a detection of the base frame as an observation in the map."""
     x, y, z = detection.position_m
-    placed = base.compose(Pose2D(x, y, 0.0))
     on_map = replace(
         detection,
-        position_m=(placed.x_m, placed.y_m, z),
+        position_m=(*base.outward(x, y), z),
         yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
         covariance_m2=turned(detection.covariance_m2, base.yaw_rad),
     )
@@ -159,14 +158,6 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
     return Sighting(on_map, seen)
 
 
-def _local(track: Track, base: Pose2D) -> Vector:
-    """Return a track's place in the base frame."""
-    x_m, y_m, z_m = track.position_m
-    local = Pose2D(x_m, y_m, 0.0).relative_to(base)
-    return local.x_m, local.y_m, z_m
-
-
 def _known(surface: Surface, base: Pose2D) -> KnownSurface:
-    corners = [Pose2D(x_m, y_m, 0.0).relative_to(base) for x_m, y_m in surface.polygon_m]
-    outline = np.array([(corner.x_m, corner.y_m) for corner in corners], dtype=np.float32)
+    outline = np.array([base.local(corner) for corner in surface.polygon_m], dtype=np.float32)
     return KnownSurface(height_m=surface.height_m, outline=counter_clockwise(outline))
