@@ -32,10 +32,9 @@ from vla_deploy.navigation.follower import DriveLimits
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.localising.place_judge import PlaceState
-from vla_deploy.navigation.maps.grid_map import GridMap, load_map
+from vla_deploy.navigation.maps.grid_map import GridMap, load_map, with_zones
 from vla_deploy.navigation.maps.map_file import read_map_file
 from vla_deploy.navigation.maps.mapping import Mapper
-from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.floor_pose import Pose2D

@@ -9,8 +9,7 @@ from typing import Final
 from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.navigation.path_planning import PathPlanner, base_planner
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Place

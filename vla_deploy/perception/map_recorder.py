@@ -8,17 +8,22 @@ from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import depths_m
-from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.localising.place_judge import PlaceState
 from vla_deploy.navigation.maps.mapping import Mapper
+from vla_deploy.perception.geometry.cloud import sparse_points
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
-from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 
 FRESH_YAW_NS: Final = NS_PER_S // 10
+DEPTH_M: Final = (0.25, 2.5)
+# Lower is floor, higher passes over the robot's head; what lies between floor and band is neither.
+FLOOR_M: Final = 0.02
+LOWEST_M, HIGHEST_M = 0.06, 1.25
+CELL_M: Final = 0.05
+MIN_PIXELS: Final = 3
 
 
 class MapRecorder:
@@ -77,13 +82,17 @@ class MapRecorder:
         if positions is None:
             return
         grid = geometry_grid(self._intrinsics(frame.width, frame.height))
-        standing, floor = depth_band(
+        points = sparse_points(
             grid.depth(depths_m(frame)),
-            ray_table(grid.camera),
+            grid.camera,
             self._body.camera_pose(positions),
             self._body.mask(positions, grid.camera),
+            within_m=DEPTH_M,
         )
-        self.mapper.add_depth(standing, floor, frame.stamp_ns)
+        height_m = points[:, 2]
+        standing = points[(height_m > LOWEST_M) & (height_m < HIGHEST_M), :2]
+        floor = points[np.abs(height_m) < FLOOR_M, :2]
+        self.mapper.add_depth(_without_noise(standing), _without_noise(floor), frame.stamp_ns)
 
     def _imu_yaw_rad(self, now_ns: int) -> float | None:
         sample = self._imu.latest()
@@ -116,3 +125,13 @@ def _tracked_pose(sample: Sample | None) -> Pose2D | None:
     if sample is None or int(sample.data["state"]) != PlaceState.TRACKING:
         return None
     return Pose2D.of(sample.data)
+
+
+def _without_noise(points: Points) -> Points:
+    """Return the points in whose cell several lie."""
+    if not len(points):
+        return points
+    cells = np.floor(points / CELL_M).astype(np.int64)
+    _, at, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    kept: Points = points[counts[at.ravel()] >= MIN_PIXELS]
+    return kept

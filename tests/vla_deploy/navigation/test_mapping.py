@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.localising.scan_match import ScanPoints
+from vla_deploy.navigation.localising.scan import ScanPoints
 from vla_deploy.navigation.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,

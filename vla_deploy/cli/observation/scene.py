@@ -7,7 +7,7 @@ from typing import Any
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import RobotSession, attach
-from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.knowledge import match_place, spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot

@@ -5,9 +5,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vla_deploy.navigation.maps.grid_map import grid_of
+from vla_deploy.navigation.maps.grid_map import grid_of, with_zones
 from vla_deploy.navigation.maps.map_file import UNKNOWN_SHADE, MapFile
-from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import clearance_of
 from vla_deploy.robots import RobotDescription
 

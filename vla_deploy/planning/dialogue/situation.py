@@ -13,7 +13,7 @@ from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.calls.picture import Image
-from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest

@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.navigation.errors import NavigationError
-from vla_deploy.navigation.follower import AT_REST, DriveLimits, FollowerPhase, PathFollower, Twist
+from vla_deploy.navigation.follower import (
+    AT_REST,
+    DriveLimits,
+    FollowerPhase,
+    PathFollower,
+    Twist,
+    is_blocked,
+    scan_points,
+)
 from vla_deploy.navigation.localising.place_judge import MATCH_RATIO, PlaceState
-from vla_deploy.navigation.obstacles import is_blocked, scan_points
 from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.actions.beyond import navigation_request, pursue, server_drives
 from vla_deploy.skills.context import Skill, SkillContext
