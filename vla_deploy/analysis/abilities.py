@@ -14,7 +14,7 @@ from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Place
 from vla_deploy.world import Body
-from vla_deploy.world.reach import REACH_M
+from vla_deploy.world.access import REACH_M
 
 # A thing is taken before the shoulder of the hand that takes it.
 SIDE_M: Final = 0.12

@@ -1,7 +1,10 @@
-"""Tell whether a thing can be taken, from where, and what is in the way, each with its reason."""
+"""Judge whether a thing can be taken, from where, and what is in the way, each with its reason.
+
+The arms reach what is straight ahead of the base, at a distance that suits.
+"""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Self
@@ -10,9 +13,16 @@ from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world.footprint import depth_inside_m
-from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, is_in_reach, stands_around
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.thing import Snapshot, Thing, Viewpoint
+
+# Distance from the base's centre to the thing: best first, all within the arms' reach.
+REACH_M: Final = (0.42, 0.46, 0.50, 0.54)
+DIRECTIONS: Final = 36
+LEAST_AHEAD_M: Final = 0.3
+MOST_ASIDE_M: Final = 0.2
+# Heights at which a hand that points down gets a grip, at some of these distances.
+GRIP_HEIGHTS_M: Final = (0.25, 0.85)
 
 # What of a hand goes down beside a thing: two fingers from below the grip, the palm from above it.
 FINGER_RADIUS_M: Final = 0.018
@@ -21,6 +31,8 @@ PALM_RADIUS_M: Final = 0.045
 PALM_ABOVE_GRIP_M: Final = 0.07
 WALL_M: Final = 0.008
 UNSURE_M: Final = 0.06
+
+IsFree = Callable[[float, float], bool]
 
 
 class GraspStand(StrEnum):
@@ -44,6 +56,35 @@ class Bar(StrEnum):
     NO_STAND = "no stand"
     UNSURE = "place unsure"
     HANDS_FULL = "hands full"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stand:
+    """Place the base's centre on the floor at a distance from a thing, facing along a bearing."""
+
+    x_m: float
+    y_m: float
+    bearing_rad: float
+    reach_m: float
+    step: int
+
+
+def is_in_reach(point_m: Sequence[float]) -> bool:
+    """Return whether the arms reach a point of the base frame from where the base stands."""
+    x_m, y_m = point_m[0], point_m[1]
+    return math.hypot(x_m, y_m) <= REACH_M[-1] and abs(y_m) <= MOST_ASIDE_M and x_m > LEAST_AHEAD_M
+
+
+def stands_around(position_m: Sequence[float], is_free: IsFree) -> Iterator[Stand]:
+    """Yield for each direction the free stand from which a point of the map is best reached."""
+    for step in range(DIRECTIONS):
+        bearing_rad = 2.0 * math.pi * step / DIRECTIONS
+        for reach_m in REACH_M:
+            x_m = position_m[0] - reach_m * math.cos(bearing_rad)
+            y_m = position_m[1] - reach_m * math.sin(bearing_rad)
+            if is_free(x_m, y_m):
+                yield Stand(x_m=x_m, y_m=y_m, bearing_rad=bearing_rad, reach_m=reach_m, step=step)
+                break
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,12 +248,3 @@ def _carries(thing: Thing, other: Thing) -> bool:
 
 def _bar(bar: Bar, by: str, why: str) -> Obstacle:
     return Obstacle(bar=bar, by=by, why=why)
-
-
-def bodies_of(openings_m: Mapping[str, float], is_free: IsFree | None = None) -> Body:
-    """Return the body with these hands; `openings_m` is how wide each opens."""
-    return Body(
-        opening_max_m=max(openings_m.values(), default=0.0),
-        hands=tuple(openings_m),
-        is_free=is_free,
-    )

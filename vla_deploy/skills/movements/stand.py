@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.movements.frames import to_base
-from vla_deploy.world.reach import REACH_M, Stand, is_in_reach, stands_around
+from vla_deploy.world.access import REACH_M, Stand, is_in_reach, stands_around
 
 # The object goes before one shoulder rather than between them.
 SIDE_M = 0.12
