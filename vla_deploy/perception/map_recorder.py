@@ -13,9 +13,10 @@ from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.perception.geometry.cloud import sparse_points
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
 from vla_deploy.perception.objects.body_state import BodyState
+from vla_deploy.perception.pose_tracker import lidar_place
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
-from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+from vla_deploy.robots.kinematics.model import RobotModel
 
 FRESH_YAW_NS: Final = NS_PER_S // 10
 DEPTH_M: Final = (0.25, 2.5)
@@ -42,7 +43,6 @@ class MapRecorder:
             RobotFileError: the MJCF does not fit the robot file.
         """
         model = RobotModel(robot)
-        site = model.site_pose(robot.lidar.site, full_positions(robot))
         self._scan, self._imu = space.cell_reader("scan"), space.cell_reader("imu")
         self._base_state = space.cell_reader("base_state")
         self._images = space.frame_reader("rgbd")
@@ -51,8 +51,7 @@ class MapRecorder:
         self._camera = robot.camera
         start = _tracked_pose(space.cell_reader("pose").latest())
         self.on_old_frame = start is not None
-        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
-        self.mapper = Mapper(start or ORIGIN, lidar, resolution_m)
+        self.mapper = Mapper(start or ORIGIN, lidar_place(robot, model), resolution_m)
         self._last = {"base_state": -1, "scan": -1, "rgbd": -1}
 
     def step(self) -> None:

@@ -23,9 +23,7 @@ class PoseTracker:
         Raises:
             MapInvalid: the robot file's map cannot be used.
         """
-        # The driver has turned the beams: they count from the robot's front.
-        site = model.site_pose(robot.lidar.site, full_positions(robot))
-        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
+        lidar = lidar_place(robot, model)
         self.localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
@@ -65,6 +63,15 @@ class PoseTracker:
     def _fresh_yaw_rad(self, now_ns: int) -> float | None:
         """Return the IMU's yaw unless it is out of date: a frozen one would hide all turns."""
         return self._imu_yaw_rad if now_ns - self._imu_ns <= FRESH_YAW_NS else None
+
+
+def lidar_place(robot: RobotDescription, model: RobotModel) -> Pose2D:
+    """Return where the lidar is on the base.
+
+    The driver has turned the beams: they count from the robot's front.
+    """
+    x_m, y_m, _ = model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
+    return Pose2D(float(x_m), float(y_m), 0.0)
 
 
 def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:

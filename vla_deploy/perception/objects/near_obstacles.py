@@ -13,8 +13,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.perception.geometry.cloud import PosedImage, sparse_points
 from vla_deploy.perception.geometry.lens import project
-from vla_deploy.perception.geometry.rotation import yaw_rotation
 from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.kinematics.orientation import yaw_rotation
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]

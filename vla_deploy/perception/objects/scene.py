@@ -3,13 +3,15 @@
 import itertools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from vla_deploy.perception.geometry.cloud import PosedImage, make_cloud
+from vla_deploy.perception.geometry.cloud import Cloud, PosedImage, make_cloud
+from vla_deploy.perception.geometry.lens import project
+from vla_deploy.perception.geometry.placement import turned
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.geometry.supports import (
     KnownSurface,
@@ -17,13 +19,11 @@ from vla_deploy.perception.geometry.supports import (
     counter_clockwise,
     find_supports,
 )
-from vla_deploy.perception.geometry.uncertainty import turned
 from vla_deploy.perception.images.detection import Detection, Vector, detect
 from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.objects.body_state import Hold
 from vla_deploy.perception.objects.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.objects.filtering import Estimate, covariance_of
-from vla_deploy.perception.objects.hands import Hold
-from vla_deploy.perception.objects.in_view import is_in_clear_view
 from vla_deploy.perception.objects.track import Sighting, Track
 from vla_deploy.perception.objects.tracker import Tracker
 from vla_deploy.robots.floor_pose import Pose2D
@@ -31,10 +31,20 @@ from vla_deploy.world.document import read_snapshot
 from vla_deploy.world.resting import BEGIN, LET_GO, RelationBounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
 from vla_deploy.world.thing import Rest, Surface
+from vla_deploy.world.vocabulary import CONTAINERS
 
 # The share of the scene's cell that is for things, the most recently seen first.
 THINGS_BYTES = 25_000
 MAX_LOST = 12
+# Further away a thing may be overlooked.
+CLEAR_RANGE_M = 1.6
+BORDER_PX = 12
+PATCH_PX = 2
+IN_FRONT_M = 0.05
+# What is lower than this shows no nearer than what it lies on.
+FLAT_M = 0.04
+# Over an empty place the camera sees this share of the thing's height further.
+THROUGH_RATIO = 0.25
 
 
 class Scene:
@@ -161,3 +171,46 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
 def _known(surface: Surface, base: Pose2D) -> KnownSurface:
     outline = np.array([base.local(corner) for corner in surface.polygon_m], dtype=np.float32)
     return KnownSurface(height_m=surface.height_m, outline=counter_clockwise(outline))
+
+
+def is_in_clear_view(
+    place: Vector, size_m: Vector, cloud: Cloud, found: Sequence[Detection]
+) -> bool:
+    """Return whether an image shows a thing's place (base frame) with nothing in front of it.
+
+    Where something stands that no detection explains, it may well be the thing: its place is not in
+    clear view then. Neither is one out of the image or too far away.
+    """
+    camera = cloud.camera
+    x, y, z = cloud.base_from_camera[:3, :3].T @ (np.array(place) - cloud.camera_position)
+    if not 0.2 < z < CLEAR_RANGE_M:
+        return False
+    half = math.ceil(0.5 * camera.fx * max(size_m) / z)
+    border = BORDER_PX + half
+    u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
+    if not (border <= u < camera.width - border and border <= v < camera.height - border):
+        return False
+    around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
+    patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
+    if cloud.own_body[around].any() or not cloud.valid[patch].all():
+        return False
+    depth_m = float(np.median(cloud.depth_m[patch]))
+    is_hidden = depth_m < z - 0.5 * max(size_m) - IN_FRONT_M
+    return not (is_hidden or _is_unexplained(depth_m - z, place, size_m, found))
+
+
+def _is_unexplained(
+    beyond_m: float, place: Vector, size_m: Vector, found: Sequence[Detection]
+) -> bool:
+    """Return whether something is where a thing was that no detection explains.
+
+    A box around the place explains nothing: the thing may stand in it.
+    """
+    height_m = size_m[2]
+    if height_m < FLAT_M or beyond_m > THROUGH_RATIO * height_m:
+        return False
+    return not any(
+        math.dist(one.position_m[:2], place[:2]) < 0.5 * (max(one.size_m[:2]) + min(size_m[:2]))
+        for one in found
+        if one.class_name not in CONTAINERS or max(one.size_m[:2]) < 2.0 * max(size_m[:2])
+    )
