@@ -9,9 +9,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import Points, Pose2D
+from vla_deploy.robots.floor_pose import Points, Pose2D, wrap_angle
 from vla_deploy.robots.maps.grid_map import GridMap
 
 HISTORY_NS = 2_000_000_000

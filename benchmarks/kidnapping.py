@@ -10,7 +10,7 @@ from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap
 
 CLEARANCE_M: Final = 0.27

@@ -33,11 +33,10 @@ from vla_deploy.navigation.follower import DriveLimits
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.maps.mapping import Mapper
-from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.maps.grid_map import GridMap, load_map
+from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.maps.grid_map import GridMap, load_map, with_zones
 from vla_deploy.robots.maps.map_file import read_map_file
 
 SLIP_RATIO: Final = 0.02
@@ -148,10 +147,7 @@ def _toured(moved: PushedRobot, robot: RobotDescription, grid: GridMap, length_m
         turn_acceleration_rad_s2=0.6 * base.max_turn_acceleration_rad_s2,
     )
     planner = PathPlanner(with_zones(grid, robot.home.zones), CLEARANCE_M)
-    stops = [
-        Pose2D(place.pose.x_m, place.pose.y_m, place.pose.yaw_rad)
-        for place in robot.places.values()
-    ]
+    stops = [place.pose for place in robot.places.values()]
     return tour(moved, planner, limits, stops, length_m)
 
 

@@ -26,8 +26,8 @@ from sim_twin.worlds.placement import draw_poses
 from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
 from vla_deploy.navigation.follower import AT_REST, DriveLimits, FollowerPhase, PathFollower, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 
 STEP_NS: Final = 10_000_000
 STEPS_PER_READING: Final = 2
@@ -59,7 +59,7 @@ class PushedRobot:
         lidar_sigma_m: float = 0.005,
     ) -> None:
         self.now = 1_000_000_000
-        self.pose = Pose2D(robot.start_pose.x_m, robot.start_pose.y_m, robot.start_pose.yaw_rad)
+        self.pose = robot.start_pose
         self._model = load_model(robot, world)
         self._data = mujoco.MjData(self._model)
         for name, placed in draw_poses(world, seed).items():

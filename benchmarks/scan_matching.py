@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from benchmarks.command import parser, show
 from benchmarks.kidnapping import CLEARANCE_M, somewhere
 from benchmarks.pushed_robot import PushedRobot
-from vla_deploy.navigation.localising.beams import placed_beams
 from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
-from vla_deploy.navigation.localising.scan_match import INLIER_M, ScanPoints, fit
+from vla_deploy.navigation.localising.scan import ScanPoints, placed_beams
+from vla_deploy.navigation.localising.scan_match import INLIER_M, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap, load_map
 
 Points = NDArray[np.float64]

@@ -15,7 +15,7 @@ from vla_deploy.analysis.document import (
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Body, Snapshot, Thing, Viewpoint, access_to, relations_of
 from vla_deploy.world.memory import still_there
-from vla_deploy.world.words import distance_word, size_word
+from vla_deploy.world.vocabulary import distance_word, size_word
 
 # Within this of straight ahead a thing is in the centre: a third of the camera's view.
 CENTRE_RAD: Final = math.radians(12.0)

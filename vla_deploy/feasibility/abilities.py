@@ -9,13 +9,12 @@ from typing import Final
 from vla_deploy.manipulation.errors import PostureUnreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.navigation.path_planning import PathPlanner, base_planner
 from vla_deploy.plans.knowledge import spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Place
 from vla_deploy.world import Body
-from vla_deploy.world.reach import REACH_M
+from vla_deploy.world.access import REACH_M
 
 # A thing is taken before the shoulder of the hand that takes it.
 SIDE_M: Final = 0.12

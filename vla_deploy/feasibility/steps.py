@@ -12,9 +12,8 @@ from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.plans.knowledge import match_place
 from vla_deploy.world import Query, Thing, UnknownWord, access_to, parse_query
-from vla_deploy.world.access import Bar, GraspAccess, Obstacle
+from vla_deploy.world.access import Bar, GraspAccess, Obstacle, stands_around
 from vla_deploy.world.memory import still_there
-from vla_deploy.world.reach import stands_around
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.vocabulary import CONTAINERS

@@ -1,8 +1,8 @@
 """Group manipulation errors by what the caller can do.
 
 ManipulationError
-├── Unreachable   stand elsewhere, or use the other hand
-└── TooWide       no grasp fits: choose another object
+├── PostureUnreachable   stand elsewhere, or use the other hand
+└── TooWide              no grasp fits: choose another object
 """
 
 
@@ -17,8 +17,6 @@ class TooWide(ManipulationError):
 class PostureUnreachable(ManipulationError):
     """Say that no posture within the limits brings the hand there."""
 
-    def __init__(self, reason: str, *, position_error_m: float, rotation_error_rad: float) -> None:
-        self.reason = reason
+    def __init__(self, reason: str, position_error_m: float = 0.0) -> None:
         self.position_error_m = position_error_m
-        self.rotation_error_rad = rotation_error_rad
         super().__init__(reason)

@@ -37,7 +37,6 @@ class IkSolution:
     positions: Array
     position_error_m: float
     rotation_error_rad: float
-    iterations: int
 
     @property
     def is_exact(self) -> bool:
@@ -82,7 +81,7 @@ class ArmKinematics:
         """Return a posture that brings the grip frame to `target`, near `seed` if there is one.
 
         Raises:
-            Unreachable: every start ended outside the tolerances; the message tells by how much.
+            PostureUnreachable: every start ended outside the tolerances; the message says how far.
         """
         nearest: IkSolution | None = None
         for start in self._starts(seed, restarts):
@@ -98,7 +97,7 @@ class ArmKinematics:
         """Return postures, `start` first, that lead the grip frame straight to `target`.
 
         Raises:
-            Unreachable: a point of the line is out of reach, or needs another posture.
+            PostureUnreachable: a point of the line is out of reach, or needs another posture.
         """
         origin = self.forward(start)
         length_m = float(np.linalg.norm(target[:3, 3] - origin[:3, 3]))
@@ -122,13 +121,12 @@ class ArmKinematics:
 
     def _descend(self, target: Array, positions: Array) -> IkSolution:
         errors: list[float] = []
-        for iteration in range(MAX_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             error = _twist(self.forward(positions), target)
             found = IkSolution(
                 positions=positions,
                 position_error_m=float(np.linalg.norm(error[:3])),
                 rotation_error_rad=float(np.linalg.norm(error[3:])),
-                iterations=iteration,
             )
             errors.append(float(np.linalg.norm(error)))
             if found.is_exact or _has_stalled(errors):
@@ -157,11 +155,10 @@ class ArmKinematics:
     def _refuse_jump(self, before: Array, after: Array, ratio: float) -> None:
         jump = float(np.abs(after - before).max())
         if jump > MAX_WAYPOINT_JUMP_RAD:
-            reason = (
+            raise PostureUnreachable(
                 f"{self.side} hand: the straight line needs a jump of {jump:.2f} rad at "
                 f"{ratio:.0%} of its length; start from another posture"
             )
-            raise PostureUnreachable(reason, position_error_m=0.0, rotation_error_rad=0.0)
 
     def _unreachable(self, target: Array, nearest: IkSolution, starts: int) -> PostureUnreachable:
         arm = nearest.positions[self._columns]
@@ -174,11 +171,7 @@ class ArmKinematics:
             f"{nearest.position_error_m * 1000:.1f} mm and {nearest.rotation_error_rad:.3f} rad"
             f"{f', at the limit of {held}' if held else ''}; stand elsewhere or turn the hand"
         )
-        return PostureUnreachable(
-            reason,
-            position_error_m=nearest.position_error_m,
-            rotation_error_rad=nearest.rotation_error_rad,
-        )
+        return PostureUnreachable(reason, nearest.position_error_m)
 
 
 def _has_stalled(errors: list[float]) -> bool:

@@ -1,15 +1,27 @@
-"""Find episodes by their words and by vectors, and join both rankings."""
+"""Find episodes by their words and by vectors, and join both rankings.
+
+The vectors hold the groups of letters in a text's words, so that their cosine says how alike texts
+are. They find what full text misses by spelling ("botle", "teapots"), not what means the same in
+other words. Each group of three to five letters falls on one of the dimensions with a sign
+(Weinberger et al., "Feature hashing for large scale multitask learning", 2009).
+"""
 
 import re
 import sqlite3
+import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vla_deploy.memory.embedding import Embedder
+Vectors = NDArray[np.float32]
 
+EMBEDDING: Final = "letter-groups-256"
+"""The name that vectors are kept by: those of different names are never compared."""
+_DIMENSIONS: Final = 256
+_LENGTHS: Final = (3, 4, 5)
 # Each list counts 1 / (60 + rank): Cormack et al., "Reciprocal rank fusion", 2009.
 _RANK_OFFSET: Final = 60.0
 _CANDIDATES: Final = 24
@@ -22,19 +34,17 @@ _SMALL_WORDS: Final = (
 _EMPTY_WORDS: Final = frozenset(_SMALL_WORDS.split())
 
 
-def search(
-    connection: sqlite3.Connection, embedder: Embedder, text: str
-) -> list[tuple[int, float]]:
+def search(connection: sqlite3.Connection, text: str) -> list[tuple[int, float]]:
     """Return numbers of episodes that fit a text, the best first, with their score."""
     scores: defaultdict[int, float] = defaultdict(float)
-    for ranking in (_by_words(connection, text), _by_vectors(connection, embedder, text)):
+    for ranking in (_by_words(connection, text), _by_vectors(connection, text)):
         for rank, number in enumerate(ranking):
             scores[number] += 1.0 / (_RANK_OFFSET + rank)
     return sorted(scores.items(), key=lambda pair: (-pair[1], -pair[0]))
 
 
 def _by_words(connection: sqlite3.Connection, text: str) -> list[int]:
-    words = [word for word in re.findall(r"\w+", text.lower()) if word not in _EMPTY_WORDS]
+    words = _significant_words(text)
     if not words:
         return []
     # Each word in quotes: what a person says is no query language.
@@ -47,24 +57,36 @@ def _by_words(connection: sqlite3.Connection, text: str) -> list[int]:
     return [number for (number,) in rows]
 
 
-def _by_vectors(connection: sqlite3.Connection, embedder: Embedder, text: str) -> list[int]:
+def _by_vectors(connection: sqlite3.Connection, text: str) -> list[int]:
     rows = connection.execute(
-        "SELECT number, value FROM vector WHERE embedder = ? ORDER BY number", (embedder.name,)
+        "SELECT number, value FROM vector WHERE embedder = ? ORDER BY number", (EMBEDDING,)
     ).fetchall()
     if not rows:
         return []
-    wanted = embedder.embed([_telling_words(text)])[0]
+    wanted = embed([text])[0]
     known = np.frombuffer(b"".join(value for _, value in rows), dtype=np.float32)
     alike = known.reshape(len(rows), wanted.size) @ wanted
     best = np.argsort(-alike, kind="stable")[:_CANDIDATES]
     return [int(rows[row][0]) for row in best if alike[row] >= LEAST_COSINE]
 
 
-def vectors_of(embedder: Embedder, texts: Sequence[str]) -> Iterable[bytes]:
-    """Return the vectors of texts as they are stored."""
-    rows = embedder.embed([_telling_words(text) for text in texts])
-    return [row.astype(np.float32).tobytes() for row in rows]
+def embed(texts: Sequence[str]) -> Vectors:
+    """Return one row of length 1 per text, or of zeros for a text whose words all say nothing."""
+    rows = np.zeros((len(texts), _DIMENSIONS), dtype=np.float32)
+    for row, text in zip(rows, texts, strict=True):
+        for word in _significant_words(text):
+            _add_letter_groups(row, f"<{word}>")
+    lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+    unit: Vectors = np.divide(rows, lengths, out=rows, where=lengths > 0.0)
+    return unit
 
 
-def _telling_words(text: str) -> str:
-    return " ".join(word for word in re.findall(r"\w+", text.lower()) if word not in _EMPTY_WORDS)
+def _add_letter_groups(row: Vectors, word: str) -> None:
+    for length in _LENGTHS:
+        for start in range(max(1, len(word) - length + 1)):
+            code = zlib.crc32(word[start : start + length].encode())
+            row[code % _DIMENSIONS] += 1.0 if code & 0x8000_0000 else -1.0
+
+
+def _significant_words(text: str) -> list[str]:
+    return [word for word in re.findall(r"\w+", text.lower()) if word not in _EMPTY_WORDS]

@@ -8,11 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Self
 
-from vla_deploy.memory.embedding import Embedder, LetterGroups
 from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen, Recollection
 from vla_deploy.memory.errors import MemoryUnusable, NoSuchEpisode
 from vla_deploy.memory.schema import open_file
-from vla_deploy.memory.search import search, vectors_of
+from vla_deploy.memory.search import EMBEDDING, Vectors, embed, search
 from vla_deploy.runtime.state_dir import state_dir_of
 
 FILE_NAME: Final = "memory.sqlite3"
@@ -35,7 +34,6 @@ class MemoryStore:
         self,
         path: Path,
         *,
-        embedder: Embedder | None = None,
         most_episodes: int = MOST_EPISODES,
         most_things: int = MOST_THINGS,
         patience_s: float = PATIENCE_S,
@@ -46,7 +44,6 @@ class MemoryStore:
             MemoryUnusable: the file cannot be used.
         """
         self.path = path
-        self._embedder = embedder or LetterGroups()
         self._most_episodes = most_episodes
         self._most_things = most_things
         self._lock = threading.Lock()
@@ -73,7 +70,7 @@ class MemoryStore:
             MemoryUnusable: the file cannot be written, such as for a full disk; nothing is lost
                 of what was remembered before.
         """
-        vectors = vectors_of(self._embedder, [one.text for one in episodes]) if episodes else ()
+        vectors = embed([one.text for one in episodes])
         with self._transaction() as connection:
             for episode, vector in zip(episodes, vectors, strict=True):
                 self._insert(connection, episode, vector)
@@ -90,7 +87,7 @@ class MemoryStore:
             MemoryUnusable: the file cannot be read.
         """
         with self._transaction() as connection:
-            found = search(connection, self._embedder, text)[:count]
+            found = search(connection, text)[:count]
             return [Recollection(episode=self._one(number), score=score) for number, score in found]
 
     def newest(self, count: int = 20) -> list[Episode]:
@@ -176,7 +173,7 @@ class MemoryStore:
             )
         return _episode(row)
 
-    def _insert(self, connection: sqlite3.Connection, episode: Episode, vector: bytes) -> None:
+    def _insert(self, connection: sqlite3.Connection, episode: Episode, vector: Vectors) -> None:
         values = (
             episode.told_s, episode.command, episode.outcome.value, episode.source, episode.goal,
             episode.reasoning, json.dumps(dict(episode.plan)), episode.rung, episode.error,
@@ -192,7 +189,7 @@ class MemoryStore:
         )
         connection.execute(
             "INSERT INTO vector (number, embedder, value) VALUES (?, ?, ?)",
-            (number, self._embedder.name, vector),
+            (number, EMBEDDING, vector.tobytes()),
         )
 
     def _forget_the_oldest(self, connection: sqlite3.Connection) -> None:

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.errors import NoPath
-from vla_deploy.robots.maps.grid_map import GridMap
+from vla_deploy.navigation.maps.distance_field import DistanceField
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.maps.grid_map import GridMap, load_map, with_zones
 
 Cell = tuple[int, int]
 
@@ -17,6 +19,8 @@ COMFORT_M = 0.25
 WALL_COST = 4.0
 # What a scan shows this near to a blocked cell is that cell: scans and poses are a little off.
 MAPPED_M = 0.11
+CLEARANCE_MARGIN_M = 0.03
+"""Air between the base's footprint and what stands on the map."""
 _NEIGHBOURS = tuple(
     (dr, dc, math.hypot(dr, dc)) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc
 )
@@ -56,13 +60,10 @@ class PathPlanner:
 
     def is_mapped(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which of (n, 2) points of the map frame the map shows as blocked, or nearly."""
-        cells = np.floor((points - self._grid.origin_m) / self._grid.resolution_m).astype(np.intp)
-        rows, columns = cells[:, 1], cells[:, 0]
-        height, width = self._clearance_m.shape
-        on_map = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-        mapped: NDArray[np.bool_] = ~on_map
-        mapped[on_map] = self._clearance_m[rows[on_map], columns[on_map]] < MAPPED_M
-        return mapped
+        grid = self._grid
+        clearance = DistanceField(self._clearance_m, grid.resolution_m, grid.origin_m)
+        near_m = clearance.nearest(points)
+        return (near_m < MAPPED_M) | np.isinf(near_m)
 
     def plan(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
         """Return the way from start to goal as (n, 2) points in the map frame.
@@ -162,3 +163,13 @@ def _unwind(came_from: dict[int, int], cell: int) -> list[int]:
         cell = came_from[cell]
         cells.append(cell)
     return cells[::-1]
+
+
+def base_planner(robot: RobotDescription) -> PathPlanner:
+    """Return the planner for a robot's base on its own map, around its keep-out zones.
+
+    Raises:
+        MapInvalid: the robot file's map cannot be used.
+    """
+    grid = with_zones(load_map(robot.home.map_path), robot.home.zones)
+    return PathPlanner(grid, robot.base.footprint_radius_m + CLEARANCE_MARGIN_M)

@@ -9,16 +9,22 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import depths_m
-from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.maps.mapping import Mapper
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.perception.geometry.cloud import sparse_points
 from vla_deploy.perception.geometry.geometry_grid import geometry_grid
-from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.objects.body_state import BodyState
+from vla_deploy.perception.pose_tracker import lidar_place
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.kinematics.model import RobotModel, full_positions
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
+from vla_deploy.robots.kinematics.model import RobotModel
 
 FRESH_YAW_NS: Final = NS_PER_S // 10
+DEPTH_M: Final = (0.25, 2.5)
+# Lower is floor, higher passes over the robot's head; what lies between floor and band is neither.
+FLOOR_M: Final = 0.02
+LOWEST_M, HIGHEST_M = 0.06, 1.25
+CELL_M: Final = 0.05
+MIN_PIXELS: Final = 3
 
 
 class MapRecorder:
@@ -37,7 +43,6 @@ class MapRecorder:
             RobotFileError: the MJCF does not fit the robot file.
         """
         model = RobotModel(robot)
-        site = model.site_pose(robot.lidar.site, full_positions(robot))
         self._scan, self._imu = space.cell_reader("scan"), space.cell_reader("imu")
         self._base_state = space.cell_reader("base_state")
         self._images = space.frame_reader("rgbd")
@@ -46,8 +51,7 @@ class MapRecorder:
         self._camera = robot.camera
         start = _tracked_pose(space.cell_reader("pose").latest())
         self.on_old_frame = start is not None
-        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
-        self.mapper = Mapper(start or ORIGIN, lidar, resolution_m)
+        self.mapper = Mapper(start or ORIGIN, lidar_place(robot, model), resolution_m)
         self._last = {"base_state": -1, "scan": -1, "rgbd": -1}
 
     def step(self) -> None:
@@ -60,9 +64,8 @@ class MapRecorder:
         moved = self._base_state.latest()
         if moved is None or not self._is_new("base_state", moved.stamp_ns):
             return
-        x_m, y_m, yaw_rad = (float(moved.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
-        yaw = self._imu_yaw_rad(moved.stamp_ns)
-        self.mapper.predict(moved.stamp_ns, Pose2D(x_m, y_m, yaw_rad), yaw)
+        yaw_rad = self._imu_yaw_rad(moved.stamp_ns)
+        self.mapper.predict(moved.stamp_ns, Pose2D.of(moved.data), yaw_rad)
         scan = self._scan.latest()
         if scan is not None and self._is_new("scan", scan.stamp_ns):
             ages_ns = np.rint(scan.data["beam_age_s"] * NS_PER_S).astype(np.int64)
@@ -78,13 +81,17 @@ class MapRecorder:
         if positions is None:
             return
         grid = geometry_grid(self._intrinsics(frame.width, frame.height))
-        standing, floor = depth_band(
+        points = sparse_points(
             grid.depth(depths_m(frame)),
-            ray_table(grid.camera),
+            grid.camera,
             self._body.camera_pose(positions),
             self._body.mask(positions, grid.camera),
+            within_m=DEPTH_M,
         )
-        self.mapper.add_depth(standing, floor, frame.stamp_ns)
+        height_m = points[:, 2]
+        standing = points[(height_m > LOWEST_M) & (height_m < HIGHEST_M), :2]
+        floor = points[np.abs(height_m) < FLOOR_M, :2]
+        self.mapper.add_depth(_without_noise(standing), _without_noise(floor), frame.stamp_ns)
 
     def _imu_yaw_rad(self, now_ns: int) -> float | None:
         sample = self._imu.latest()
@@ -116,4 +123,14 @@ def _tracked_pose(sample: Sample | None) -> Pose2D | None:
     """Return the robot's pose on its present map, None where it is not tracked."""
     if sample is None or int(sample.data["state"]) != PlaceState.TRACKING:
         return None
-    return Pose2D(*(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+    return Pose2D.of(sample.data)
+
+
+def _without_noise(points: Points) -> Points:
+    """Return the points in whose cell several lie."""
+    if not len(points):
+        return points
+    cells = np.floor(points / CELL_M).astype(np.int64)
+    _, at, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    kept: Points = points[counts[at.ravel()] >= MIN_PIXELS]
+    return kept

@@ -5,8 +5,8 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.maps.grid_map import load_map
 
@@ -23,9 +23,7 @@ class PoseTracker:
         Raises:
             MapInvalid: the robot file's map cannot be used.
         """
-        # The driver has turned the beams: they count from the robot's front.
-        site = model.site_pose(robot.lidar.site, full_positions(robot))
-        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
+        lidar = lidar_place(robot, model)
         self.localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
@@ -45,9 +43,8 @@ class PoseTracker:
         sample = self._base_state.latest()
         if sample is not None and sample.stamp_ns != self._base_stamp_ns:
             self._base_stamp_ns = sample.stamp_ns
-            data = sample.data
-            odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
-            self.localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
+            odometry, yaw_rad = Pose2D.of(sample.data), self._fresh_yaw_rad(now_ns)
+            self.localiser.predict(sample.stamp_ns, odometry, yaw_rad)
         pose = self.localiser.pose
         self._writer.put(
             x_m=pose.x_m,
@@ -68,9 +65,15 @@ class PoseTracker:
         return self._imu_yaw_rad if now_ns - self._imu_ns <= FRESH_YAW_NS else None
 
 
+def lidar_place(robot: RobotDescription, model: RobotModel) -> Pose2D:
+    """Return where the lidar is on the base.
+
+    The driver has turned the beams: they count from the robot's front.
+    """
+    x_m, y_m, _ = model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
+    return Pose2D(float(x_m), float(y_m), 0.0)
+
+
 def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
     last = space.cell_reader("pose").latest()
-    if last is not None:
-        return Pose2D(*(float(last.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
-    start = robot.start_pose
-    return Pose2D(start.x_m, start.y_m, start.yaw_rad)
+    return robot.start_pose if last is None else Pose2D.of(last.data)

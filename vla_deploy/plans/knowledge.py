@@ -11,8 +11,8 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.world import Query, UnknownWord, parse_query
+from vla_deploy.world.access import IsFree
 from vla_deploy.world.query import FROM_A_VIEW
-from vla_deploy.world.reach import IsFree
 from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
 
 

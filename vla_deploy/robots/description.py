@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.ros_settings import UNUSED, RosSettings
@@ -272,22 +273,13 @@ class Hand:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FloorPose:
-    """Place the robot's base on the floor of the map frame."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """Name a pose to drive to, and the poses from which its furniture can be searched."""
 
     name: str
-    pose: FloorPose
+    pose: Pose2D
     aliases: tuple[str, ...]
-    viewpoints: tuple[FloorPose, ...]
+    viewpoints: tuple[Pose2D, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -357,7 +349,7 @@ class RobotDescription:
         return self.home.places
 
     @property
-    def start_pose(self) -> FloorPose:
+    def start_pose(self) -> Pose2D:
         """Return the pose in which the robot is switched on."""
         return self.home.places[self.home.start].pose
 

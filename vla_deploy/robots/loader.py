@@ -19,7 +19,6 @@ from vla_deploy.robots.description import (
     CanBus,
     Drive,
     EstopButtonDescription,
-    FloorPose,
     Hand,
     Home,
     JointLimits,
@@ -35,6 +34,7 @@ from vla_deploy.robots.description import (
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.ros_settings import ROS, ros_settings
@@ -238,9 +238,9 @@ def _home(row: Document, directory: Path) -> Home:
 def _place(name: str, row: Document) -> Place:
     return Place(
         name=name,
-        pose=FloorPose(x_m=row["x_m"], y_m=row["y_m"], yaw_rad=row["yaw_rad"]),
+        pose=Pose2D(x_m=row["x_m"], y_m=row["y_m"], yaw_rad=row["yaw_rad"]),
         aliases=tuple(row["aliases"]),
-        viewpoints=tuple(FloorPose(**view) for view in row["viewpoints"]),
+        viewpoints=tuple(Pose2D(**view) for view in row["viewpoints"]),
     )
 
 

@@ -13,7 +13,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.motion_ids import motion_ids
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.safety import Direction
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.world import SceneUnreadable, Snapshot, read_snapshot
@@ -114,7 +114,7 @@ class SkillLink:
         return np.asarray(sample.data[field][:count], dtype=np.float64)
 
     @property
-    def pose(self) -> FloorPose:
+    def pose(self) -> Pose2D:
         """Return the base's pose in the map.
 
         Raises:
@@ -123,11 +123,7 @@ class SkillLink:
         sample = self._pose.latest()
         if sample is None or sample.age_s(self.clock.now_ns()) > POSE_AGE_S:
             raise TryAgain("perception does not tell the robot's pose; is it running?")
-        return FloorPose(
-            x_m=float(sample.data["x_m"]),
-            y_m=float(sample.data["y_m"]),
-            yaw_rad=float(sample.data["yaw_rad"]),
-        )
+        return Pose2D.of(sample.data)
 
     @property
     def match_ratio(self) -> float:

@@ -20,7 +20,7 @@ from vla_deploy.ipc import (
     SharedSpace,
 )
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.plan import Plan
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NodeContext

@@ -1,26 +1,37 @@
-"""Tell whether a thing can be taken, from where, and what is in the way, each with its reason."""
+"""Judge whether a thing can be taken, from where, and what is in the way, each with its reason.
+
+The arms reach what is straight ahead of the base, at a distance that suits.
+"""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Self
 
 from vla_deploy.manipulation.errors import TooWide
-from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
+from vla_deploy.manipulation.grasps import TIP_BEYOND_GRIP_M, Grasp, grasps_from_above
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world.footprint import depth_inside_m
-from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, is_in_reach, stands_around
 from vla_deploy.world.resting import IN, ON
-from vla_deploy.world.thing import Snapshot, Thing, Viewpoint
+from vla_deploy.world.thing import Rest, Snapshot, Thing, Viewpoint
+
+# Distance from the base's centre to the thing: best first, all within the arms' reach.
+REACH_M: Final = (0.42, 0.46, 0.50, 0.54)
+DIRECTIONS: Final = 36
+LEAST_AHEAD_M: Final = 0.3
+MOST_ASIDE_M: Final = 0.2
+# Heights at which a hand that points down gets a grip, at some of these distances.
+GRIP_HEIGHTS_M: Final = (0.25, 0.85)
 
 # What of a hand goes down beside a thing: two fingers from below the grip, the palm from above it.
 FINGER_RADIUS_M: Final = 0.018
-TIP_BELOW_GRIP_M: Final = 0.012
 PALM_RADIUS_M: Final = 0.045
 PALM_ABOVE_GRIP_M: Final = 0.07
 WALL_M: Final = 0.008
 UNSURE_M: Final = 0.06
+
+IsFree = Callable[[float, float], bool]
 
 
 class GraspStand(StrEnum):
@@ -47,6 +58,35 @@ class Bar(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Stand:
+    """Place the base's centre on the floor at a distance from a thing, facing along a bearing."""
+
+    x_m: float
+    y_m: float
+    bearing_rad: float
+    reach_m: float
+    step: int
+
+
+def is_in_reach(point_m: Sequence[float]) -> bool:
+    """Return whether the arms reach a point of the base frame from where the base stands."""
+    x_m, y_m = point_m[0], point_m[1]
+    return math.hypot(x_m, y_m) <= REACH_M[-1] and abs(y_m) <= MOST_ASIDE_M and x_m > LEAST_AHEAD_M
+
+
+def stands_around(position_m: Sequence[float], is_free: IsFree) -> Iterator[Stand]:
+    """Yield for each direction the free stand from which a point of the map is best reached."""
+    for step in range(DIRECTIONS):
+        bearing_rad = 2.0 * math.pi * step / DIRECTIONS
+        for reach_m in REACH_M:
+            x_m = position_m[0] - reach_m * math.cos(bearing_rad)
+            y_m = position_m[1] - reach_m * math.sin(bearing_rad)
+            if is_free(x_m, y_m):
+                yield Stand(x_m=x_m, y_m=y_m, bearing_rad=bearing_rad, reach_m=reach_m, step=step)
+                break
+
+
+@dataclass(frozen=True, slots=True)
 class Obstacle:
     """Say what is in the way; `by` is the id of a thing, "" where none is."""
 
@@ -108,22 +148,21 @@ def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> GraspAccess:
     found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps)]
     found += _in_corridor(thing, grasps, snapshot) if grasps else []
     if way is GraspStand.NONE:
-        found.append(_bar(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
+        found.append(Obstacle(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
     return GraspAccess(way=way, is_graspable=bool(grasps), obstacles=tuple(found))
 
 
 def _general(thing: Thing, snapshot: Snapshot, body: Body) -> Iterator[Obstacle]:
     if thing.held_by:
-        yield _bar(Bar.HELD, "", f"the {thing.held_by} hand holds it")
+        yield Obstacle(Bar.HELD, "", f"the {thing.held_by} hand holds it")
     full = {one.held_by for one in snapshot.things if one.held_by}
     if not thing.held_by and body.hands and full.issuperset(body.hands):
-        yield _bar(Bar.HANDS_FULL, "", "no hand is free")
+        yield Obstacle(Bar.HANDS_FULL, "", "no hand is free")
     for other in snapshot.things:
-        rests = other.rests
-        if rests is not None and rests.relation == ON and rests.of == thing.thing_id:
-            yield _bar(Bar.ON_TOP, other.thing_id, f"the {other} is on it")
+        if other.rests == Rest(ON, thing.thing_id):
+            yield Obstacle(Bar.ON_TOP, other.thing_id, f"the {other} is on it")
     if max(thing.sigma_m[:2]) > UNSURE_M:
-        yield _bar(
+        yield Obstacle(
             Bar.UNSURE, "", f"its place is known to {max(thing.sigma_m[:2]):.2f} m only; look first"
         )
 
@@ -134,7 +173,7 @@ def _grasps(thing: Thing, body: Body) -> tuple[list[Grasp], list[Obstacle]]:
             thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, body.opening_max_m
         ), []
     except TooWide as error:
-        return [], [_bar(Bar.TOO_WIDE, "", str(error))]
+        return [], [Obstacle(Bar.TOO_WIDE, "", str(error))]
 
 
 def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
@@ -143,23 +182,17 @@ def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
         height_m = grasp.point_m[2]
         bar = Bar.TOO_LOW if height_m < low_m else Bar.TOO_HIGH
         if not low_m <= height_m <= high_m:
-            yield _bar(bar, "", f"the grip would be {height_m:.2f} m high; "
+            yield Obstacle(bar, "", f"the grip would be {height_m:.2f} m high; "
                        f"hands that point down reach {low_m:g} to {high_m:g} m")  # fmt: skip
 
 
 def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> GraspStand:
-    if robot is not None and is_in_reach(_from(robot, thing)):
+    if robot is not None and is_in_reach(robot.local(thing.position_m)):
         return GraspStand.HERE
     if body.is_free is None:
         return GraspStand.AFTER_DRIVING
     has_stand = next(stands_around(thing.position_m, body.is_free), None) is not None
     return GraspStand.AFTER_DRIVING if has_stand else GraspStand.NONE
-
-
-def _from(robot: Viewpoint, thing: Thing) -> tuple[float, float]:
-    dx, dy = thing.position_m[0] - robot.x_m, thing.position_m[1] - robot.y_m
-    c, s = math.cos(robot.yaw_rad), math.sin(robot.yaw_rad)
-    return c * dx + s * dy, c * dy - s * dx
 
 
 def _in_corridor(thing: Thing, grasps: list[Grasp], snapshot: Snapshot) -> list[Obstacle]:
@@ -176,19 +209,19 @@ def _bars_of(grasp: Grasp, thing: Thing, snapshot: Snapshot) -> Iterator[Obstacl
     for other in snapshot.things:
         if other is thing or other.held_by or _carries(thing, other):
             continue
-        holds = thing.rests is not None and (thing.rests.relation, thing.rests.of) == (
-            IN, other.thing_id,
-        )  # fmt: skip
+        holds = thing.rests == Rest(IN, other.thing_id)
         for point_m, radius_m, from_m in _discs(grasp):
             depth_m = depth_inside_m(point_m, other)
             if other.top_m <= from_m:
                 continue
             if holds and depth_m < radius_m + WALL_M:
-                yield _bar(
+                yield Obstacle(
                     Bar.CLOSED_IN, other.thing_id, f"too deep, or too near a wall, in the {other}"
                 )
             elif not holds and depth_m > -radius_m:
-                yield _bar(Bar.BESIDE, other.thing_id, f"the {other} is where a finger would go")
+                yield Obstacle(
+                    Bar.BESIDE, other.thing_id, f"the {other} is where a finger would go"
+                )
 
 
 def _discs(grasp: Grasp) -> Iterator[tuple[tuple[float, float], float, float]]:
@@ -198,27 +231,12 @@ def _discs(grasp: Grasp) -> Iterator[tuple[tuple[float, float], float, float]]:
     across = (math.sin(grasp.yaw_rad), -math.cos(grasp.yaw_rad))
     for side in (-aside_m, aside_m):
         at = (x_m + side * across[0], y_m + side * across[1])
-        yield at, FINGER_RADIUS_M, z_m - TIP_BELOW_GRIP_M
+        yield at, FINGER_RADIUS_M, z_m - TIP_BEYOND_GRIP_M
     yield (x_m, y_m), PALM_RADIUS_M, z_m + PALM_ABOVE_GRIP_M
 
 
 def _carries(thing: Thing, other: Thing) -> bool:
     """Return whether `other` is what a thing stands on, or stands on it: neither is beside it."""
-    below = thing.rests is not None and (thing.rests.relation, thing.rests.of) == (
-        ON, other.thing_id,
-    )  # fmt: skip
+    below = thing.rests == Rest(ON, other.thing_id)
     above = other.rests is not None and other.rests.of == thing.thing_id
     return below or above
-
-
-def _bar(bar: Bar, by: str, why: str) -> Obstacle:
-    return Obstacle(bar=bar, by=by, why=why)
-
-
-def bodies_of(openings_m: Mapping[str, float], is_free: IsFree | None = None) -> Body:
-    """Return the body with these hands; `openings_m` is how wide each opens."""
-    return Body(
-        opening_max_m=max(openings_m.values(), default=0.0),
-        hands=tuple(openings_m),
-        is_free=is_free,
-    )

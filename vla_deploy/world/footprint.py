@@ -22,8 +22,8 @@ def depth_inside_m(point_m: Sequence[float], thing: Thing) -> float:
     """Return how far a point of the plan lies within a thing's footprint; outside, negative."""
     if is_round(thing):
         return 0.25 * sum(thing.size_m[:2]) - math.dist(point_m[:2], thing.xy_m)
-    along_m, across_m = np.abs(_local(point_m, thing))
-    beyond = (float(along_m) - 0.5 * thing.size_m[0], float(across_m) - 0.5 * thing.size_m[1])
+    along_m, across_m = thing.floor_pose.local(point_m)
+    beyond = (abs(along_m) - 0.5 * thing.size_m[0], abs(across_m) - 0.5 * thing.size_m[1])
     if max(beyond) > 0.0:
         return -math.hypot(*(max(0.0, one) for one in beyond))
     return -max(beyond)
@@ -55,23 +55,10 @@ def polygon_depth_m(point_m: Sequence[float], polygon_m: Sequence[Sequence[float
 
 def _parted_m(one: Thing, other: Thing) -> float:
     """Return by how much `other` clears the sides of `one`, in the better of its two directions."""
-    local = np.array([_local(corner, one) for corner in _corners(other)])
     half = 0.5 * np.array(one.size_m[:2])
+    ends = 0.5 * np.array(other.size_m[:2]) * [(i, j) for i in (-1, 1) for j in (-1, 1)]
+    local = np.array([one.floor_pose.local(corner) for corner in other.floor_pose.place(ends)])
     return float((np.maximum(local.min(axis=0), -local.max(axis=0)) - half).max())
-
-
-def _corners(thing: Thing) -> NDArray[np.float64]:
-    half_length, half_width = 0.5 * thing.size_m[0], 0.5 * thing.size_m[1]
-    c, s = math.cos(thing.yaw_rad), math.sin(thing.yaw_rad)
-    turned = np.array([[c, s], [-s, c]])
-    local = np.array([(i * half_length, j * half_width) for i in (-1, 1) for j in (-1, 1)])
-    return np.asarray(local @ turned + np.array(thing.xy_m), dtype=np.float64)
-
-
-def _local(point_m: Sequence[float], thing: Thing) -> NDArray[np.float64]:
-    dx, dy = point_m[0] - thing.position_m[0], point_m[1] - thing.position_m[1]
-    c, s = math.cos(thing.yaw_rad), math.sin(thing.yaw_rad)
-    return np.array((c * dx + s * dy, c * dy - s * dx))
 
 
 def _area2(corners: NDArray[np.float64]) -> float:

@@ -23,11 +23,14 @@ from vla_deploy.world.vocabulary import (
     ANY_CLASS,
     ARTICLES,
     COLOURS,
+    COMPARED,
     FILLERS,
+    FORMS,
     OBJECT_CLASSES,
     SYNONYMS,
+    compared,
+    form_words,
 )
-from vla_deploy.world.words import COMPARED, FORMS, compared, form_words
 
 NEAR: Final = "near"
 # What people say, the longest first, and the relation that it means.

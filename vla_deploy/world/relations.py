@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.world.footprint import depth_inside_m, gap_m, polygon_depth_m
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.thing import Rest, Snapshot, Surface, Thing, Viewpoint
@@ -34,14 +35,6 @@ class Relation:
     subject: str
     relation: str
     other: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Sight:
-    """Hold how far `one` is beyond, and to the left of, `other` for who looks."""
-
-    beyond_m: float
-    left_m: float
 
 
 Test = Callable[[Thing, Thing, Viewpoint | None], bool]
@@ -75,20 +68,18 @@ def _carries(one: Thing, other: Thing) -> bool:
     return other.rests is not None and other.rests.of == one.thing_id
 
 
-def _left(one: Thing, other: Thing, view: Viewpoint | None) -> bool:
-    return (seen := _sight(one, other, view)) is not None and _along(seen.left_m, seen.beyond_m)
+def _seen(*, beyond: int = 0, left: int = 0) -> Test:
+    """Return the test whether, for who looks, one thing lies in a direction from another."""
 
+    def lies_there(one: Thing, other: Thing, view: Viewpoint | None) -> bool:
+        offset = _offset(one, other, view)
+        if offset is None:
+            return False
+        beyond_m, left_m = offset
+        main_m, aside_m = beyond * beyond_m + left * left_m, left * beyond_m + beyond * left_m
+        return main_m > LEAST_OFFSET_M and main_m >= CONE * abs(aside_m)
 
-def _right(one: Thing, other: Thing, view: Viewpoint | None) -> bool:
-    return (seen := _sight(one, other, view)) is not None and _along(-seen.left_m, seen.beyond_m)
-
-
-def _behind(one: Thing, other: Thing, view: Viewpoint | None) -> bool:
-    return (seen := _sight(one, other, view)) is not None and _along(seen.beyond_m, seen.left_m)
-
-
-def _in_front(one: Thing, other: Thing, view: Viewpoint | None) -> bool:
-    return (seen := _sight(one, other, view)) is not None and _along(-seen.beyond_m, seen.left_m)
+    return lies_there
 
 
 RELATIONS: Final[Mapping[str, Test]] = MappingProxyType(
@@ -97,10 +88,10 @@ RELATIONS: Final[Mapping[str, Test]] = MappingProxyType(
         ON: _on,
         "under": _under,
         NEXT_TO: is_next_to,
-        "left of": _left,
-        "right of": _right,
-        "in front of": _in_front,
-        "behind": _behind,
+        "left of": _seen(left=1),
+        "right of": _seen(left=-1),
+        "in front of": _seen(beyond=-1),
+        "behind": _seen(beyond=1),
     }
 )
 
@@ -126,8 +117,11 @@ def is_under(thing: Thing, surface: Surface) -> bool:
     return below and polygon_depth_m(thing.position_m, surface.polygon_m) > 0.0
 
 
-def _sight(one: Thing, other: Thing, view: Viewpoint | None) -> _Sight | None:
-    """Return how two things lie to each other for who looks, None where they are not together."""
+def _offset(one: Thing, other: Thing, view: Viewpoint | None) -> tuple[float, float] | None:
+    """Return how far `one` is beyond, and to the left of, `other` for who looks.
+
+    None means that they are not together.
+    """
     if view is None or math.dist(one.position_m, other.position_m) > TOGETHER_M:
         return None
     if depth_inside_m(one.position_m, other) > 0.0 or _carries(one, other) or _carries(other, one):
@@ -135,10 +129,4 @@ def _sight(one: Thing, other: Thing, view: Viewpoint | None) -> _Sight | None:
     middle_x = 0.5 * (one.position_m[0] + other.position_m[0])
     middle_y = 0.5 * (one.position_m[1] + other.position_m[1])
     bearing_rad = math.atan2(middle_y - view.y_m, middle_x - view.x_m)
-    dx, dy = one.position_m[0] - other.position_m[0], one.position_m[1] - other.position_m[1]
-    c, s = math.cos(bearing_rad), math.sin(bearing_rad)
-    return _Sight(beyond_m=c * dx + s * dy, left_m=c * dy - s * dx)
-
-
-def _along(main_m: float, aside_m: float) -> bool:
-    return main_m > LEAST_OFFSET_M and main_m >= CONE * abs(aside_m)
+    return Pose2D(*other.xy_m, bearing_rad).local(one.position_m)

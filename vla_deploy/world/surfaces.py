@@ -1,6 +1,5 @@
 """Remember the surfaces of the home: the same table has the same name whichever part is in view."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
@@ -34,10 +33,9 @@ def furniture_points(places: Mapping[str, Place]) -> dict[str, Point]:
     points: dict[Point, tuple[float, str]] = {}
     for place in places.values():
         for view in place.viewpoints:
-            x_m = view.x_m + FURNITURE_AHEAD_M * math.cos(view.yaw_rad)
-            y_m = view.y_m + FURNITURE_AHEAD_M * math.sin(view.yaw_rad)
-            away_m = math.dist((view.x_m, view.y_m), (place.pose.x_m, place.pose.y_m))
-            at, candidate = (round(x_m, 2), round(y_m, 2)), (away_m, place.name)
+            x_m, y_m = view.outward(FURNITURE_AHEAD_M, 0.0)
+            candidate = (view.distance_m(place.pose), place.name)
+            at = (round(x_m, 2), round(y_m, 2))
             points[at] = min(points.get(at, candidate), candidate)
     return {name: at for at, (_, name) in points.items()}
 

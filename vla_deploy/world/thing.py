@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from drivers.clock import NS_PER_S
+from vla_deploy.robots.floor_pose import Pose2D
 
 Vector = tuple[float, float, float]
 
@@ -56,6 +57,11 @@ class Thing:
         """Return its place on the floor plan."""
         return self.position_m[:2]
 
+    @property
+    def floor_pose(self) -> Pose2D:
+        """Return its middle on the floor plan, with the direction of its length."""
+        return Pose2D(*self.xy_m, self.yaw_rad)
+
     def is_called(self, name: str) -> bool:
         """Return whether a name is one of its ids."""
         return name == self.thing_id or name in self.aliases
@@ -74,11 +80,9 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Viewpoint:
+class Viewpoint(Pose2D):
     """Place someone who looks: the robot, or a named place; `name` is for words only."""
 
-    x_m: float
-    y_m: float
     yaw_rad: float = 0.0
     name: str = "robot"
 

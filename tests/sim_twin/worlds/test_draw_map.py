@@ -5,7 +5,7 @@ import numpy as np
 
 from sim_twin.worlds.draw_map import BODY_ONLY, FREE, RESOLUTION_M, SEEN, draw_map, write_map
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 
 ROOM = """
 <mujoco>
@@ -50,7 +50,7 @@ def test_the_robot_has_room_at_every_place_and_viewpoint() -> None:
             )
 
 
-def clearance_m(document: Path, pose: FloorPose) -> float:
+def clearance_m(document: Path, pose: Pose2D) -> float:
     origin = next(line for line in document.read_text().splitlines() if line.startswith("origin"))
     x_min, y_min = (float(v) for v in origin.split("[")[1].split(",")[:2])
     data = document.with_suffix(".pgm").read_bytes()

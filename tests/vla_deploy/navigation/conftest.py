@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.localising.localisation import Localiser
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap
 
 RESOLUTION_M: Final = 0.05

@@ -8,7 +8,7 @@ from vla_deploy.navigation.localising.dead_reckoning import (
     DeadReckoning,
     OdometryStep,
 )
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 TICK_NS = 20_000_000
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.localising.place_judge import LOST_SIGMA_M
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 
 if TYPE_CHECKING:
     from conftest import TracedFlat

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.localising.scan_match import ScanPoints
+from vla_deploy.navigation.localising.scan import ScanPoints
 from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.navigation.maps.occupancy import OccupancyGrid
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,

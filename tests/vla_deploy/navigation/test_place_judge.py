@@ -9,7 +9,6 @@ from vla_deploy.navigation.localising.place_judge import (
     UNSURE_AFTER_SCANS,
     UNSURE_SIGMA_M,
     PlaceJudge,
-    ScanVerdict,
 )
 
 SCAN_NS = 100_000_000
@@ -27,8 +26,7 @@ class Course:
     ) -> PlaceState:
         for _ in range(count):
             self.now_ns += SCAN_NS
-            verdict = ScanVerdict(doubt=doubt, match_ratio=ratio, sigma_m=sigma_m, sigma_rad=0.01)
-            self.judge.take(self.now_ns, verdict)
+            self.judge.take(self.now_ns, doubt, ratio, sigma_m, sigma_rad=0.01)
         return self.judge.state
 
 

@@ -28,12 +28,12 @@ from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.ipc import Sample, SharedSpace
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.geometry.cloud import Cloud, make_cloud
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.node import NodeContext
 

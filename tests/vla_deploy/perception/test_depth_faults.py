@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import aim_sigma_rad, make_cloud
 from vla_deploy.perception.geometry.supports import find_supports
 from vla_deploy.perception.images.detection import Detection, detect
 from vla_deploy.perception.objects.body_state import JointHistory
+from vla_deploy.robots.floor_pose import Pose2D
 
 if TYPE_CHECKING:
     from conftest import StillFlat

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.supports import find_supports
 from vla_deploy.perception.images.detection import Detection, detect
+from vla_deploy.robots.floor_pose import Pose2D
 
 if TYPE_CHECKING:
     from conftest import StillFlat
@@ -149,8 +149,7 @@ def test_furniture_and_walls_are_no_things_to_pick(flat: "StillFlat") -> None:
     flat.scatter(0)
     known = {(item.class_name, item.colour) for item in flat.world.objects.values()}
     for place in ("living_room", "kitchen", "bedroom", "entrance", "charging_station"):
-        pose = flat.robot.places[place].pose
-        flat.stand(Pose2D(pose.x_m, pose.y_m, pose.yaw_rad), head_tilt=0.35)
+        flat.stand(flat.robot.places[place].pose, head_tilt=0.35)
         for detection, position in see(flat):
             if detection.truncated or detection.class_name == "object":
                 continue

@@ -9,11 +9,11 @@ import pytest
 
 from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import DEPTH_SIGMA_PER_M
 from vla_deploy.perception.images.frame_check import LIMITS, ImageUse, StatisticLimit, judge_frame
 from vla_deploy.perception.images.frame_monitor import FrameMonitor
 from vla_deploy.perception.images.frame_statistics import FrameStatistics, measure_frame
+from vla_deploy.robots.floor_pose import Pose2D
 
 WIDTH, HEIGHT = 160, 120
 CAMERA = Intrinsics(width=WIDTH, height=HEIGHT, fx=140.0, fy=140.0, cx=79.5, cy=59.5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.perception.objects.hands import Hands, Hold
+from vla_deploy.perception.objects.body_state import Hands, Hold
 from vla_deploy.robots import load_robot
 
 STEP_NS = 20_000_000

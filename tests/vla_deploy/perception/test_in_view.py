@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import Cloud
 from vla_deploy.perception.geometry.supports import KnownSurface, counter_clockwise, find_supports
 from vla_deploy.perception.images.detection import Detection, Vector, detect
-from vla_deploy.perception.objects.in_view import is_in_clear_view
+from vla_deploy.perception.objects.scene import is_in_clear_view
+from vla_deploy.robots.floor_pose import Pose2D
 
 if TYPE_CHECKING:
     from conftest import StillFlat

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import PosedImage
 from vla_deploy.perception.objects.near_obstacles import KEPT_NS, NearObstacles
+from vla_deploy.robots.floor_pose import Pose2D
 
 CAMERA = Intrinsics(width=160, height=120, fx=110.0, fy=110.0, cx=79.5, cy=59.5)
 HEIGHT_M = 1.2

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 if TYPE_CHECKING:
     from conftest import Rig, StillFlat

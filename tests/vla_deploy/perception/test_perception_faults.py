@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from platforms import Profile, load_profile
 from sim_twin.faults.line_tamper import Garbage, LineTamper, Stuck, Tampering
 from vla_deploy.inference.errors import ModelUnknown
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 if TYPE_CHECKING:
     from conftest import Rig

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vla_deploy.ipc import BY_NAME
+from vla_deploy.perception.objects.body_state import Hold
 from vla_deploy.perception.objects.filtering import Estimate
-from vla_deploy.perception.objects.hands import Hold
 from vla_deploy.perception.objects.scene import Scene
 from vla_deploy.perception.objects.track import Track
 from vla_deploy.perception.objects.tracker import MAX_OBJECTS, VANISHED_KEPT

@@ -1,11 +1,14 @@
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.robots.errors import MapInvalid
-from vla_deploy.robots.maps.grid_map import load_map
+from vla_deploy.robots.maps.grid_map import GridMap, load_map, with_zones
 
 YAML = """# a flat
 image: flat.pgm
@@ -15,6 +18,9 @@ negate: 0
 occupied_thresh: 0.65
 free_thresh: 0.196
 """
+ZONE = KeepOutZone(
+    name="stairs", reason="a drop", polygon_m=((2.0, 1.0), (3.0, 1.0), (3.0, 4.0), (2.0, 4.0))
+)
 
 
 def write(folder: Path, yaml: str = YAML) -> Path:
@@ -46,24 +52,18 @@ def test_cells_and_world_points_agree(tmp_path: Path) -> None:
         assert grid.world_to_cell(*grid.cell_to_world(*cell)) == cell
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("resolution: 0.1", "", "missing resolution"),
-        ("resolution: 0.1", "resolution: 0", "resolution: expected"),
-        ("resolution: 0.1", "resolution: fine", "resolution: expected"),
-        ("0.0]", "0.5]", "origin: expected"),
-        ("flat.pgm", "other.pgm", r"other\.pgm"),
-        ("negate: 0", "negate 0", "key: value"),
-    ],
-)
-def test_a_bad_map_file_is_told_with_place_and_expectation(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
-    with pytest.raises(MapInvalid, match=message):
-        load_map(write(tmp_path, YAML.replace(old, new)))
-
-
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(MapInvalid, match="nowhere"):
         load_map(tmp_path / "nowhere.yaml")
+
+
+def test_a_path_goes_around_a_keep_out_zone() -> None:
+    open_room = GridMap(
+        resolution_m=0.1, origin_m=(0.0, 0.0), blocked=np.zeros((60, 60), dtype=bool)
+    )
+    path = PathPlanner(with_zones(open_room, [ZONE]), 0.2).plan((1.0, 2.0), (4.0, 2.0))
+    assert not open_room.blocked.any()
+    for a, b in pairwise(path):
+        for s in np.linspace(0, 1, 50):
+            x, y = a + (b - a) * s
+            assert not (1.9 < x < 3.1 and 0.9 < y < 4.1)

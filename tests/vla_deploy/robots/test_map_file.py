@@ -160,6 +160,7 @@ def test_a_png_is_as_good_as_a_pgm(tmp_path: Path) -> None:
         ("negate: 0", "negate: maybe", "negate: expected"),
         ("negate: 0", "mode: binary", "mode: expected trinary, scale, raw"),
         ("image: map.pgm", "", "missing image"),
+        ("resolution: 0.050000", "", "missing resolution"),
         ("map.pgm", "gone.pgm", "no such file"),
         ("negate: 0", "negate", "map.yaml:4: expected `key: value`"),
     ],

@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.context import SkillContext
@@ -75,7 +75,7 @@ class Executor:
 class StandingLink:
     """Say where the robot stands and what it has seen; the part of `SkillLink` that is state."""
 
-    pose: FloorPose
+    pose: Pose2D
     objects: list[dict[str, Any]] = field(default_factory=list)
     surfaces: list[dict[str, Any]] = field(default_factory=list)
     clock: StoppedClock = field(default_factory=StoppedClock)
@@ -90,9 +90,9 @@ class StandingLink:
         return None if self.is_silent else read_snapshot(told)
 
 
-def at(x_m: float, y_m: float, yaw_rad: float = 0.0) -> FloorPose:
+def at(x_m: float, y_m: float, yaw_rad: float = 0.0) -> Pose2D:
     """Return a pose of the floor."""
-    return FloorPose(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+    return Pose2D(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
 @pytest.fixture

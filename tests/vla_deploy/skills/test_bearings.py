@@ -10,7 +10,7 @@ from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import Announcer, CellReader, ClaimBook, SharedSpace
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
@@ -106,7 +106,7 @@ def test_a_lost_robot_waits_then_turns_on_the_spot_then_says_that_it_is_lost(tol
 
 def test_drive_goals_of_a_lost_robot_move_nothing_forward(told: Told) -> None:
     told.state = PlaceState.LOST
-    goal = FloorPose(x_m=3.0, y_m=2.0, yaw_rad=0.0)
+    goal = Pose2D(x_m=3.0, y_m=2.0, yaw_rad=0.0)
     skill = drive_to(told.context, goal)
     rested = told.run(skill, SEARCH_S)
     assert set(rested) == {(0.0, 0.0)}
@@ -120,7 +120,7 @@ def test_drive_goals_of_a_lost_robot_move_nothing_forward(told: Told) -> None:
 def test_a_robot_that_becomes_unsure_on_the_way_stops_and_gives_up_with_the_reason(
     told: Told,
 ) -> None:
-    skill = drive_to(told.context, FloorPose(x_m=3.0, y_m=2.0, yaw_rad=0.0))
+    skill = drive_to(told.context, Pose2D(x_m=3.0, y_m=2.0, yaw_rad=0.0))
     assert told.run(skill, 2.0)[-1][0] > 0.1
     told.state, told.doubt = PlaceState.UNSURE, Doubt.THROUGH_WALLS
     held = told.run(skill, BLOCKED_TIMEOUT_S)

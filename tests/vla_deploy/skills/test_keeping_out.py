@@ -6,7 +6,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.plans.knowledge import parse_object
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.actions import find
 from vla_deploy.skills.actions.navigate import reach
 from vla_deploy.skills.context import Skill, SkillContext
@@ -33,10 +33,10 @@ def thing(name: str, of: str) -> dict[str, Any]:
 def test_a_search_goes_to_every_other_viewpoint_and_says_what_it_leaves_out(
     context: SkillContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    visited: list[FloorPose] = []
+    visited: list[Pose2D] = []
     said: list[str] = []
 
-    def searched(_: SkillContext, viewpoint: FloorPose, __: object) -> Skill:
+    def searched(_: SkillContext, viewpoint: Pose2D, __: object) -> Skill:
         visited.append(viewpoint)
         yield
 

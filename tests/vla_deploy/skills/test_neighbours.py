@@ -5,7 +5,6 @@ import pytest
 
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.movements.frames import to_map
 from vla_deploy.skills.movements.neighbours import crowding_m
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ CUP_SIZE_M = (0.08, 0.08, 0.10)
 def thing(
     standing: "StandingLink", at_m: tuple[float, float, float], kind: str, size_m: Any
 ) -> dict[str, Any]:
-    position = (*to_map(standing.pose, at_m[0], at_m[1]), at_m[2])
+    position = (*standing.pose.outward(at_m[0], at_m[1]), at_m[2])
     return {"id": kind, "class": kind, "position_m": position, "size_m": list(size_m)}
 
 

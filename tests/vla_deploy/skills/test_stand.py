@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.stand import SIDE_M, standing_poses
-from vla_deploy.world.reach import REACH_M
+from vla_deploy.world.access import REACH_M
 
 if TYPE_CHECKING:
     from conftest import StandingLink

@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.movements.frames import to_map
 from vla_deploy.skills.movements.surfaces import APART_M, EDGE_M, free_spots, spots_beside
 from vla_deploy.world.document import read_thing
 from vla_deploy.world.relations import is_next_to
@@ -23,7 +22,7 @@ def test_spots_lie_on_the_surface_away_from_its_edge(
     assert spots
     for x_m, y_m, height_m in spots:
         assert height_m == 0.45
-        assert to_map(standing.pose, x_m, y_m)[0] >= 1.35 + EDGE_M
+        assert standing.pose.outward(x_m, y_m)[0] >= 1.35 + EDGE_M
 
 
 def test_a_hand_begins_on_its_own_side(context: SkillContext, standing: "StandingLink") -> None:
@@ -46,7 +45,7 @@ def test_spots_keep_apart_from_the_outlines_of_things(
     spots = free_spots(context, "left")
     assert spots
     for x_m, y_m, _ in spots:
-        spot = to_map(standing.pose, x_m, y_m)
+        spot = standing.pose.outward(x_m, y_m)
         assert math.dist(spot, (1.44, 2.10)) > size_m / 2 + APART_M
 
 
@@ -78,7 +77,7 @@ def test_what_is_put_beside_a_thing_stands_next_to_it(
 
     assert len(spots) >= 8
     for x_m, y_m, height_m in spots:
-        spot = [*to_map(standing.pose, x_m, y_m), height_m + 0.05]
+        spot = [*standing.pose.outward(x_m, y_m), height_m + 0.05]
         put = read_thing({**thing("can", 0.06), "id": "can_1", "position_m": spot})
         assert is_next_to(put, anchor)
 
@@ -93,7 +92,7 @@ def test_beside_means_on_the_same_surface_and_apart_from_others(
     other = {**thing("can", 0.08), "position_m": [1.44, 2.28, 0.5]}
     standing.objects.append(other)
     for x_m, y_m, _ in spots_beside(context, "left", standing.objects[0]):
-        spot = to_map(standing.pose, x_m, y_m)
+        spot = standing.pose.outward(x_m, y_m)
         assert math.dist(spot, (1.44, 2.28)) > 0.04 + APART_M
 
 

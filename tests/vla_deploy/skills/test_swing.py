@@ -3,7 +3,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.movements.frames import to_map
 from vla_deploy.skills.movements.swing import MARGIN_M, heights_above
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ BELOW_M = 0.05
 def thing(
     standing: "StandingLink", x_m: float, y_m: float, top_m: float, kind: str = "bottle"
 ) -> dict[str, Any]:
-    position = (*to_map(standing.pose, x_m, y_m), top_m - 0.09)
+    position = (*standing.pose.outward(x_m, y_m), top_m - 0.09)
     return {"class": kind, "position_m": position, "size_m": [0.06, 0.06, 0.18]}
 
 

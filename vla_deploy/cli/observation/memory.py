@@ -12,8 +12,7 @@ from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import base_of
 from vla_deploy.memory import Episode, MemoryStore
-from vla_deploy.memory.episode import unix_s
-from vla_deploy.memory.wording import place_words, sentence_of
+from vla_deploy.memory.episode import place_words, sentence_of, unix_s
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "list": "  vla-deploy memory list\n",

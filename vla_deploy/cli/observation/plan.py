@@ -23,7 +23,7 @@ from vla_deploy.planning.understanding import Conversation
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Snapshot, read_snapshot
-from vla_deploy.world.report import read_report
+from vla_deploy.world.document import read_report
 
 EXAMPLES: Final = """  vla-deploy plan "pick up the red cup and put it in the box"
   vla-deploy plan "bring me the bottle" --scene scene.json --json

@@ -7,11 +7,11 @@ from typing import Any
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import RobotSession, attach
-from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.knowledge import match_place, spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot
-from vla_deploy.world.report import report as report_on
+from vla_deploy.world.document import report as report_on
 from vla_deploy.world.surfaces import furniture_points
 
 EXAMPLES = """  vla-deploy scene

@@ -4,7 +4,6 @@ An image is encoded once for all clients. Pose and joints are the newest ones, u
 than the image: while the head turns, boxes run ahead of it.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,6 +19,7 @@ from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.kinematic_tree import KinematicTree
+from vla_deploy.robots.kinematics.orientation import yaw_rotation
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Detections:
         base_from_camera = self._tree.site_pose(camera.site, values) @ camera.site_from_camera
         x_m, y_m, yaw_rad = (float(pose.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
         map_from_base = np.eye(4)
-        map_from_base[:3, :3] = _turned(yaw_rad)
+        map_from_base[:3, :3] = yaw_rotation(yaw_rad)
         map_from_base[:2, 3] = x_m, y_m
         inverse: Array = np.asarray(np.linalg.inv(map_from_base @ base_from_camera), np.float64)
         return inverse
@@ -85,7 +85,7 @@ def _cuboids(scene: Mapping[str, Any], stamp_ns: int) -> Iterator[tuple[dict[str
     for thing in scene.get("objects", ()):
         if abs(stamp_ns - thing["last_seen_ns"]) <= SEEN_NS:
             names = {key: thing[key] for key in ("id", "class", "colour", "confidence")}
-            turned = _CORNERS * thing["size_m"] @ _turned(thing.get("yaw_rad", 0.0)).T
+            turned = _CORNERS * thing["size_m"] @ yaw_rotation(thing.get("yaw_rad", 0.0)).T
             yield names, turned + thing["position_m"]
     if abs(stamp_ns - scene.get("stamp_ns", 0)) > SEEN_NS:
         return
@@ -98,11 +98,6 @@ def _standing(position_m: Sequence[float], width_m: float, top_m: float) -> Arra
     corners: Array = _CORNERS * (width_m, width_m, top_m)
     middle: Array = np.array((position_m[0], position_m[1], top_m / 2))
     return corners + middle
-
-
-def _turned(yaw_rad: float) -> Array:
-    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
-    return np.array(((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

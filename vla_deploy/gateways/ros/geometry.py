@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.ipc import Sample
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
 from vla_deploy.robots.kinematics.orientation import matrix
 

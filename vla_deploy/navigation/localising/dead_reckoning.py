@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.follower import wrap_angle
-from vla_deploy.navigation.pose import ORIGIN, Points, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D, wrap_angle
 
 Floats = NDArray[np.float64]
 

@@ -11,19 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.client.place_state import Doubt, PlaceState
-from vla_deploy.navigation.localising.beams import placed_beams
-from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
-from vla_deploy.navigation.localising.hypotheses import Relocaliser
 from vla_deploy.navigation.localising.place_judge import (
     MATCH_RATIO,
     THROUGH_RATIO,
     PlaceJudge,
-    ScanVerdict,
 )
 from vla_deploy.navigation.localising.pose_filter import GATE, PoseFilter
-from vla_deploy.navigation.localising.scan_match import MIN_POINTS, Match, ScanPoints, fit
+from vla_deploy.navigation.localising.relocalisation import Relocaliser
+from vla_deploy.navigation.localising.scan import ScanPoints, placed_beams
+from vla_deploy.navigation.localising.scan_match import MIN_POINTS, Match, fit
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.maps.grid_map import GridMap
 
 # However often it is measured, no pose is better known than the map is drawn.
@@ -53,7 +51,6 @@ class Localiser:
         self.match_ratio = 0.0
         self._lidar = lidar or ORIGIN
         self._field = DistanceField.of(grid)
-        self._track = DeadReckoning()
         self._filter = PoseFilter(start)
         self._judge = PlaceJudge()
         self._relocaliser = Relocaliser(self._field)
@@ -87,42 +84,33 @@ class Localiser:
         """Return whether scans have borne out a place since the start, or since it was lost."""
         return self._judge.is_anchored
 
-    @property
-    def track_pose(self) -> Pose2D:
-        """Return the dead-reckoned pose, which drifts but never jumps."""
-        return self._track.pose
-
     def pose_at(self, stamp_ns: int) -> Pose2D:
         """Return where the base was; the nearest known moment where `stamp_ns` is out of range."""
-        return self._map_from_track().compose(self._track.at(stamp_ns))
+        return self._filter.pose_at(stamp_ns)
 
     def track_at(self, stamp_ns: int) -> Pose2D:
         """Return where the base was by dead reckoning alone, which drifts but never jumps."""
-        return self._track.at(stamp_ns)
+        return self._filter.track.at(stamp_ns)
 
-    def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> Pose2D:
-        """Move by what wheels (way) and IMU (turn) say since the last call; return the pose.
-
-        Without an IMU the wheels' turn is taken.
-        """
-        self._filter.predict(self._track.move(stamp_ns, odometry, imu_yaw_rad))
+    def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> None:
+        """Move by what wheels and IMU say since the last call, and search while lost."""
+        self._filter.predict(stamp_ns, odometry, imu_yaw_rad)
         self._judge.pass_time(stamp_ns, self._filter.sigma_m, self._filter.sigma_rad)
         if self.state is PlaceState.LOST:
             self._relocaliser.work()
-        return self.pose
 
     def correct(self, range_m: NDArray[np.float32], beam_stamp_ns: NDArray[np.int64]) -> bool:
-        """Pull the pose towards where the scan fits the map; tell whether it was used."""
+        """Pull the pose towards where the scan fits the map; return whether it was used."""
         stamp_ns = int(beam_stamp_ns.max(initial=0))
-        scan = placed_beams(self._track, self._lidar, range_m, beam_stamp_ns)
+        scan = placed_beams(self._filter.track, self._lidar, range_m, beam_stamp_ns)
         if len(scan) < MIN_POINTS or self._is_frozen(range_m):
             self.match_ratio = 0.0
-            self._tell(stamp_ns, Doubt.NO_SCAN)
+            self._judge_scan(stamp_ns, Doubt.NO_SCAN)
             return False
         if self.state is PlaceState.LOST:
             self._search(stamp_ns, scan)
             return False
-        match = fit(self._field, scan.placed(self._map_from_track()), self.pose)
+        match = fit(self._field, scan.placed(self._filter.map_from_track), self.pose)
         self.match_ratio = match.match_ratio
         noise = match.covariance + self._timing_covariance()
         doubt = self._doubt_of(match, noise)
@@ -130,12 +118,12 @@ class Localiser:
             if self._is_astray(float(match.shift[2])):
                 self._filter.doubt(match.shift)
             self._filter.correct(match.shift, noise)
-        self._tell(stamp_ns, doubt)
+        self._judge_scan(stamp_ns, doubt)
         return doubt is Doubt.NONE
 
     def _timing_covariance(self) -> NDArray[np.float64]:
         """Return what uncertain stamps of the beams make of a scan that is taken in motion."""
-        speed_m_s, rate_rad_s = self._track.speed()
+        speed_m_s, rate_rad_s = self._filter.track.speed()
         way_m, turn_rad = BEAM_TIMING_S * speed_m_s, BEAM_TIMING_S * rate_rad_s
         return np.diag((way_m**2, way_m**2, turn_rad**2))
 
@@ -156,7 +144,7 @@ class Localiser:
         return Doubt.INCONSISTENT
 
     def _is_astray(self, turn_rad: float) -> bool:
-        """Take by how much a scan turns the pose; tell whether the last ones did so one way."""
+        """Take by how much a scan turns the pose; return whether the last ones did so one way."""
         self._turns.append(turn_rad)
         low, high = min(self._turns), max(self._turns)
         far = low > ASTRAY_RAD or high < -ASTRAY_RAD
@@ -164,7 +152,7 @@ class Localiser:
 
     def _search(self, stamp_ns: int, scan: ScanPoints) -> None:
         """Look for the place that a lost robot's scans fit."""
-        found = self._relocaliser.take(scan, self._track.pose)
+        found = self._relocaliser.take(scan, self._filter.track.pose)
         self._judge.search_found(self._relocaliser.places)
         if found is None:
             return
@@ -174,15 +162,9 @@ class Localiser:
         self._relocaliser.reset()
         self._unexpected = 0
 
-    def _tell(self, stamp_ns: int, doubt: Doubt) -> None:
+    def _judge_scan(self, stamp_ns: int, doubt: Doubt) -> None:
         sigma_m, sigma_rad = self._filter.sigma_m, self._filter.sigma_rad
-        verdict = ScanVerdict(
-            doubt=doubt, match_ratio=self.match_ratio, sigma_m=sigma_m, sigma_rad=sigma_rad
-        )
-        self._judge.take(stamp_ns, verdict)
-
-    def _map_from_track(self) -> Pose2D:
-        return self.pose.compose(ORIGIN.relative_to(self._track.pose))
+        self._judge.take(stamp_ns, doubt, self.match_ratio, sigma_m, sigma_rad)
 
     def _is_frozen(self, range_m: NDArray[np.float32]) -> bool:
         same = self._last_ranges is not None and np.array_equal(self._last_ranges, range_m)

@@ -3,7 +3,6 @@
 The judge is pure: it takes one fact at a time and has no clock of its own.
 """
 
-from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
@@ -22,16 +21,6 @@ UNSURE_SIGMA_RAD: Final = 0.15
 LOST_SIGMA_M: Final = 0.6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScanVerdict:
-    """Hold what a scan says of the pose: the doubt that it casts, or none, and how well it fits."""
-
-    doubt: Doubt
-    match_ratio: float
-    sigma_m: float
-    sigma_rad: float
-
-
 class PlaceJudge:
     """Follow the verdicts with hysteresis."""
 
@@ -45,18 +34,20 @@ class PlaceJudge:
         self._weak = 0
         self._good_ns: int | None = None
 
-    def take(self, stamp_ns: int, verdict: ScanVerdict) -> None:
-        """Take in what a scan says."""
-        if verdict.doubt is Doubt.NO_SCAN:
-            self.pass_time(stamp_ns, verdict.sigma_m, verdict.sigma_rad)
+    def take(
+        self, stamp_ns: int, doubt: Doubt, match_ratio: float, sigma_m: float, sigma_rad: float
+    ) -> None:
+        """Take in what a scan says of the pose: the doubt that it casts, and how well it fits."""
+        if doubt is Doubt.NO_SCAN:
+            self.pass_time(stamp_ns, sigma_m, sigma_rad)
             return
-        if verdict.doubt is not Doubt.NONE:
+        if doubt is not Doubt.NONE:
             self._good, self._bad = 0, self._bad + 1
-            self._take_bad(verdict.doubt)
+            self._take_bad(doubt)
             return
-        fits_well = verdict.match_ratio >= SURE_RATIO
+        fits_well = match_ratio >= SURE_RATIO
         self._good, self._bad, self._good_ns = self._good + 1 if fits_well else 0, 0, stamp_ns
-        certain = verdict.sigma_m < UNSURE_SIGMA_M and verdict.sigma_rad < UNSURE_SIGMA_RAD
+        certain = sigma_m < UNSURE_SIGMA_M and sigma_rad < UNSURE_SIGMA_RAD
         self._weak = 0 if fits_well else self._weak + 1
         if self.state is not PlaceState.UNSURE:
             return
@@ -66,7 +57,7 @@ class PlaceJudge:
             self.doubt, self.is_anchored = Doubt.POOR_MATCH, True  # it fits no other place better
 
     def pass_time(self, now_ns: int, sigma_m: float, sigma_rad: float) -> None:
-        """Return what is known when no scan says anything."""
+        """Take in that time has passed, in which the pose may have become unsure."""
         if self._good_ns is None:
             self._good_ns = now_ns
         if self.state is PlaceState.TRACKING and now_ns - self._good_ns > SILENT_NS:
@@ -95,7 +86,7 @@ class PlaceJudge:
             self._fall(PlaceState.LOST, doubt)
         elif self._bad >= UNSURE_AFTER_SCANS:
             keeps = self.state is PlaceState.UNSURE and self.doubt is Doubt.FOUND_AGAIN
-            bad, self._bad = self._bad, 0
+            bad = self._bad
             self._fall(PlaceState.LOST if keeps else PlaceState.UNSURE, doubt)
             self._bad = bad
 

@@ -9,9 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
-from vla_deploy.navigation.localising.dead_reckoning import OdometryStep
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D, wrap_angle
 
 Floats = NDArray[np.float64]
 
@@ -25,10 +24,11 @@ GATE: Final = 26.0
 
 
 class PoseFilter:
-    """Hold the estimate and its covariance."""
+    """Hold the estimate and its covariance, and the dead-reckoned track that carries it on."""
 
     def __init__(self, pose: Pose2D) -> None:
         self.pose = pose
+        self.track = DeadReckoning()
         self.drift_rad_s = 0.0
         self._p = np.diag((START_SIGMA_M**2, START_SIGMA_M**2, START_SIGMA_RAD**2, 0.0))
         self._p[3, 3] = DRIFT_SIGMA_RAD_S**2
@@ -48,8 +48,21 @@ class PoseFilter:
         """Return the standard deviation of the heading."""
         return math.sqrt(max(0.0, float(self._p[2, 2])))
 
-    def predict(self, step: OdometryStep) -> None:
-        """Move by a dead-reckoned step."""
+    @property
+    def map_from_track(self) -> Pose2D:
+        """Return where the dead-reckoned frame lies on the map now."""
+        return self.pose.compose(ORIGIN.relative_to(self.track.pose))
+
+    def pose_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the base was; the nearest known moment where `stamp_ns` is out of range."""
+        return self.map_from_track.compose(self.track.at(stamp_ns))
+
+    def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> None:
+        """Move by what wheels (way) and IMU (turn) say since the last call.
+
+        Without an IMU the wheels' turn is taken.
+        """
+        step = self.track.move(stamp_ns, odometry, imu_yaw_rad)
         drift_rad = self.drift_rad_s * step.duration_s if step.by_imu else 0.0
         motion = Pose2D(step.motion.x_m, step.motion.y_m, step.motion.yaw_rad - drift_rad)
         before, self.pose = self.pose, self.pose.compose(motion)

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
+from vla_deploy.navigation.localising.scan import ScanPoints
 from vla_deploy.navigation.maps.distance_field import DistanceField
-from vla_deploy.navigation.pose import Points, Pose2D
+from vla_deploy.robots.floor_pose import Points, Pose2D, wrap_angle
 
 Floats = NDArray[np.float64]
 
@@ -31,21 +31,6 @@ LEAST_RESIDUAL_M: Final = 0.015
 # What a scan says nothing about is known to the basin of the match at best.
 BASIN_M: Final = 0.5
 BASIN_RAD: Final = 0.35
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ScanPoints:
-    """Hold where each beam of a scan started and what it met, (n, 2) each, in one frame."""
-
-    starts: Points
-    ends: Points
-
-    def __len__(self) -> int:
-        return len(self.ends)
-
-    def placed(self, frame: Pose2D) -> "ScanPoints":
-        """Return them in the frame that `frame` is given in."""
-        return ScanPoints(frame.place(self.starts), frame.place(self.ends))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,9 +76,7 @@ def fit(field: DistanceField, scan: ScanPoints, pose: Pose2D) -> Match:
 
 def through_ratio(field: DistanceField, scan: ScanPoints) -> float:
     """Return the share of beams that end well behind a wall of the map."""
-    ways = scan.ends - scan.starts
-    length_m = np.hypot(ways[:, 0], ways[:, 1])
-    directions = ways / np.maximum(length_m, 1e-9)[:, None]
+    directions, length_m = scan.beams()
     free_m = field.cast(scan.starts, directions, length_m)
     return float(np.mean(free_m < length_m - THROUGH_M))
 

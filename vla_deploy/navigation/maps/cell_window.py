@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.pose import Points
 from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.floor_pose import Points
 
 Cells = NDArray[np.float32]
 

@@ -1,16 +1,25 @@
 """Know the distance to the nearest wall everywhere, to match scans with it and to cast rays."""
 
+from typing import Final
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.pose import Points
+from vla_deploy.navigation.localising.scan import ScanPoints
+from vla_deploy.navigation.maps.cell_window import CellWindow
+from vla_deploy.robots.floor_pose import Points
 from vla_deploy.robots.maps.grid_map import GridMap
 
 Floats = NDArray[np.float64]
 
-_MAX_STRIDES = 64
-_LONGEST_STRIDE_M = 1.0
+_MAX_STRIDES: Final = 64
+_LONGEST_STRIDE_M: Final = 1.0
+# Known before the surface and, less far, behind it: walls are thin, and seen from both sides.
+BEFORE_M: Final = 0.25
+BEHIND_M: Final = 0.06
+MOST_WEIGHT: Final = 200.0
+FIELD, WEIGHT = "field", "weight"
 
 
 class DistanceField:
@@ -77,3 +86,52 @@ class DistanceField:
             # The point may lie nearer to the wall than the middle of its cell.
             travelled_m[going] += np.clip(near_m[on] - least_m, least_m, _LONGEST_STRIDE_M)
         return np.minimum(travelled_m, reach_m)
+
+
+class SurfaceField:
+    """Grow a field from scans, exact to a fraction of a cell.
+
+    An occupancy grid knows a wall to its cell only; here each cell keeps the mean of what all beams
+    said of its distance to the surface, and the surface lies where that is zero. Unknown cells are
+    as far from a surface as the field can hold.
+    """
+
+    def __init__(self, resolution_m: float) -> None:
+        self._window = CellWindow(resolution_m, {FIELD: BEFORE_M, WEIGHT: 0.0})
+
+    @property
+    def field(self) -> DistanceField:
+        """Return the field as scans are matched with it."""
+        window = self._window
+        return DistanceField(window.layers[FIELD], window.resolution_m, window.origin_m)
+
+    def add(self, scan: ScanPoints) -> None:
+        """Take in a scan in the map frame; its points must be in the order of the beams."""
+        resolution_m = self._window.resolution_m
+        beams, _ = scan.beams()
+        slant = np.clip((beams * scan.surface_normals()).sum(axis=1), 0.1, 1.0)
+        offsets_m = np.arange(-BEFORE_M, BEHIND_M + 1e-9, 0.5 * resolution_m)
+        points = (scan.ends[:, None] + offsets_m[None, :, None] * beams[:, None]).reshape(-1, 2)
+        distance_m = (-offsets_m[None, :] * slant[:, None]).ravel()
+        self._window.cover(points)
+        self._average(points, distance_m)
+
+    def is_known(self, points: Points) -> NDArray[np.bool_]:
+        """Return at which of (n, 2) points the field knows a surface near."""
+        window = self._window
+        if not window.shape[0]:
+            return np.zeros(len(points), dtype=np.bool_)
+        weight = DistanceField(window.layers[WEIGHT], window.resolution_m, window.origin_m)
+        known = weight.nearest(points)
+        return np.asarray((known > 0.0) & np.isfinite(known))
+
+    def _average(self, points: Points, distance_m: Floats) -> None:
+        window = self._window
+        index, size = window.flat_index(points), window.shape[0] * window.shape[1]
+        count = np.bincount(index, minlength=size)
+        total = np.bincount(index, weights=distance_m, minlength=size)
+        field, weight = window.layers[FIELD].ravel(), window.layers[WEIGHT].ravel()
+        seen = np.flatnonzero(count)
+        mean = total[seen] / count[seen]
+        field[seen] = (field[seen] * weight[seen] + mean) / (weight[seen] + 1.0)
+        weight[seen] = np.minimum(weight[seen] + 1.0, MOST_WEIGHT)

@@ -5,11 +5,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vla_deploy.navigation.maps.zones import with_zones
 from vla_deploy.navigation.path_planning import clearance_of
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.maps.grid_map import grid_of
+from vla_deploy.robots.maps.grid_map import grid_of, with_zones
 from vla_deploy.robots.maps.map_file import UNKNOWN_SHADE, MapFile
 
 
@@ -38,10 +36,8 @@ def check_for_robot(file: MapFile, robot: RobotDescription) -> tuple[dict[str, A
     grid = with_zones(grid_of(file), robot.home.zones)
     fits = clearance_of(grid) >= robot.base.footprint_radius_m
     _, parts = cv2.connectedComponents(fits.astype(np.uint8), connectivity=8)
-    start = robot.start_pose
-    poses = {"the start pose": Pose2D(start.x_m, start.y_m, start.yaw_rad)} | {
-        f"place {name}": Pose2D(place.pose.x_m, place.pose.y_m, place.pose.yaw_rad)
-        for name, place in robot.places.items()
+    poses = {"the start pose": robot.start_pose} | {
+        f"place {name}": place.pose for name, place in robot.places.items()
     }
     found = {name: _part(parts, grid.world_to_cell(p.x_m, p.y_m)) for name, p in poses.items()}
     home = found["the start pose"]

@@ -9,13 +9,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.localising.beams import placed_beams
-from vla_deploy.navigation.localising.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.localising.pose_filter import GATE, PoseFilter
-from vla_deploy.navigation.localising.scan_match import MIN_POINTS, ScanPoints, fit
+from vla_deploy.navigation.localising.scan import ScanPoints, placed_beams
+from vla_deploy.navigation.localising.scan_match import MIN_POINTS, fit
+from vla_deploy.navigation.maps.distance_field import SurfaceField
 from vla_deploy.navigation.maps.occupancy import OccupancyGrid
-from vla_deploy.navigation.maps.surface_field import SurfaceField
-from vla_deploy.navigation.pose import ORIGIN, Points, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Points, Pose2D
 
 # A scan is added when the robot has moved so far since the last one.
 KEY_WAY_M: Final = 0.4
@@ -38,7 +37,6 @@ class Mapper:
         self.scans = 0
         self.refused = 0
         self._lidar = lidar
-        self._track = DeadReckoning()
         self._filter = PoseFilter(start)
         self._filter.start_anew(start, np.zeros((3, 3)))
         self._surface = SurfaceField(resolution_m)
@@ -56,26 +54,26 @@ class Mapper:
 
     def pose_at(self, stamp_ns: int) -> Pose2D:
         """Return where the base was at a moment of the last seconds."""
-        return self._map_from_track().compose(self._track.at(stamp_ns))
+        return self._filter.pose_at(stamp_ns)
 
     def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> None:
         """Move by what wheels and IMU say since the last call."""
-        self._filter.predict(self._track.move(stamp_ns, odometry, imu_yaw_rad))
+        self._filter.predict(stamp_ns, odometry, imu_yaw_rad)
 
     def add_scan(self, range_m: NDArray[np.float32], beam_stamp_ns: NDArray[np.int64]) -> bool:
-        """Match a scan and add it to the map; tell whether it was used.
+        """Match a scan and add it to the map; return whether it was used.
 
         Raises:
             MapInvalid: the map has grown beyond every flat.
         """
-        scan = placed_beams(self._track, self._lidar, range_m, beam_stamp_ns)
+        scan = placed_beams(self._filter.track, self._lidar, range_m, beam_stamp_ns)
         if len(scan) < MIN_POINTS or not self._match(scan):
             self.refused += 1
             return False
         self.scans += 1
         if self._is_key():
             self._key = self.pose
-            on_map = scan.placed(self._map_from_track())
+            on_map = scan.placed(self._filter.map_from_track)
             self._surface.add(on_map)
             self.grid.add_scan(on_map)
         return True
@@ -93,7 +91,7 @@ class Mapper:
         """Correct the pose by the part of a scan that shows what is on the map already."""
         if self.scans < FIRST_SCANS:
             return True
-        on_map = scan.placed(self._map_from_track())
+        on_map = scan.placed(self._filter.map_from_track)
         known = self._surface.is_known(on_map.ends)
         if np.count_nonzero(known) < max(MIN_POINTS, KNOWN_RATIO * len(scan)):
             return False
@@ -112,6 +110,3 @@ class Mapper:
             return True
         moved = self.pose.distance_m(self._key) > KEY_WAY_M
         return moved or self.pose.turn_rad(self._key) > KEY_TURN_RAD
-
-    def _map_from_track(self) -> Pose2D:
-        return self.pose.compose(ORIGIN.relative_to(self._track.pose))

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.localising.scan_match import ScanPoints
+from vla_deploy.navigation.localising.scan import ScanPoints
 from vla_deploy.navigation.maps.cell_window import CellWindow
-from vla_deploy.navigation.pose import Points
+from vla_deploy.robots.floor_pose import Points
 from vla_deploy.robots.maps.map_file import (
     FREE_SHADE,
     LOW_SHADE,
@@ -20,8 +20,6 @@ from vla_deploy.robots.maps.map_file import (
     MapFile,
 )
 
-Floats = NDArray[np.float64]
-
 HIT: Final = 0.85
 MISS: Final = -0.4
 MOST: Final = 6.0
@@ -29,8 +27,6 @@ OCCUPIED: Final = 0.6
 FREE: Final = -0.7
 # Samples along a beam, in cells.
 STRIDE: Final = 0.5
-# Neighbouring beams that end this near to each other show one surface.
-NEIGHBOUR_M: Final = 0.35
 LIDAR, DEPTH = "lidar", "depth"
 
 
@@ -46,7 +42,7 @@ class OccupancyGrid:
             return
         # What is seen begins at the beam's end and goes on behind it: a cell counts as occupied
         # where its middle is, as maps are drawn.
-        inside = scan.ends + 0.5 * self.window.resolution_m * surface_normals(scan)
+        inside = scan.ends + 0.5 * self.window.resolution_m * scan.surface_normals()
         crossed = self._crossed(scan)
         self.window.cover(np.vstack((inside, crossed)))
         self._vote(LIDAR, hits=inside, misses=crossed)
@@ -97,9 +93,7 @@ class OccupancyGrid:
     def _crossed(self, scan: ScanPoints) -> Points:
         """Return points along all beams, up to the cell before their ends."""
         resolution_m = self.window.resolution_m
-        ways = scan.ends - scan.starts
-        length_m = np.hypot(ways[:, 0], ways[:, 1])
-        directions = ways / np.maximum(length_m, 1e-9)[:, None]
+        directions, length_m = scan.beams()
         free_m = np.maximum(0.0, length_m - 0.75 * resolution_m)
         counts = np.ceil(free_m / (STRIDE * resolution_m)).astype(np.intp)
         beam = np.repeat(np.arange(len(counts)), counts)
@@ -107,16 +101,3 @@ class OccupancyGrid:
         way_m = number * (STRIDE * resolution_m)
         crossed: Points = scan.starts[beam] + way_m[:, None] * directions[beam]
         return crossed
-
-
-def surface_normals(scan: ScanPoints) -> Points:
-    """Return, for each point, the direction into the surface; the beam's where it stands alone."""
-    ways = scan.ends - scan.starts
-    beams = ways / np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-9)[:, None]
-    along = np.roll(scan.ends, -1, axis=0) - np.roll(scan.ends, 1, axis=0)
-    length_m = np.hypot(along[:, 0], along[:, 1])
-    steps = np.hypot(*(np.roll(scan.ends, -1, axis=0) - scan.ends).T)
-    joined = (steps < NEIGHBOUR_M) & (np.roll(steps, 1) < NEIGHBOUR_M) & (length_m > 1e-6)
-    normal = np.column_stack((-along[:, 1], along[:, 0])) / np.maximum(length_m, 1e-9)[:, None]
-    normal *= np.sign((normal * beams).sum(axis=1))[:, None]
-    return np.where(joined[:, None], normal, beams)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.lens import ray_table
+from vla_deploy.robots.floor_pose import Pose2D
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -23,6 +23,7 @@ AIM_SIGMA_RAD = 0.0005
 # How well stamps of images and joints agree: a camera that turns meanwhile looks elsewhere.
 STAMP_SIGMA_S = 0.004
 SMOOTHING_PX = 3
+SPARSE_PX = 3
 UPRIGHT = 0.9
 EDGE_RATIO = 0.15
 
@@ -103,6 +104,29 @@ def make_cloud(
         base_from_camera=base_from_camera,
         aim_sigma_rad=aim_sigma_rad,
     )
+
+
+def sparse_points(
+    depth_m: Floats,
+    camera: Intrinsics,
+    base_from_camera: NDArray[np.float64],
+    body: Mask,
+    *,
+    within_m: tuple[float, float],
+) -> NDArray[np.float64]:
+    """Return the points (n, 3), in the base frame, of every third pixel of every third row.
+
+    Those of the robot's own `body`, and those whose depth is out of bounds, are left out.
+    """
+    some = (slice(None, None, SPARSE_PX), slice(None, None, SPARSE_PX))
+    near_m, far_m = within_m
+    depth = depth_m[some].astype(np.float64)
+    rows, columns = np.nonzero((depth > near_m) & (depth < far_m) & ~body[some])
+    z = depth[rows, columns]
+    x, y = ray_table(camera)[some][rows, columns].T * z
+    rotation, origin = base_from_camera[:3, :3], base_from_camera[:3, 3]
+    points: NDArray[np.float64] = np.column_stack((x, y, z)) @ rotation.T + origin
+    return points
 
 
 def _back_project(

@@ -12,7 +12,8 @@ from vla_deploy.perception.geometry.clusters import (
     split_apart,
     split_by_colour,
 )
-from vla_deploy.perception.geometry.placement import place
+from vla_deploy.perception.geometry.placement import Matrix, place
+from vla_deploy.perception.geometry.placement import Vector as Vector
 from vla_deploy.perception.geometry.shapes import (
     MeasuredShape,
     Rectangle,
@@ -20,10 +21,6 @@ from vla_deploy.perception.geometry.shapes import (
     measure,
 )
 from vla_deploy.perception.geometry.supports import Support
-from vla_deploy.perception.geometry.uncertainty import (
-    Matrix,
-)
-from vla_deploy.perception.geometry.uncertainty import Vector as Vector
 from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.perception.naming.class_fusion import Name, NameSource, fuse_name, name_by_form
 from vla_deploy.perception.naming.classes import OTHER, Form, judge_form

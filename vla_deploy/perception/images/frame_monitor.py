@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import Floats
-from vla_deploy.perception.geometry.rotation import angle_rad
 from vla_deploy.perception.images.frame_check import (
     STALE_COLOUR_RATIO,
     ImageUse,
@@ -23,6 +21,8 @@ from vla_deploy.perception.images.frame_statistics import (
     FrameStatistics,
     measure_frame,
 )
+from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.kinematics.orientation import angle_rad
 
 VIEW_DISTANCE_M: Final = 3.0
 """Driving by one metre changes the view as turning by one over this does."""

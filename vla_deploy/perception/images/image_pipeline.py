@@ -11,7 +11,6 @@ from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
-from vla_deploy.perception.geometry.rotation import angle_rad
 from vla_deploy.perception.images.detector_worker import DetectorWorker
 from vla_deploy.perception.images.frame_check import ImageUse
 from vla_deploy.perception.images.frame_monitor import FrameMonitor
@@ -19,6 +18,7 @@ from vla_deploy.perception.images.network_view import as_pinhole, to_camera_imag
 from vla_deploy.perception.objects.body_state import Array, BodyState
 from vla_deploy.perception.objects.near_obstacles import NearObstacles
 from vla_deploy.perception.objects.scene import Scene
+from vla_deploy.robots.kinematics.orientation import angle_rad
 from vla_deploy.world.surfaces import Point
 
 # Things are placed by images before whose exposure the camera was nearly still.

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.cloud import Cloud, Floats
 from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.perception.naming.classes import BYSTANDERS, Range
+from vla_deploy.robots.floor_pose import Pose2D
 
 LEAST_CHANCE: Final = 0.3
 """Low, because an obstacle too many costs little."""
@@ -72,11 +72,11 @@ def _place(
     if not lowest_m <= top_m <= highest_m or width_m > WIDEST_M:
         return None
     x, y = (float(value) for value in np.median(points[:, :2], axis=0))
-    placed = base.compose(Pose2D(x, y, 0.0))
+    x_m, y_m = base.outward(x, y)
     return Bystander(
         class_name=class_name,
-        x_m=placed.x_m,
-        y_m=placed.y_m,
+        x_m=x_m,
+        y_m=y_m,
         width_m=width_m,
         top_m=top_m,
         confidence=chance,

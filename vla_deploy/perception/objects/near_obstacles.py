@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.cloud import PosedImage
-from vla_deploy.perception.geometry.lens import project, ray_table
-from vla_deploy.perception.geometry.rotation import yaw_rotation
+from vla_deploy.perception.geometry.cloud import PosedImage, sparse_points
+from vla_deploy.perception.geometry.lens import project
+from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.kinematics.orientation import yaw_rotation
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]
 
-STRIDE_PX = 3
 # Lower things are taken for the floor: depth noise, a carpet, the slant of a wheel on its edge.
 LOWEST_M = 0.05
 HIGHEST_M = 1.3
@@ -106,13 +105,13 @@ class NearObstacles:
 
 def _standing(image: PosedImage) -> Array:
     """Return the points between floor and robot's height, of some of the pixels."""
-    some = (slice(None, None, STRIDE_PX), slice(None, None, STRIDE_PX))
-    depth = image.depth_m[some].astype(np.float64)
-    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < SEEN_WITHIN_M) & ~image.body[some])
-    z = depth[rows, columns]
-    x, y = ray_table(image.camera)[some][rows, columns].T * z
-    rotation, origin = image.base_from_camera[:3, :3], image.base_from_camera[:3, 3]
-    points: Array = np.column_stack((x, y, z)) @ rotation.T + origin
+    points = sparse_points(
+        image.depth_m,
+        image.camera,
+        image.base_from_camera,
+        image.body,
+        within_m=(MIN_DEPTH_M, SEEN_WITHIN_M),
+    )
     return points[(points[:, 2] > LOWEST_M) & (points[:, 2] < HIGHEST_M)]
 
 

@@ -3,14 +3,15 @@
 import itertools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.perception.geometry.cloud import PosedImage, make_cloud
+from vla_deploy.perception.geometry.cloud import Cloud, PosedImage, make_cloud
+from vla_deploy.perception.geometry.lens import project
+from vla_deploy.perception.geometry.placement import turned
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.geometry.supports import (
     KnownSurface,
@@ -18,23 +19,32 @@ from vla_deploy.perception.geometry.supports import (
     counter_clockwise,
     find_supports,
 )
-from vla_deploy.perception.geometry.uncertainty import turned
 from vla_deploy.perception.images.detection import Detection, Vector, detect
 from vla_deploy.perception.images.network_view import NetworkView
+from vla_deploy.perception.objects.body_state import Hold
 from vla_deploy.perception.objects.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.objects.filtering import Estimate, covariance_of
-from vla_deploy.perception.objects.hands import Hold
-from vla_deploy.perception.objects.in_view import is_in_clear_view
 from vla_deploy.perception.objects.track import Sighting, Track
 from vla_deploy.perception.objects.tracker import Tracker
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.world.document import read_snapshot
 from vla_deploy.world.resting import BEGIN, LET_GO, RelationBounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
 from vla_deploy.world.thing import Rest, Surface
+from vla_deploy.world.vocabulary import CONTAINERS
 
 # The share of the scene's cell that is for things, the most recently seen first.
 THINGS_BYTES = 25_000
 MAX_LOST = 12
+# Further away a thing may be overlooked.
+CLEAR_RANGE_M = 1.6
+BORDER_PX = 12
+PATCH_PX = 2
+IN_FRONT_M = 0.05
+# What is lower than this shows no nearer than what it lies on.
+FLAT_M = 0.04
+# Over an empty place the camera sees this share of the thing's height further.
+THROUGH_RATIO = 0.25
 
 
 class Scene:
@@ -76,7 +86,9 @@ class Scene:
         in_view = [
             track
             for track in self._tracker.tracks
-            if is_in_clear_view(_local(track, base), track.size_m, cloud, found)
+            if is_in_clear_view(
+                (*base.local(track.position_m), track.position_m[2]), track.size_m, cloud, found
+            )
         ]
         self._tracker.update(sightings, in_view, stamp_ns)
         self.stamp_ns = stamp_ns
@@ -89,10 +101,9 @@ class Scene:
 
         What it has put down rests below it; what it has lost may be anywhere near.
         """
-        placed = base.compose(Pose2D(grip[0], grip[1], 0.0))
         before = held = self._tracker.held_by(hand)
         if hold.kind:
-            grip_m = (placed.x_m, placed.y_m, grip[2])
+            grip_m = (*base.outward(grip[0], grip[1]), grip[2])
             held = self._tracker.carry(hand, hold.kind, grip_m, stamp_ns)
         elif before is not None and hold.is_lost:
             self._tracker.lose(hand, f"the {hand} hand lost it: {hold.cause}")
@@ -122,8 +133,7 @@ class Scene:
     def _surface(self, support: Support, base: Pose2D) -> dict[str, Any]:
         """Return a surface for the scene topic: the part in view, in the map frame."""
         x, y = (float(v) for v in support.outline.mean(axis=0))
-        corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
-        polygon_m = [(corner.x_m, corner.y_m) for corner in corners]
+        polygon_m = [base.outward(float(u), float(v)) for u, v in support.outline]
         height_m = support.height_m(x, y)
         return {
             "name": self._book.look(height_m, polygon_m),
@@ -145,10 +155,9 @@ def _size(documents: list[dict[str, Any]]) -> int:
 def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
     """Return a detection of the base frame as an observation in the map."""
     x, y, z = detection.position_m
-    placed = base.compose(Pose2D(x, y, 0.0))
     on_map = replace(
         detection,
-        position_m=(placed.x_m, placed.y_m, z),
+        position_m=(*base.outward(x, y), z),
         yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
         covariance_m2=turned(detection.covariance_m2, base.yaw_rad),
     )
@@ -159,14 +168,49 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
     return Sighting(on_map, seen)
 
 
-def _local(track: Track, base: Pose2D) -> Vector:
-    """Return a track's place in the base frame."""
-    x_m, y_m, z_m = track.position_m
-    local = Pose2D(x_m, y_m, 0.0).relative_to(base)
-    return local.x_m, local.y_m, z_m
-
-
 def _known(surface: Surface, base: Pose2D) -> KnownSurface:
-    corners = [Pose2D(x_m, y_m, 0.0).relative_to(base) for x_m, y_m in surface.polygon_m]
-    outline = np.array([(corner.x_m, corner.y_m) for corner in corners], dtype=np.float32)
+    outline = np.array([base.local(corner) for corner in surface.polygon_m], dtype=np.float32)
     return KnownSurface(height_m=surface.height_m, outline=counter_clockwise(outline))
+
+
+def is_in_clear_view(
+    place: Vector, size_m: Vector, cloud: Cloud, found: Sequence[Detection]
+) -> bool:
+    """Return whether an image shows a thing's place (base frame) with nothing in front of it.
+
+    Where something stands that no detection explains, it may well be the thing: its place is not in
+    clear view then. Neither is one out of the image or too far away.
+    """
+    camera = cloud.camera
+    x, y, z = cloud.base_from_camera[:3, :3].T @ (np.array(place) - cloud.camera_position)
+    if not 0.2 < z < CLEAR_RANGE_M:
+        return False
+    half = math.ceil(0.5 * camera.fx * max(size_m) / z)
+    border = BORDER_PX + half
+    u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
+    if not (border <= u < camera.width - border and border <= v < camera.height - border):
+        return False
+    around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
+    patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
+    if cloud.own_body[around].any() or not cloud.valid[patch].all():
+        return False
+    depth_m = float(np.median(cloud.depth_m[patch]))
+    is_hidden = depth_m < z - 0.5 * max(size_m) - IN_FRONT_M
+    return not (is_hidden or _is_unexplained(depth_m - z, place, size_m, found))
+
+
+def _is_unexplained(
+    beyond_m: float, place: Vector, size_m: Vector, found: Sequence[Detection]
+) -> bool:
+    """Return whether something is where a thing was that no detection explains.
+
+    A box around the place explains nothing: the thing may stand in it.
+    """
+    height_m = size_m[2]
+    if height_m < FLAT_M or beyond_m > THROUGH_RATIO * height_m:
+        return False
+    return not any(
+        math.dist(one.position_m[:2], place[:2]) < 0.5 * (max(one.size_m[:2]) + min(size_m[:2]))
+        for one in found
+        if one.class_name not in CONTAINERS or max(one.size_m[:2]) < 2.0 * max(size_m[:2])
+    )

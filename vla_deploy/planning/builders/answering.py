@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from vla_deploy.memory.episode import unix_s
-from vla_deploy.memory.wording import at_words, place_words
+from vla_deploy.memory.episode import at_words, place_words, unix_s
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting

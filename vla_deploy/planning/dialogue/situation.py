@@ -10,10 +10,9 @@ from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
-from vla_deploy.memory.episode import unix_s
-from vla_deploy.memory.wording import sentence_of
+from vla_deploy.memory.episode import sentence_of, unix_s
 from vla_deploy.model_servers.calls.picture import Image
-from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest

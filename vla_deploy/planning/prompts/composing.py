@@ -16,8 +16,7 @@ from vla_deploy.planning.understanding import ConversationTurn
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
-from vla_deploy.world.vocabulary import OBJECT_CLASSES
-from vla_deploy.world.words import size_word
+from vla_deploy.world.vocabulary import OBJECT_CLASSES, size_word
 
 TEMPLATES: Final = Path(__file__).parent
 ROOM: Final = 14_000

@@ -14,8 +14,8 @@ from vla_deploy.plans.knowledge import World, match_place
 from vla_deploy.plans.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
+from vla_deploy.world.access import GRIP_HEIGHTS_M, IsFree, stands_around
 from vla_deploy.world.footprint import polygon_depth_m
-from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, stands_around
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.thing import FLOOR, Rest

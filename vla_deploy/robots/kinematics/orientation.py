@@ -1,4 +1,7 @@
-"""Read how MJCF turns a frame, in any of its ways, as a quaternion x, y, z, w."""
+"""Read how MJCF turns a frame, in any of its ways, as a quaternion x, y, z, w.
+
+Build and measure rotations as matrices, too.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -101,6 +104,18 @@ def quaternion_of(rotation: Array) -> Array:
     )
     row: Array = outer[int(np.argmax(square))]
     return row / np.linalg.norm(row)
+
+
+def angle_rad(rotation: Array) -> float:
+    """Return by how much a 3 x 3 rotation turns, whichever way: 0 to pi."""
+    cosine = (float(np.trace(rotation)) - 1.0) / 2.0
+    return math.acos(min(1.0, max(-1.0, cosine)))
+
+
+def yaw_rotation(yaw_rad: float) -> Array:
+    """Return the 3 x 3 rotation about the vertical axis."""
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 _WAYS: Final[Mapping[str, Callable[[Array, float, str], Array]]] = {

@@ -1,12 +1,15 @@
 """Know what blocks the robot and what its lidar sees, in square cells of the map frame."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.robots.maps.map_file import MapFile, MapMode, read_map_file
 
 # Black crosses the plane of the lidar; dark grey stands above or below it, like a table top.
@@ -67,3 +70,12 @@ def grid_of(file: MapFile) -> GridMap:
         blocked=~(probability < file.free_thresh),
         seen_by_lidar=seen if seen.any() else occupied,
     )
+
+
+def with_zones(grid: GridMap, zones: Iterable[KeepOutZone]) -> GridMap:
+    """Return the map with every keep-out zone blocked."""
+    blocked = grid.blocked.astype(np.uint8)
+    for zone in zones:
+        cells = [grid.world_to_cell(x_m, y_m)[::-1] for x_m, y_m in zone.polygon_m]
+        cv2.fillPoly(blocked, [np.array(cells, dtype=np.int32)], 1)
+    return replace(grid, blocked=blocked.astype(bool), seen_by_lidar=None)

@@ -20,9 +20,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.runtime.one_line import one_line
 
 Shades = NDArray[np.uint8]
 
@@ -112,21 +114,21 @@ def read_map_file(yaml_path: Path) -> MapFile:
 
     Raises:
         MapInvalid: a file is missing or not readable, or keys are missing or out of range; the
-            message tells all of them.
+            message names all of them.
     """
-    entries = _whole_entries(yaml_path)
+    entries = _entries(yaml_path)
     faults = list(_faults(entries))
     if faults:
         raise MapInvalid(f"{yaml_path}: {'; '.join(faults)}")
     origin = _numbers(entries["origin"])
     return MapFile(
-        shades=_read_shades(yaml_path.parent / _text(entries["image"])),
-        resolution_m=float(_text(entries["resolution"])),
+        shades=_read_shades(yaml_path.parent / str(entries["image"])),
+        resolution_m=_number(entries["resolution"]),
         origin_m=(origin[0], origin[1]),
-        mode=MapMode(_text(entries.get("mode", "trinary")).lower()),
-        negate=_SWITCH[_text(entries.get("negate", "0")).lower()],
-        occupied_thresh=float(_text(entries["occupied_thresh"])),
-        free_thresh=float(_text(entries["free_thresh"])),
+        mode=MapMode(_word(entries, "mode", "trinary")),
+        negate=_SWITCH[_word(entries, "negate", "0")],
+        occupied_thresh=_number(entries["occupied_thresh"]),
+        free_thresh=_number(entries["free_thresh"]),
     )
 
 
@@ -136,7 +138,7 @@ def image_of(yaml_path: Path) -> Path:
     Raises:
         MapInvalid: the file is missing or not readable, or keys are missing.
     """
-    return yaml_path.parent / _text(_whole_entries(yaml_path)["image"])
+    return yaml_path.parent / str(_entries(yaml_path)["image"])
 
 
 def files_of(yaml_path: Path) -> tuple[Path, Path]:
@@ -192,13 +194,14 @@ def _replace(path: Path, content: bytes) -> None:
     fresh.replace(path)
 
 
-def _faults(entries: Mapping[str, str | list[str]]) -> list[str]:
+def _faults(entries: Mapping[str, Any]) -> list[str]:
     """Return every fault of a map file's values."""
     faults = []
     low_m, high_m = RESOLUTION_RANGE_M
     if not low_m <= _number(entries["resolution"]) <= high_m:
-        told = entries["resolution"]
-        faults.append(f"resolution: expected metres from {low_m} to {high_m:g}, got {told}")
+        faults.append(
+            f"resolution: expected metres from {low_m} to {high_m:g}, got {entries['resolution']}"
+        )
     origin = _numbers(entries["origin"])
     is_near = all(abs(one_m) <= MOST_ORIGIN_M for one_m in origin)  # nan is not
     if len(origin) != 3 or not is_near or origin[2] != 0.0:
@@ -211,10 +214,10 @@ def _faults(entries: Mapping[str, str | list[str]]) -> list[str]:
         faults.append(
             f"free_thresh, occupied_thresh: expected 0..1, rising, got {free}, {occupied}"
         )
-    mode = _text(entries.get("mode", "trinary")).lower()
+    mode = _word(entries, "mode", "trinary")
     if mode not in list(MapMode):
         faults.append(f"mode: expected {', '.join(MapMode)}, got {mode!r}")
-    negate = _text(entries.get("negate", "0")).lower()
+    negate = _word(entries, "negate", "0")
     if negate not in _SWITCH:
         faults.append(f"negate: expected 0 or 1, got {negate!r}")
     return faults
@@ -280,56 +283,37 @@ def _has_transparent_cells(image: NDArray[Any] | None) -> bool:
     return bool((image[..., 3] < opaque).any())
 
 
-def _whole_entries(path: Path) -> dict[str, str | list[str]]:
+def _entries(path: Path) -> dict[str, Any]:
     """Return what a map's file says, with all keys that it must have."""
-    entries = _read_entries(path)
-    missing = [key for key in REQUIRED_KEYS if key not in entries]
+    try:
+        entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "it is no text"
+        raise MapInvalid(f"{path}: cannot read the map: {why}") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "context_mark", None) or getattr(error, "problem_mark", None)
+        where = f"{path}:{mark.line + 1}" if mark else str(path)
+        why = one_line(getattr(error, "problem", None) or error)
+        raise MapInvalid(f"{where}: expected `key: value`, in YAML: {why}") from error
+    if not isinstance(entries, dict):
+        raise MapInvalid(f"{path}: expected lines of `key: value`, got {entries!r:.40}")
+    missing = [key for key in REQUIRED_KEYS if entries.get(key) is None]
     if missing:
         raise MapInvalid(f"{path}: missing {', '.join(missing)}; see ROS map_server's format")
     return entries
 
 
-def _read_entries(path: Path) -> dict[str, str | list[str]]:
-    """Read `key: value` lines; a value is a word, `[a, b]`, or lines that begin with a dash."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "it is no text"
-        raise MapInvalid(f"{path}: cannot read the map: {why}") from error
-    entries: dict[str, str | list[str]] = {}
-    key = ""
-    for number, line in enumerate(lines, start=1):
-        text = line.split("#", 1)[0].strip()
-        if not text or text in ("---", "..."):
-            continue
-        items = entries.get(key)
-        if text.startswith("- ") and isinstance(items, list):
-            items.append(text[2:].strip())
-            continue
-        key, colon, value = (part.strip() for part in text.partition(":"))
-        if not colon:
-            raise MapInvalid(f"{path}:{number}: expected `key: value`, got {text!r}")
-        entries[key] = _value(value)
-    return entries
+def _word(entries: Mapping[str, Any], key: str, default: str) -> str:
+    return str(entries.get(key, default)).lower()
 
 
-def _value(text: str) -> str | list[str]:
-    if text.startswith("[") and text.endswith("]"):
-        return [item.strip() for item in text[1:-1].split(",")]
-    return text.strip("'\"") if text else []
-
-
-def _text(value: str | list[str]) -> str:
-    return value if isinstance(value, str) else str(value)
-
-
-def _number(value: str | list[str]) -> float:
+def _number(value: Any) -> float:
     """Return a number, NaN where it is none."""
     try:
-        return float(_text(value))
+        return float(str(value))
     except ValueError:
         return math.nan
 
 
-def _numbers(value: str | list[str]) -> list[float]:
+def _numbers(value: Any) -> list[float]:
     return [_number(item) for item in value] if isinstance(value, list) else []

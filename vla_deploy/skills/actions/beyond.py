@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vla_deploy.ipc.ros_goals import MOST_POINTS, GoalKind, GoalRequest, GoalState
 from vla_deploy.plans.catalogue import MANIPULATION_TIMEOUT_S, NAVIGATION_TIMEOUT_S
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import (
     ServerAborted,
@@ -94,7 +94,7 @@ def conclude(goal: SentGoal) -> None:
 
 
 def navigation_request(
-    context: SkillContext, target: FloorPose, speed_m_s: float | None
+    context: SkillContext, target: Pose2D, speed_m_s: float | None
 ) -> GoalRequest:
     """Return the goal that has Nav2 drive to a pose of the map."""
     return GoalRequest(

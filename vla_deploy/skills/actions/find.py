@@ -8,18 +8,17 @@ import numpy as np
 
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.plans.knowledge import parse_object
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.actions.simple import speak
 from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.movements.carrying import carry
 from vla_deploy.skills.movements.drive import drive_to
-from vla_deploy.skills.movements.frames import to_base, to_map
+from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.gaze import DRIVING_GAZE, gaze_at, remembered, turn_head, watch_for
 from vla_deploy.world import Query
+from vla_deploy.world.surfaces import FURNITURE_AHEAD_M
 
-# A viewpoint stands this far before the middle of the furniture that it is for.
-FURNITURE_AHEAD_M = 0.5
 FURNITURE_HEIGHT_M = 0.5
 # Within the first distance everything on furniture is recognised, within the second large things.
 SURELY_SEEN_M = 1.5
@@ -55,7 +54,7 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         raise TryAgain(_nowhere(context, query))
 
 
-def _look_around(context: SkillContext, query: Query, left: dict[FloorPose, None]) -> Skill:
+def _look_around(context: SkillContext, query: Query, left: dict[Pose2D, None]) -> Skill:
     """Look ahead, then at the furniture in sight; drop the viewpoints that this makes needless."""
     yield from _sweep(context, query, (GLANCE,))
     for distance_m, viewpoint in sorted(_in_sight(context, left), key=lambda one: one[0]):
@@ -67,7 +66,7 @@ def _look_around(context: SkillContext, query: Query, left: dict[FloorPose, None
             del left[viewpoint]
 
 
-def _search_from(context: SkillContext, viewpoint: FloorPose, query: Query) -> Skill:
+def _search_from(context: SkillContext, viewpoint: Pose2D, query: Query) -> Skill:
     """Drive to a viewpoint, watching on the way, and look around from there."""
     yield from carry(context)
     yield from turn_head(context, *DRIVING_GAZE)
@@ -91,8 +90,8 @@ def _sweep(
 
 
 def _in_sight(
-    context: SkillContext, viewpoints: Mapping[FloorPose, None]
-) -> list[tuple[float, FloorPose]]:
+    context: SkillContext, viewpoints: Mapping[Pose2D, None]
+) -> list[tuple[float, Pose2D]]:
     """Return the viewpoints whose furniture can be seen from here, with its distance."""
     seen = []
     for viewpoint in viewpoints:
@@ -105,12 +104,12 @@ def _in_sight(
     return seen
 
 
-def _furniture_of(viewpoint: FloorPose) -> tuple[float, float, float]:
+def _furniture_of(viewpoint: Pose2D) -> tuple[float, float, float]:
     """Return the point of the map, on the furniture, that a viewpoint looks at."""
-    return (*to_map(viewpoint, FURNITURE_AHEAD_M, 0.0), FURNITURE_HEIGHT_M)
+    return (*viewpoint.outward(FURNITURE_AHEAD_M, 0.0), FURNITURE_HEIGHT_M)
 
 
-def _way_m(context: SkillContext, goal: FloorPose) -> float:
+def _way_m(context: SkillContext, goal: Pose2D) -> float:
     pose = context.link.pose
     try:
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Mapping
 from typing import Any, Final, TypeVar
 
 from vla_deploy.plans.knowledge import match_place, parse_object, spoken_places
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.movements.carrying import carry
@@ -39,7 +39,7 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         yield from drive_to(context, _place(context, parameters["place"]), speed_m_s=speed_m_s)
         return
     yaw_rad = parameters.get("yaw_rad")
-    goal = FloorPose(
+    goal = Pose2D(
         x_m=float(parameters["x_m"]),
         y_m=float(parameters["y_m"]),
         yaw_rad=float(yaw_rad) if yaw_rad is not None else 0.0,
@@ -117,7 +117,7 @@ def _full_hands(context: SkillContext) -> tuple[str, ...]:
     return tuple(sorted(hand for hand, held in context.hands.items() if held is not None))
 
 
-def _place(context: SkillContext, name: str) -> FloorPose:
+def _place(context: SkillContext, name: str) -> Pose2D:
     place = match_place(name, spoken_places(context.robot.places))
     if place is None:
         known = ", ".join(sorted(context.robot.places))

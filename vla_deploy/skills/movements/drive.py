@@ -16,16 +16,15 @@ from vla_deploy.navigation.follower import (
     FollowerPhase,
     PathFollower,
     Twist,
-    wrap_angle,
+    is_blocked,
+    scan_points,
 )
 from vla_deploy.navigation.localising.place_judge import MATCH_RATIO
-from vla_deploy.navigation.obstacles import is_blocked, scan_points
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.actions.beyond import navigation_request, pursue, server_drives
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.movements.bearings import find_myself
-from vla_deploy.skills.movements.frames import on_floor, to_map
 
 # Cruise below what the drives can do, so that tracking errors can be made up.
 CRUISE_RATIO = 0.9
@@ -51,7 +50,7 @@ def limits_of(context: SkillContext, speed_m_s: float | None = None) -> DriveLim
 
 def drive_to(
     context: SkillContext,
-    goal: FloorPose,
+    goal: Pose2D,
     turn: bool = True,
     until: Callable[[], bool] = lambda: False,
     speed_m_s: float | None = None,
@@ -78,18 +77,18 @@ def drive_to(
     yield from follow(context, points, goal.yaw_rad if turn else None, until, speed_m_s)
 
 
-def _arriving(points: NDArray[np.float64], goal: FloorPose) -> FloorPose:
+def _arriving(points: NDArray[np.float64], goal: Pose2D) -> Pose2D:
     """Return the goal with the yaw in which a path arrives there: Nav2 wants one."""
     far = np.hypot(*(points[:-1] - points[-1]).T) > STOP_DISTANCE_M
     if not far.any():
         return goal
     dx_m, dy_m = points[-1] - points[:-1][far][-1]
-    return FloorPose(x_m=goal.x_m, y_m=goal.y_m, yaw_rad=math.atan2(dy_m, dx_m))
+    return Pose2D(x_m=goal.x_m, y_m=goal.y_m, yaw_rad=math.atan2(dy_m, dx_m))
 
 
 def _have_driven(
     context: SkillContext,
-    target: FloorPose,
+    target: Pose2D,
     turn: bool,
     until: Callable[[], bool],
     speed_m_s: float | None,
@@ -113,8 +112,8 @@ def _have_driven(
     yield from pursue(context, request, hindrance, until)
     yield from stand_still(context)
     pose = context.link.pose
-    off_m = math.hypot(pose.x_m - target.x_m, pose.y_m - target.y_m)
-    off_rad = abs(wrap_angle(pose.yaw_rad - target.yaw_rad)) if turn else 0.0
+    off_m = pose.distance_m(target)
+    off_rad = pose.turn_rad(target) if turn else 0.0
     if not until() and (off_m > ARRIVED_M or off_rad > ARRIVED_RAD):
         raise TryAgain(
             f"Nav2 says that the robot is there, but it is {off_m:.2f} m and {off_rad:.2f} rad off"
@@ -294,7 +293,7 @@ def _hindrance(
     if why or ranges_m is None:
         return why
     points = scan_points(ranges_m)
-    mapped = context.planner.is_mapped(on_floor(context.link.pose, points))
+    mapped = context.planner.is_mapped(context.link.pose.place(points))
     blocked = is_blocked(
         points * math.copysign(1.0, twist.v_m_s),
         mapped & planned,
@@ -318,16 +317,15 @@ def _why_blind(context: SkillContext) -> str:
 def _leaves_free_floor(context: SkillContext, sign: float) -> bool:
     """Return whether a little further on the map leaves too little room, and less than here."""
     pose = context.link.pose
-    ahead, here = to_map(pose, sign * LOOK_AHEAD_M, 0.0), (pose.x_m, pose.y_m)
+    ahead, here = pose.outward(sign * LOOK_AHEAD_M, 0.0), (pose.x_m, pose.y_m)
     planner = context.planner
     return not planner.is_free(*ahead) and planner.room_m(*ahead) < planner.room_m(*here)
 
 
-def _ahead_m(start: FloorPose, pose: FloorPose) -> float:
+def _ahead_m(start: Pose2D, pose: Pose2D) -> float:
     """Return how far ahead of where the robot stood it stands now, negative behind."""
-    forward_m = (pose.x_m - start.x_m) * math.cos(start.yaw_rad)
-    return forward_m + (pose.y_m - start.y_m) * math.sin(start.yaw_rad)
+    return start.local((pose.x_m, pose.y_m))[0]
 
 
-def _distance(pose: FloorPose, point: NDArray[np.float64]) -> float:
+def _distance(pose: Pose2D, point: NDArray[np.float64]) -> float:
     return math.hypot(float(point[0]) - pose.x_m, float(point[1]) - pose.y_m)

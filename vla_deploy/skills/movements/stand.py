@@ -3,11 +3,10 @@
 import math
 from collections.abc import Sequence
 
-from vla_deploy.navigation.follower import wrap_angle
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.movements.frames import to_base
-from vla_deploy.world.reach import REACH_M, Stand, is_in_reach, stands_around
+from vla_deploy.world.access import REACH_M, Stand, is_in_reach, stands_around
 
 # The object goes before one shoulder rather than between them.
 SIDE_M = 0.12
@@ -15,7 +14,7 @@ SIDE_M = 0.12
 
 def standing_poses(
     context: SkillContext, position_m: Sequence[float], anew: bool = False
-) -> list[FloorPose]:
+) -> list[Pose2D]:
     """Return free poses facing an object, the one quickest to reach first.
 
     The present pose alone, where it will do, unless they are wanted `anew`.
@@ -30,10 +29,10 @@ def standing_poses(
     return [goal for _, _, goal in sorted(candidates, key=lambda one: (one[0], one[1].step))][:6]
 
 
-def _facing(context: SkillContext, stand: Stand) -> FloorPose:
+def _facing(context: SkillContext, stand: Stand) -> Pose2D:
     """Turn a stand so that the object comes before the shoulder of the hand that takes it."""
     side_rad = math.asin(min(1.0, _side_m(context) / stand.reach_m))
-    return FloorPose(x_m=stand.x_m, y_m=stand.y_m, yaw_rad=wrap_angle(stand.bearing_rad - side_rad))
+    return Pose2D(x_m=stand.x_m, y_m=stand.y_m, yaw_rad=wrap_angle(stand.bearing_rad - side_rad))
 
 
 def _side_m(context: SkillContext) -> float:
@@ -42,9 +41,8 @@ def _side_m(context: SkillContext) -> float:
     return -SIDE_M if held == ["right"] else SIDE_M
 
 
-def _effort(pose: FloorPose, goal: FloorPose) -> float:
+def _effort(pose: Pose2D, goal: Pose2D) -> float:
     """Estimate the way in metres; a radian of turning counts as a third of a metre."""
-    distance_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
     heading = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
     turning = abs(wrap_angle(heading - pose.yaw_rad)) + abs(wrap_angle(goal.yaw_rad - heading))
-    return distance_m + turning / 3.0
+    return pose.distance_m(goal) + turning / 3.0

@@ -7,9 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vla_deploy.robots.description import FloorPose
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.movements.frames import side_of, to_base, to_map
+from vla_deploy.skills.movements.frames import side_of, to_base
 from vla_deploy.world.document import read_thing
 from vla_deploy.world.footprint import depth_inside_m
 from vla_deploy.world.thing import Thing
@@ -62,7 +62,7 @@ def spots_beside(context: SkillContext, hand: str, seen: Mapping[str, Any]) -> l
 
 
 def _around(
-    thing: Thing, middle_m: tuple[float, float], pose: FloorPose
+    thing: Thing, middle_m: tuple[float, float], pose: Pose2D
 ) -> Iterator[tuple[float, float]]:
     """Yield points of the base frame at a hand's breadth from a thing's outline."""
     for step in range(DIRECTIONS):
@@ -70,14 +70,14 @@ def _around(
         for away_m in np.arange(APART_M, FARTHEST_M, 0.01):
             x_m = middle_m[0] + away_m * math.cos(angle_rad)
             y_m = middle_m[1] + away_m * math.sin(angle_rad)
-            if depth_inside_m(to_map(pose, x_m, y_m), thing) < -BESIDE_M:
+            if depth_inside_m(pose.outward(x_m, y_m), thing) < -BESIDE_M:
                 yield x_m, y_m
                 break
 
 
 def _fits(context: SkillContext, surface: Mapping[str, Any], x_m: float, y_m: float) -> bool:
     """Return whether a spot lies well within the seen surface and away from what stands on it."""
-    spot = to_map(context.link.pose, x_m, y_m)
+    spot = context.link.pose.outward(x_m, y_m)
     outline = np.array(surface["polygon_m"], dtype=np.float32)
     if cv2.pointPolygonTest(outline, spot, measureDist=True) < EDGE_M:
         return False

@@ -10,7 +10,6 @@ from drivers.clock import NS_PER_S
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.movements.drive import straight
-from vla_deploy.skills.movements.frames import on_floor
 from vla_deploy.skills.movements.motion import wait_until
 
 Floats = NDArray[np.float64]
@@ -53,7 +52,7 @@ def way_back_m(context: SkillContext) -> float:
         hands = [
             hand
             for hand, outline, low_m in parts
-            if _reaches_into(outline, on_floor(pose, low_m - (back_m, 0.0)))
+            if _reaches_into(outline, pose.place(low_m - (back_m, 0.0)))
         ]
         if not hands:
             return back_m

@@ -16,8 +16,8 @@ from vla_deploy.gateways.ros.geometry import (
     standing,
     thinned,
 )
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel
 
 BENT = (0.12, -0.2, 0.001, -0.002, 0.05)

@@ -19,7 +19,7 @@ from vla_deploy.gateways.ros.inward.action_server import (
 )
 from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
 from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME
 
 FAILED: Final = 9000

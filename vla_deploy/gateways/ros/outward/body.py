@@ -18,7 +18,7 @@ from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway, GatewayPart
 from vla_deploy.ipc import Sample
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
 from vla_deploy.robots.kinematics.urdf import urdf_of
 

@@ -22,8 +22,8 @@ from vla_deploy.gateways.ros.geometry import (
 )
 from vla_deploy.gateways.ros.graph import JsonTopic
 from vla_deploy.gateways.ros.part import MAP, Due, Gateway, GatewayPart
-from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.frame_tree import OPTICAL_FRAME
 from vla_deploy.world import (
     SceneUnreadable,

@@ -1,9 +1,9 @@
-"""How recollections are said."""
+"""What is remembered, in sentences."""
 
 import pytest
 
 from vla_deploy.memory import Episode, EpisodeOutcome, LastSeen
-from vla_deploy.memory.wording import ago, place_words, sentence_of
+from vla_deploy.memory.episode import ago, place_words, sentence_of
 
 
 @pytest.mark.parametrize(
