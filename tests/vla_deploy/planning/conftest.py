@@ -100,6 +100,7 @@ class Desk:
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
         )
         self._slow = slow
+        self._given = 0
         self._utterances = self._space.ring_writer("utterance")
         self._events = self._space.ring_reader("task_event", from_start=True)
         self._plans = self._space.ring_reader("plan", from_start=True)
@@ -141,10 +142,23 @@ class Desk:
         self._scene.put_document({"stamp_ns": now_ns, "objects": list(objects)} | rest)
 
     def give(self, **utterance: object) -> None:
-        self._utterances.publish({"command_id": "c1", "source": "test"} | utterance)
+        """Give an utterance; those without an id are c1, c2 and so on."""
+        self._given += 1
+        named = {"command_id": f"c{self._given}", "source": "test"}
+        self._utterances.publish(named | utterance)
 
     def executor_tells(self, **event: object) -> None:
         self._executor.publish(event)
+
+    def answers_to(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
+        """Give an utterance, and return the events of the planner's next step."""
+        self.give(**({} if text is None else {"text": text}) | utterance)
+        return self.answers()
+
+    def plans_for(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
+        """Give an utterance, and return what the planner hands to the executor."""
+        self.answers_to(text, **utterance)
+        return self.plans()
 
     def answers(self) -> list[dict[str, Any]]:
         self.planner.step()
@@ -197,6 +211,12 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
     yield open_desk
     for desk in opened:
         desk.close()
+
+
+@pytest.fixture
+def desk(open_desk: Callable[..., Desk]) -> Desk:
+    """Open a desk whose planner has patterns alone."""
+    return open_desk()
 
 
 @pytest.fixture

@@ -164,18 +164,14 @@ def test_a_check_is_made_outside_the_steps_and_a_stop_overtakes_it(
     model.is_language_model = True
     desk = open_desk(model, executor=later)
     desk.sees("red cup_1", "blue cup_2")
-    desk.give(text=BOTH)
-    assert [one["event"] for one in desk.answers()] == ["planning"]
+    assert [one["event"] for one in desk.answers_to(BOTH)] == ["planning"]
     later.do_one()
     (asked,) = desk.answers()
     assert asked["question"].startswith(DOUBT)
     assert desk.plans() == []
-    desk.give(command_id="c2", text="yes")
-    assert [one["event"] for one in desk.answers()] == ["answered", "accepted", "plan"]
-    desk.give(command_id="c3", text=BOTH)
-    desk.answers()
-    desk.give(command_id="c4", text="stop")
-    assert [one["command_id"] for one in desk.answers()] == ["c3"]
+    assert [one["event"] for one in desk.answers_to("yes")] == ["answered", "accepted", "plan"]
+    desk.answers_to(BOTH)
+    assert [one["command_id"] for one in desk.answers_to("stop")] == ["c3"]
     later.do_one()
     assert desk.answers() == []
     assert desk.plans()[1:] == [{"command_id": "c4", "cancel": True}]
