@@ -3,12 +3,15 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_session import PlannerSession, fresh_session
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
@@ -217,6 +220,24 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
 def desk(open_desk: Callable[..., Desk]) -> Desk:
     """Open a desk whose planner has patterns alone."""
     return open_desk()
+
+
+@pytest.fixture
+def session_in() -> Iterator[Callable[[str], PlannerSession]]:
+    """Open a session with the shipped planner, in a scene of the corpus."""
+    with ExitStack() as opened:
+
+        def session_in(scene: str) -> PlannerSession:
+            session = opened.enter_context(fresh_session())
+            session.tell(scenes()[scene].world(home()))
+            return session
+
+        yield session_in
+
+
+@pytest.fixture
+def flat(session_in: Callable[[str], PlannerSession]) -> PlannerSession:
+    return session_in("tidy")
 
 
 @pytest.fixture
