@@ -12,10 +12,12 @@ import pytest
 
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_session import PlannerSession, fresh_session
-from drivers.clock import NS_PER_S
+from drivers.clock import NS_PER_S, MonotonicClock
+from platforms import Profile, load_profile
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
@@ -25,6 +27,22 @@ from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world import Snapshot, Thing
+
+SERVERS = """
+[servers.bench]
+api = "openai_compatible"
+url = "{url}"
+model = "tiny"
+location = "local"
+max_attempts = 1
+
+[servers.cloud]
+api = "openai"
+url = "https://example.com/v1"
+model = "large"
+location = "remote"
+credential = "no_such_key_anywhere"
+"""
 
 
 @cache
@@ -238,6 +256,32 @@ def session_in() -> Iterator[Callable[[str], PlannerSession]]:
 @pytest.fixture
 def flat(session_in: Callable[[str], PlannerSession]) -> PlannerSession:
     return session_in("tidy")
+
+
+@pytest.fixture
+def profile_of(tmp_path: Path, loopback: Any) -> Callable[..., Profile]:
+    """Write a profile with this table, for a runtime directory whose servers are these."""
+
+    def profile_of(planning: str, url: str = loopback.url) -> Profile:
+        config = tmp_path / "base-config"
+        config.mkdir(exist_ok=True)
+        (config / "servers.toml").write_text(SERVERS.format(url=url))
+        profile = tmp_path / "mine.toml"
+        profile.write_text(f'inherits = "desktop"\n[planning]\n{planning}\n')
+        return load_profile(profile)
+
+    return profile_of
+
+
+@pytest.fixture
+def open_with(tmp_path: Path, profile_of: Callable[..., Profile]) -> Callable[..., Planner]:
+    """Open the planner of a profile with this table, and with these parsers on board."""
+
+    def open_with(planning: str, *on_board: BackEnd, **changes: str) -> Planner:
+        settings = profile_of(planning, **changes).planning
+        return open_planner(butler(), settings, MonotonicClock(), tmp_path / "base", on_board)
+
+    return open_with
 
 
 @pytest.fixture

@@ -112,7 +112,7 @@ JSON = st.recursive(
     lambda inner: (
         st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4)
     ),
-    max_leaves=12,
+    max_leaves=8,
 )
 
 
@@ -123,7 +123,8 @@ JSON = st.recursive(
         | st.lists(
             st.dictionaries(
                 st.sampled_from(["id", "action", "params", "type", "depends_on", "priority"]), JSON
-            )
+            ),
+            max_size=3,
         ),
     )
 )
