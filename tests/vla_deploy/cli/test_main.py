@@ -63,12 +63,15 @@ def test_the_list_of_commands_tells_of_each_what_it_tells_of_itself():
     assert list(commands()) == list(COMMANDS)
 
 
-@pytest.mark.parametrize("word", ["--help", "status", "estop"])
-def test_no_command_loads_what_only_others_need(word):
-    spell = f"import sys; from vla_deploy.cli.main import parser; parser([{word!r}]); "
-    tell = "print(*{'can', 'cv2', 'pinocchio', 'pydantic'} & sys.modules.keys())"
-    told = subprocess.run([sys.executable, "-c", spell + tell], capture_output=True, text=True)
-    assert (told.stdout, told.stderr) == ("\n", "")
+def test_no_command_loads_what_only_others_need():
+    spell = "import sys; from vla_deploy.cli.main import main, parser; "
+    spell += "parser(['--help']), parser(['status']), parser(['estop']); "
+    spell += "print(*{'can', 'cv2', 'pinocchio', 'pydantic'} & sys.modules.keys()); "
+    spell += "main(['--runtime-base', '/nonexistent/base', 'servers', 'list']); "
+    spell += "print('httpcore2' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", spell], capture_output=True, text=True)
+    assert (told.stdout.splitlines()[0], told.stdout.splitlines()[-1]) == ("", "False")
+    assert told.stderr == ""
 
 
 def test_a_folder_named_like_a_command_is_a_folder(tmp_path, capsys, monkeypatch):
@@ -80,32 +83,6 @@ def test_a_folder_named_like_a_command_is_a_folder(tmp_path, capsys, monkeypatch
 @pytest.mark.parametrize(("module", "name"), USER_ERRORS.items())
 def test_what_a_person_can_mend_is_an_exception_of_that_module(module, name):
     assert issubclass(getattr(import_module(module), name), Exception)
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        ([], "vla-deploy: the following arguments are required: COMMAND"),
-        (["frobnicate"], "vla-deploy: argument COMMAND: invalid choice"),
-        (["say"], "vla-deploy say: one of the arguments text --plan --answer is required"),
-        (
-            ["run", "--seed", "-1"],
-            "vla-deploy run: argument --seed: expected a whole number from 0",
-        ),
-        (
-            ["run", "--twin", "--viewer", "--headless"],
-            "vla-deploy run: argument --headless: not allowed with argument --viewer",
-        ),
-        (["bench", "nothing"], "vla-deploy bench: argument benchmark: invalid choice"),
-    ],
-)
-def test_bad_arguments_are_one_line_and_exit_code_2(words, complaint, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 2
-    error = capsys.readouterr().err
-    assert error.startswith(complaint)
-    assert error.count("\n") == 1
 
 
 SHARED = {
@@ -148,27 +125,6 @@ def test_a_bad_plan_is_one_line_and_exit_code_2(content, complaint, tmp_path, ca
     assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["check", "--robot", "nosuch"], "expected a robot file, its folder, or one of butler"),
-        (["check", "--profile", "nosuch"], "no profile 'nosuch': choose "),
-        (["check", "--plan", "/nowhere/plan.json"], "cannot read the plan /nowhere/plan.json"),
-        (["demo", "--out", "/dev/null/out"], "--out /dev/null/out: Not a directory"),
-        (["status"], "no robot runs in "),
-        (["say", "stop"], "no robot runs in "),
-        (["shutdown"], "no robot runs in "),
-        (["run", "--twin", "--robot", "nosuch"], "expected a robot file"),
-        (["run", "--twin", "--profile", "nosuch"], "no profile 'nosuch'"),
-    ],
-)
-def test_what_cannot_be_found_is_one_line_and_exit_code_2(words, complaint, tmp_path, capsys):
-    assert main(["--runtime-base", str(tmp_path), *words]) == 2
-    error = capsys.readouterr().err
-    assert complaint in error
-    assert error.count("\n") == 1
-
-
 def test_all_ten_faults_of_a_robot_file_are_told_at_once(tmp_path, capsys):
     text = (BUTLER / "robot.toml").read_text()
     for right, wrong in TEN_FAULTS.items():
@@ -185,14 +141,6 @@ def test_all_ten_faults_of_a_robot_file_are_told_at_once(tmp_path, capsys):
     for word in ("node_id", "bitrate", "id"):
         assert word in told
     assert len(faults) >= len(TEN_FAULTS)
-
-
-def test_a_runtime_directory_that_cannot_be_made_is_one_line_and_exit_code_2(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    assert main(["--runtime-base", str(tmp_path / "file" / "base"), "run", "--twin"]) == 2
-    error = capsys.readouterr().err
-    assert "choose another with --runtime-base" in error
-    assert error.count("\n") == 1
 
 
 def test_a_reader_that_has_seen_enough_gets_no_traceback():
@@ -214,29 +162,6 @@ def test_a_runtime_directory_of_someone_else_is_one_line_and_exit_code_2(
     assert main(["--runtime-base", str(tmp_path), "status"]) == 2
     error = capsys.readouterr().err
     assert f"runtime directory {tmp_path}: Permission denied; choose another" in error
-    assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("option", ["--viewer", "--paced"])
-def test_what_is_about_the_twin_is_refused_without_one(
-    option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["run", option]) == 2
-    assert "add --twin" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["install", "--root", "/proc/self"],
-        ["uninstall", "--root", __file__],
-        ["--runtime-base", "/proc/self/x", "profile", "use", "desktop"],
-    ],
-)
-def test_a_place_that_cannot_be_written_is_one_line_and_exit_code_2(words, capsys):
-    assert main(words) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("vla-deploy: /")
     assert error.count("\n") == 1
 
 

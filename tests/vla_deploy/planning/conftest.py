@@ -3,15 +3,20 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from drivers.clock import NS_PER_S
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_session import PlannerSession, fresh_session
+from drivers.clock import NS_PER_S, MonotonicClock
+from platforms import Profile, load_profile
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
+from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.planner import Planner, checked
@@ -22,6 +27,22 @@ from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.world import Snapshot, Thing
+
+SERVERS = """
+[servers.bench]
+api = "openai_compatible"
+url = "{url}"
+model = "tiny"
+location = "local"
+max_attempts = 1
+
+[servers.cloud]
+api = "openai"
+url = "https://example.com/v1"
+model = "large"
+location = "remote"
+credential = "no_such_key_anywhere"
+"""
 
 
 @cache
@@ -100,6 +121,7 @@ class Desk:
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
         )
         self._slow = slow
+        self._given = 0
         self._utterances = self._space.ring_writer("utterance")
         self._events = self._space.ring_reader("task_event", from_start=True)
         self._plans = self._space.ring_reader("plan", from_start=True)
@@ -141,10 +163,23 @@ class Desk:
         self._scene.put_document({"stamp_ns": now_ns, "objects": list(objects)} | rest)
 
     def give(self, **utterance: object) -> None:
-        self._utterances.publish({"command_id": "c1", "source": "test"} | utterance)
+        """Give an utterance; those without an id are c1, c2 and so on."""
+        self._given += 1
+        named = {"command_id": f"c{self._given}", "source": "test"}
+        self._utterances.publish(named | utterance)
 
     def executor_tells(self, **event: object) -> None:
         self._executor.publish(event)
+
+    def answers_to(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
+        """Give an utterance, and return the events of the planner's next step."""
+        self.give(**({} if text is None else {"text": text}) | utterance)
+        return self.answers()
+
+    def plans_for(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
+        """Give an utterance, and return what the planner hands to the executor."""
+        self.answers_to(text, **utterance)
+        return self.plans()
 
     def answers(self) -> list[dict[str, Any]]:
         self.planner.step()
@@ -197,6 +232,56 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
     yield open_desk
     for desk in opened:
         desk.close()
+
+
+@pytest.fixture
+def desk(open_desk: Callable[..., Desk]) -> Desk:
+    """Open a desk whose planner has patterns alone."""
+    return open_desk()
+
+
+@pytest.fixture
+def session_in() -> Iterator[Callable[[str], PlannerSession]]:
+    """Open a session with the shipped planner, in a scene of the corpus."""
+    with ExitStack() as opened:
+
+        def session_in(scene: str) -> PlannerSession:
+            session = opened.enter_context(fresh_session())
+            session.tell(scenes()[scene].world(home()))
+            return session
+
+        yield session_in
+
+
+@pytest.fixture
+def flat(session_in: Callable[[str], PlannerSession]) -> PlannerSession:
+    return session_in("tidy")
+
+
+@pytest.fixture
+def profile_of(tmp_path: Path, loopback: Any) -> Callable[..., Profile]:
+    """Write a profile with this table, for a runtime directory whose servers are these."""
+
+    def profile_of(planning: str, url: str = loopback.url) -> Profile:
+        config = tmp_path / "base-config"
+        config.mkdir(exist_ok=True)
+        (config / "servers.toml").write_text(SERVERS.format(url=url))
+        profile = tmp_path / "mine.toml"
+        profile.write_text(f'inherits = "desktop"\n[planning]\n{planning}\n')
+        return load_profile(profile)
+
+    return profile_of
+
+
+@pytest.fixture
+def open_with(tmp_path: Path, profile_of: Callable[..., Profile]) -> Callable[..., Planner]:
+    """Open the planner of a profile with this table, and with these parsers on board."""
+
+    def open_with(planning: str, *on_board: BackEnd, **changes: str) -> Planner:
+        settings = profile_of(planning, **changes).planning
+        return open_planner(butler(), settings, MonotonicClock(), tmp_path / "base", on_board)
+
+    return open_with
 
 
 @pytest.fixture

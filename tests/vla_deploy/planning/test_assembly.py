@@ -2,49 +2,16 @@
 
 import json
 
-import pytest
-
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.planning.assembly import open_planner, planner_for
+from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
-SERVERS = """
-[servers.bench]
-api = "openai_compatible"
-url = "{url}"
-model = "tiny"
-location = "local"
-max_attempts = 1
-
-[servers.cloud]
-api = "openai"
-url = "https://example.com/v1"
-model = "large"
-location = "remote"
-credential = "no_such_key_anywhere"
-"""
 GO = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}
 ANSWER = {"reasoning": "", "question": None, "feasible": True, "steps": [GO], "confidence": 0.9}
-
-
-@pytest.fixture
-def open_with(tmp_path, loopback):
-    """Open the planner of a profile with this table."""
-
-    def open_with(planning: str):
-        config = tmp_path / "base-config"
-        config.mkdir(exist_ok=True)
-        (config / "servers.toml").write_text(SERVERS.format(url=loopback.url))
-        profile = tmp_path / "mine.toml"
-        profile.write_text(f'inherits = "desktop"\n[planning]\n{planning}\n')
-        settings = load_profile(profile).planning
-        return open_planner(load_robot("butler"), settings, MonotonicClock(), tmp_path / "base")
-
-    return open_with
 
 
 def test_nobody_else_is_asked_unless_configured(open_with):
@@ -57,17 +24,16 @@ def test_servers_are_asked_after_the_patterns(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
     assert planner.back_ends == ("patterns", "server bench")
     assert planner.uses == {Aid.MEMORY}
+    assert planner.plan(ask("go to the kitchen")).proposal.back_end == "patterns"
+    assert loopback.heard == []
     loopback.then(loopback.says(json.dumps(ANSWER)))
     answer = planner.plan(ask("make it nice in here"))
     assert answer.plan.actions[0].parameters == {"place": "kitchen"}
     assert [one.outcome for one in answer.attempts] == ["declined", "planned"]
     assert planner.document()["servers"][0]["answers"] == 1
-
-
-def test_a_command_of_the_rules_asks_no_server(open_with, loopback, ask):
-    planner = open_with('servers = ["bench"]')
-    assert planner.plan(ask("go to the kitchen")).proposal.back_end == "patterns"
-    assert loopback.heard == []
+    schema = json.dumps(loopback.heard[0].body["response_format"])
+    for place in set(world_of(load_robot("butler"), {}).places.values()):
+        assert f'"{place}"' in schema
 
 
 def test_servers_that_are_not_there_are_told_and_done_without(open_with):
@@ -77,28 +43,15 @@ def test_servers_that_are_not_there_are_told_and_done_without(open_with):
     assert "NO_SUCH_KEY_ANYWHERE" in planner.away["cloud"]
 
 
-def test_the_shipped_parser_is_asked_last(tmp_path, loopback, ask):
-    config = tmp_path / "base-config"
-    config.mkdir()
-    (config / "servers.toml").write_text(SERVERS.format(url=loopback.url))
-    profile = tmp_path / "mine.toml"
-    profile.write_text('inherits = "desktop"\n[planning]\nservers = ["bench"]\n')
-    clock, robot = MonotonicClock(), load_robot("butler")
-    planner = planner_for(robot, load_profile(profile), clock, tmp_path / "base")
+def test_the_shipped_parser_is_asked_last(tmp_path, loopback, ask, profile_of):
+    profile = profile_of('servers = ["bench"]')
+    planner = planner_for(load_robot("butler"), profile, MonotonicClock(), tmp_path / "base")
     assert planner.slow_back_ends == ("server bench", "command_parser")
     loopback.then(loopback.sends(500, b""))
     answer = planner.plan(ask("would you mind heading over to the kitchen"))
     planner.close()
     assert answer.proposal.back_end == "command_parser"
     assert [one.back_end for one in answer.attempts[1:]] == list(planner.slow_back_ends)
-
-
-def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_with, loopback, ask):
-    loopback.then(loopback.says(json.dumps(ANSWER)))
-    open_with('servers = ["bench"]').plan(ask("make it nice in here"))
-    schema = json.dumps(loopback.heard[0].body["response_format"])
-    for place in set(world_of(load_robot("butler"), {}).places.values()):
-        assert f'"{place}"' in schema
 
 
 def test_models_on_board_are_done_without_where_others_hold_the_memory(tmp_path):

@@ -5,26 +5,15 @@ from typing import Any
 
 import pytest
 
-from drivers.clock import MonotonicClock
-from platforms import load_profile
-from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.dialogue.confirmation import confirmation_of
 from vla_deploy.planning.planner import Planner
-from vla_deploy.robots import load_robot
 
-SERVERS = """
-[servers.bench]
-api = "openai_compatible"
-url = "{url}"
-model = "tiny"
-location = "local"
-max_attempts = 1
-"""
 NICE = "make it nice in here"
 BOTH = "pick up both cups"
 KITCHEN = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}
 RED = {"skill": "pick_up", "object": "red cup", "arm": None}
 BLUE = {"skill": "pick_up", "object": "blue cup", "arm": None}
+LOOK = {"skill": "look_at", "object": "red cup"}
 TO_HALL = ("navigate_to", {"place": "hall"})
 NO_WAY = {"steps": [], "feasible": False, "reasoning": "I cannot reach it"}
 DOUBT = 'You said "both", which I may not have understood. Shall I pick up the red cup and pick up'
@@ -41,19 +30,11 @@ def parser(back_end, propose):
 
 
 @pytest.fixture
-def planner(tmp_path, loopback, parser):
-    """Return a planner whose profile names a server, beside a parser on board."""
+def planner(open_with, parser):
+    """Open a planner whose profile names a server, beside a parser on board."""
 
-    def planner(url: str = loopback.url, within_s: float = 5.0) -> Planner:
-        config = tmp_path / "base-config"
-        config.mkdir(exist_ok=True)
-        (config / "servers.toml").write_text(SERVERS.format(url=url))
-        profile = tmp_path / "mine.toml"
-        profile.write_text(
-            f'inherits = "desktop"\n[planning]\nservers = ["bench"]\nwithin_s = {within_s}\n'
-        )
-        settings, clock = load_profile(profile).planning, MonotonicClock()
-        return open_planner(load_robot("butler"), settings, clock, tmp_path / "base", (parser,))
+    def planner(within_s: float = 5.0, **changes: str) -> Planner:
+        return open_with(f'servers = ["bench"]\nwithin_s = {within_s}', parser, **changes)
 
     return planner
 
@@ -81,7 +62,7 @@ def test_a_server_that_has_no_plan_is_followed_by_the_parser(
 
 
 def test_a_server_that_is_away_or_late_leaves_time_for_the_parser(planner, loopback, ask) -> None:
-    away = planner("http://127.0.0.1:9").plan(ask(NICE))
+    away = planner(url="http://127.0.0.1:9").plan(ask(NICE))
     assert outcomes(away)[1:] == [("server bench", "declined"), ("parser", "planned")]
     loopback.then(loopback.raw(b"HTTP/1.1 200 OK\r\n", pause_s=0.8))
     late = planner(within_s=1.0).plan(ask(NICE))
@@ -111,18 +92,12 @@ def test_what_a_server_finds_impossible_is_asked_about_where_words_change_the_sc
     assert answer.proposal.is_read_back is asks
 
 
-@pytest.mark.parametrize(
-    "steps", [(RED, BLUE), (BLUE, RED), (RED, BLUE, RED | {"skill": "look_at"})]
-)
+@pytest.mark.parametrize("steps", [(RED, BLUE), (BLUE, RED), (RED, BLUE, LOOK)])
 def test_a_plan_that_a_server_shares_runs_unasked(planner, loopback, ask, steps) -> None:
-    loopback.then(loopback.says(says(*[_fit(one) for one in steps])))
+    loopback.then(loopback.says(says(*steps)))
     answer = planner().plan(ask(BOTH))
     assert outcomes(answer) == [("patterns", "planned"), ("server bench", "planned")]
     assert (answer.proposal.back_end, answer.proposal.is_read_back) == ("patterns", False)
-
-
-def _fit(step: dict[str, Any]) -> dict[str, Any]:
-    return {"skill": "look_at", "object": step["object"]} if step["skill"] == "look_at" else step
 
 
 @pytest.mark.parametrize(
@@ -146,7 +121,7 @@ def test_a_plan_that_a_server_does_not_share_is_read_back(planner, loopback, ask
 
 
 def test_a_plan_stands_where_no_server_can_check_it(planner, ask) -> None:
-    answer = planner("http://127.0.0.1:9").plan(ask(BOTH))
+    answer = planner(url="http://127.0.0.1:9").plan(ask(BOTH))
     assert outcomes(answer) == [("patterns", "planned"), ("server bench", "declined")]
     assert not answer.proposal.is_read_back
 
@@ -164,18 +139,14 @@ def test_a_check_is_made_outside_the_steps_and_a_stop_overtakes_it(
     model.is_language_model = True
     desk = open_desk(model, executor=later)
     desk.sees("red cup_1", "blue cup_2")
-    desk.give(text=BOTH)
-    assert [one["event"] for one in desk.answers()] == ["planning"]
+    assert [one["event"] for one in desk.answers_to(BOTH)] == ["planning"]
     later.do_one()
     (asked,) = desk.answers()
     assert asked["question"].startswith(DOUBT)
     assert desk.plans() == []
-    desk.give(command_id="c2", text="yes")
-    assert [one["event"] for one in desk.answers()] == ["answered", "accepted", "plan"]
-    desk.give(command_id="c3", text=BOTH)
-    desk.answers()
-    desk.give(command_id="c4", text="stop")
-    assert [one["command_id"] for one in desk.answers()] == ["c3"]
+    assert [one["event"] for one in desk.answers_to("yes")] == ["answered", "accepted", "plan"]
+    desk.answers_to(BOTH)
+    assert [one["command_id"] for one in desk.answers_to("stop")] == ["c3"]
     later.do_one()
     assert desk.answers() == []
     assert desk.plans()[1:] == [{"command_id": "c4", "cancel": True}]

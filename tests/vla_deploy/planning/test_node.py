@@ -6,24 +6,20 @@ from platforms import load_profile
 from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
 
 
-@pytest.fixture
-def desk(open_desk):
-    return open_desk()
-
-
 def test_a_command_becomes_a_plan_for_the_executor(desk):
-    desk.give(text="go to the kitchen")
-    accepted, planned = desk.answers()
+    accepted, planned = desk.answers_to("go to the kitchen")
     assert (accepted["event"], planned["event"]) == ("accepted", "plan")
     (plan,) = desk.plans()
     assert plan == {"command_id": "c1", "plan": planned["plan"]}
     assert [action["skill"] for action in plan["plan"]["actions"]] == ["navigate_to"]
+    assert (planned["rung"], planned["confidence"]) == ("patterns", 1.0)
+    (attempt,) = planned["attempts"]
+    assert (attempt["rung"], attempt["outcome"]) == ("patterns", "planned")
 
 
 def test_a_command_to_a_disarmed_robot_is_refused_with_what_to_do(desk):
     desk.control("disarmed")
-    desk.give(text="go to the kitchen")
-    (answer,) = desk.answers()
+    (answer,) = desk.answers_to("go to the kitchen")
     assert answer["event"] == "rejected"
     assert "vla-deploy arm" in answer["reason"]
     assert desk.plans() == []
@@ -39,25 +35,19 @@ def test_a_command_that_waited_too_long_for_the_planner_is_refused(desk):
     assert desk.plans() == []
 
 
+@pytest.mark.parametrize("is_restarted", [False, True])
 @pytest.mark.parametrize("utterance", [{"cancel": True}, {"text": "stop"}])
-def test_a_stop_is_handed_on_however_old_it_is(desk, utterance):
+def test_a_stop_is_handed_on_however_old_it_is(desk, utterance, is_restarted):
     desk.give(**utterance)
     desk.clock.pass_s(60.0)
+    if is_restarted:
+        desk.start()
     assert desk.answers() == []
     assert desk.plans() == [{"command_id": "c1", "cancel": True}]
 
 
-def test_what_planned_it_is_told(desk):
-    desk.give(text="go to the kitchen")
-    planned = desk.answers()[1]
-    assert (planned["rung"], planned["confidence"]) == ("patterns", 1.0)
-    (attempt,) = planned["attempts"]
-    assert (attempt["rung"], attempt["outcome"]) == ("patterns", "planned")
-
-
 def test_why_nobody_planned_it_is_told(desk):
-    desk.give(text="sing a sea shanty")
-    (refused,) = desk.answers()
+    (refused,) = desk.answers_to("sing a sea shanty")
     assert refused["event"] == "rejected"
     assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
     assert [one["rung"] for one in refused["attempts"]] == ["patterns"]
@@ -65,8 +55,9 @@ def test_why_nobody_planned_it_is_told(desk):
 
 def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
     desk.give(plan=[{"action": "go_to", "params": {"location": "kitchen"}}])
-    desk.give(command_id="c2", plan=[{"action": "go_to", "params": {"location": "narnia"}}])
-    accepted, planned, refused = desk.answers()
+    accepted, planned, refused = desk.answers_to(
+        plan=[{"action": "go_to", "params": {"location": "narnia"}}]
+    )
     assert (accepted["event"], planned["rung"]) == ("accepted", "given")
     assert (refused["command_id"], refused["event"]) == ("c2", "rejected")
     assert 'I do not know the place "narnia"' in refused["reason"]
@@ -74,8 +65,7 @@ def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
 
 @pytest.mark.parametrize("utterance", [{}, {"text": 7}, {"text": None}, {"text": "go " * 1000}])
 def test_an_utterance_that_is_no_command_is_refused_with_what_was_expected(desk, utterance):
-    desk.give(**utterance)
-    (answer,) = desk.answers()
+    (answer,) = desk.answers_to(**utterance)
     assert answer["event"] == "rejected"
     assert answer["reason"].startswith("expected a command")
 
@@ -93,37 +83,34 @@ GO_ALL_OVER = [{"skill": "navigate_to", "parameters": {"place": "kitchen"}}]
     ],
 )
 def test_a_plan_too_long_to_be_told_is_refused(desk, plan):
-    desk.give(plan={"goal": "talk"} | plan)
-    assert [(one["event"]) for one in desk.answers()] == ["rejected"]
+    assert [(one["event"]) for one in desk.answers_to(plan={"goal": "talk"} | plan)] == ["rejected"]
     assert desk.plans() == []
 
 
 def test_a_long_plan_is_told_whole(desk):
     said = [{"skill": "speak", "parameters": {"text": "y" * 400}}] * 20
-    desk.give(plan={"goal": "talk", "actions": said})
-    desk.answers()
-    (plan,) = desk.plans()
+    (plan,) = desk.plans_for(plan={"goal": "talk", "actions": said})
     assert len(plan["plan"]["actions"]) == 20
 
 
 @pytest.mark.parametrize("text", ["\\ud800", "\\u0000\\u001b[2J", "\U0001f600" * 2_000])
 def test_no_text_of_a_plan_can_end_the_planner(desk, text):
     go = '{"skill": "navigate_to", "parameters": {"place": "kitchen"}}'
-    desk.give(plan=f'{{"goal": "{text}", "safety_concerns": ["{text}"], "actions": [{go}]}}')
-    assert desk.answers()[-1]["event"] in ("asked", "rejected")
-    desk.give(command_id="c2", text="go to the kitchen")
-    assert desk.answers()[-1]["event"] == "plan"
+    assert desk.answers_to(
+        plan=f'{{"goal": "{text}", "safety_concerns": ["{text}"], "actions": [{go}]}}'
+    )[-1]["event"] in ("asked", "rejected")
+    assert desk.answers_to("go to the kitchen")[-1]["event"] == "plan"
 
 
 def test_an_id_without_end_is_cut(desk):
-    desk.give(command_id="x" * 60_000, text="sing a sea shanty")
-    (refused,) = desk.answers()
+    (refused,) = desk.answers_to(command_id="x" * 60_000, text="sing a sea shanty")
     assert refused["command_id"] == "x" * 128
 
 
 def test_a_plan_with_very_many_faults_is_refused_in_a_bounded_answer(desk):
-    desk.give(plan={"actions": [{"skill": f"fly_{number}"} for number in range(100)]})
-    (refused,) = desk.answers()
+    (refused,) = desk.answers_to(
+        plan={"actions": [{"skill": f"fly_{number}"} for number in range(100)]}
+    )
     assert refused["reason"].endswith("... (and more)")
     assert len(refused["reason"]) < 3000
 
@@ -137,19 +124,11 @@ def test_a_restarted_planner_takes_up_what_nobody_has_answered(desk):
     assert desk.answers() == [], "it was answered"
 
 
-def test_a_restarted_planner_hands_on_a_stop_that_came_while_it_was_away(desk):
-    desk.give(text="stop")
-    desk.start()
-    assert desk.answers() == []
-    assert desk.plans() == [{"command_id": "c1", "cancel": True}]
-
-
 def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
     open_desk, later, back_end, propose
 ):
     desk = open_desk(back_end("model", propose(("wait", {"duration_s": 1.0}))), executor=later)
-    desk.give(text="sing a sea shanty")
-    assert [one["event"] for one in desk.answers()] == ["planning"]
+    assert [one["event"] for one in desk.answers_to("sing a sea shanty")] == ["planning"]
     desk.start()
     (lost,) = desk.told()
     assert (lost["event"], lost["reason"]) == ("rejected", AWAY)
@@ -158,8 +137,7 @@ def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
 
 def test_the_status_tells_of_commands_and_rungs(desk):
     desk.give(text="go to the kitchen")
-    desk.give(text="sing a sea shanty")
-    desk.answers()
+    desk.answers_to("sing a sea shanty")
     status = desk.status()
     assert (status["heard"], status["planned"], status["refused"]) == (2, 1, 1)
     assert status["by_rung"]["patterns"]["planned"] == 1
@@ -174,8 +152,7 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
     model = back_end("model", propose(("wait", {"duration_s": 1.0})))
     model.close = lambda: closed.append("model")
     desk = open_desk(model, executor=later)
-    desk.give(text="sing a sea shanty")
-    desk.answers()
+    desk.answers_to("sing a sea shanty")
     node = desk.planner
     before = node.commit(node.prepare(load_profile("desktop"), 0))
     node.discard(before)

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.planner_bounds import moves
-from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerSession, fresh_session
+from benchmarks.planner_session import PlannerSession
 from drivers.clock import MonotonicClock
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import Forbidden, Prohibition, StandingOrder
@@ -22,11 +21,6 @@ from vla_deploy.world import Snapshot
 WORLD = world_of(load_robot("butler"), {})
 KEYS = Prohibition(what=Forbidden.THING, words="keys")
 KITCHEN = Prohibition(what=Forbidden.PLACE, words="kitchen")
-
-
-def in_the_flat(desk: PlannerSession) -> PlannerSession:
-    desk.tell(scenes()["tidy"].world(home()))
-    return desk
 
 
 def refused(desk: PlannerSession, text: str) -> str:
@@ -56,21 +50,19 @@ def test_orders_are_read_from_whole_sentences(text: str, order: StandingOrder | 
     assert read_order(text, WORLD, (KEYS, KITCHEN)) == order
 
 
-def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        (said,) = (desk.say("don't touch the keys")[1].plan or {})["actions"]
-        assert said["parameters"] == {"text": "All right, I will not touch the keys."}
-        why = refused(desk, "bring me the keys")
-        assert 'say "you may touch the keys again" first' in why
-        refused(desk, "put the keys in the box")
-        assert moves(desk.say("pick up the red cup")[1].plan or {})
-        asked = desk.say("you may touch the keys again")[1]
-        assert (asked.outcome, asked.text) == ("ask", "May I touch the keys again?")
-        refused(desk, "bring me the keys")
-        desk.say("you may touch the keys again")
-        desk.say("yes")
-        assert desk.say("bring me the keys")[1].outcome == "plan"
+def test_a_thing_is_not_taken_until_that_is_permitted(flat: PlannerSession) -> None:
+    (said,) = (flat.say("don't touch the keys")[1].plan or {})["actions"]
+    assert said["parameters"] == {"text": "All right, I will not touch the keys."}
+    why = refused(flat, "bring me the keys")
+    assert 'say "you may touch the keys again" first' in why
+    refused(flat, "put the keys in the box")
+    assert moves(flat.say("pick up the red cup")[1].plan or {})
+    asked = flat.say("you may touch the keys again")[1]
+    assert (asked.outcome, asked.text) == ("ask", "May I touch the keys again?")
+    refused(flat, "bring me the keys")
+    flat.say("you may touch the keys again")
+    flat.say("yes")
+    assert flat.say("bring me the keys")[1].outcome == "plan"
 
 
 @pytest.mark.parametrize(
@@ -103,22 +95,20 @@ def test_what_is_not_seen_is_not_taken_where_it_may_be_the_forbidden(
         ("go to the bedroom", "stay out of the kitchen"),
     ],
 )
-def test_what_is_under_way_ends_where_something_is_forbidden(command: str, order: str) -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        assert desk.say(command)[1].outcome == "plan"
-        assert desk.say(order)[1].outcome == "stop"
+def test_what_is_under_way_ends_where_something_is_forbidden(
+    flat: PlannerSession, command: str, order: str
+) -> None:
+    assert flat.say(command)[1].outcome == "plan"
+    assert flat.say(order)[1].outcome == "stop"
 
 
-def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        desk.say("stay out of the kitchen")
-        refused(desk, "go to the kitchen")
-        refused(desk, "go to the kitchen table")
-        refused(desk, "patrol the kitchen")
-        refused(desk, "bring me the green bottle")
-        assert desk.say("go to the bedroom")[1].outcome == "plan"
+def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there(flat: PlannerSession) -> None:
+    flat.say("stay out of the kitchen")
+    refused(flat, "go to the kitchen")
+    refused(flat, "go to the kitchen table")
+    refused(flat, "patrol the kitchen")
+    refused(flat, "bring me the green bottle")
+    assert flat.say("go to the bedroom")[1].outcome == "plan"
 
 
 @pytest.mark.parametrize(
@@ -133,34 +123,32 @@ def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
     ],
 )  # fmt: skip
 def test_a_search_leaves_out_what_may_not_be_entered(
-    orders: tuple[str, ...], text: str, outcome: str, keeps_out: list[str] | None
+    flat: PlannerSession,
+    orders: tuple[str, ...],
+    text: str,
+    outcome: str,
+    keeps_out: list[str] | None,
 ) -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        for order in orders:
-            desk.say(order)
-        answer = desk.say(text)[1]
-        assert answer.outcome == outcome, answer
-        assert (answer.plan and answer.plan["keeps_out"]) == keeps_out
-        if outcome == "refuse":
-            assert "you told me not to go into the kitchen" in answer.text
+    for order in orders:
+        flat.say(order)
+    answer = flat.say(text)[1]
+    assert answer.outcome == outcome, answer
+    assert (answer.plan and answer.plan["keeps_out"]) == keeps_out
+    if outcome == "refuse":
+        assert "you told me not to go into the kitchen" in answer.text
 
 
-def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        desk.say("don't touch the keys")
-        plan = {"goal": "keys", "actions": [{"id": "a", "skill": "pick_up",
-                                             "parameters": {"object": "keys_1"}}]}  # fmt: skip
-        assert desk.hand_in(plan)[1].outcome == "refuse"
+def test_a_plan_of_somebody_else_is_held_to_it_too(flat: PlannerSession) -> None:
+    flat.say("don't touch the keys")
+    plan = {"goal": "keys", "actions": [{"id": "a", "skill": "pick_up",
+                                         "parameters": {"object": "keys_1"}}]}  # fmt: skip
+    assert flat.hand_in(plan)[1].outcome == "refuse"
 
 
-def test_another_profiles_planner_holds_to_it_too() -> None:
-    with fresh_session() as desk:
-        in_the_flat(desk)
-        desk.say("stay out of the kitchen")
-        desk.node.commit(Planner(MonotonicClock()))
-        refused(desk, "go to the kitchen")
+def test_another_profiles_planner_holds_to_it_too(flat: PlannerSession) -> None:
+    flat.say("stay out of the kitchen")
+    flat.node.commit(Planner(MonotonicClock()))
+    refused(flat, "go to the kitchen")
 
 
 def test_they_stand_after_a_restart_and_a_spoilt_file_is_no_end(

@@ -38,8 +38,7 @@ def keys(seen_s: float, place: str = "bedside_table") -> LastSeen:
 def test_a_command_and_its_end_are_remembered(open_desk: Callable, memory: MemoryStore) -> None:
     desk = open_desk(memory=memory)
     desk.give(text="go to the kitchen")
-    desk.give(command_id="c2", text="sing a sea shanty")
-    desk.answers()
+    desk.answers_to("sing a sea shanty")
     desk.executor_tells(command_id="c1", event="finished", success=True, error=None)
     desk.answers()
     desk.planner.stop()

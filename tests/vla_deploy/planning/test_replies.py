@@ -2,8 +2,7 @@
 
 import pytest
 
-from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import fresh_session
+from benchmarks.planner_session import PlannerSession
 
 
 @pytest.mark.parametrize(
@@ -21,10 +20,10 @@ from benchmarks.planner_session import fresh_session
         ("go to the moon", "refuse", 'the place "the moon"; I know: bedroom'),
     ],
 )
-def test_what_is_said_gets_a_true_answer(text: str, outcome: str, said: str) -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        answer = desk.say(text)[1]
-        told = [one["parameters"].get("text", "") for one in (answer.plan or {}).get("actions", ())]
-        assert answer.outcome == outcome, answer
-        assert said in " ".join([answer.text, *told])
+def test_what_is_said_gets_a_true_answer(
+    flat: PlannerSession, text: str, outcome: str, said: str
+) -> None:
+    answer = flat.say(text)[1]
+    told = [one["parameters"].get("text", "") for one in (answer.plan or {}).get("actions", ())]
+    assert answer.outcome == outcome, answer
+    assert said in " ".join([answer.text, *told])

@@ -6,8 +6,7 @@ from typing import Final
 import pytest
 
 from benchmarks.planner_bounds import moves
-from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerAnswer, fresh_session
+from benchmarks.planner_session import PlannerAnswer, PlannerSession
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanRequest, Proposal
 from vla_deploy.planning.scope import guarded, scope_words
@@ -27,27 +26,21 @@ CHANGES: Final = (
 )  # fmt: skip
 
 
-def asked(text: str) -> PlannerAnswer:
-    with fresh_session() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        return desk.say(text)[1]
-
-
 def runs(answer: PlannerAnswer) -> bool:
     return answer.outcome == "plan" and moves(answer.plan or {})
 
 
 @pytest.mark.parametrize("plain", PLAIN)
-def test_a_plain_command_runs_unasked(plain: str) -> None:
-    assert runs(asked(plain))
+def test_a_plain_command_runs_unasked(flat: PlannerSession, plain: str) -> None:
+    assert runs(flat.say(plain)[1])
 
 
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("plain", PLAIN)
 def test_with_a_word_that_changes_it_the_same_plan_does_not_run_unasked(
-    plain: str, change: str
+    flat: PlannerSession, plain: str, change: str
 ) -> None:
-    answer = asked(change.format(plain))
+    answer = flat.say(change.format(plain))[1]
     assert not runs(answer), answer.plan
 
 
@@ -69,8 +62,8 @@ def test_scope_words_are_found_and_idioms_are_none(text: str, words: tuple[str, 
     assert scope_words(text) == words
 
 
-def test_the_question_names_what_may_not_be_understood() -> None:
-    answer = asked("go to the kitchen before dinner")
+def test_the_question_names_what_may_not_be_understood(flat: PlannerSession) -> None:
+    answer = flat.say("go to the kitchen before dinner")[1]
     assert answer.outcome in ("ask", "refuse")
     assert re.search(r"before|later|time|sure|leave out|understand", answer.text), answer.text
 

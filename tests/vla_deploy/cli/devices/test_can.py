@@ -12,7 +12,6 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.can import CanHub, CanWire, WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.odrive.axis import ODriveAxis
-from vla_deploy.cli.main import main
 
 CLOCK = MonotonicClock()
 
@@ -57,17 +56,21 @@ def make_bus(tmp_path: Path) -> Iterator[Callable[..., ServedBus]]:
         bus.close()
 
 
-def on(bus: ServedBus, *words: str) -> int:
-    command, *rest = words
-    return main(["can", command, "--interface", "vla_hub", "--channel", bus.path, *rest])
+@pytest.fixture
+def on(vla: Callable[..., Any]) -> Callable[..., Any]:
+    """Run a CAN command on a bus."""
+
+    def on(bus: ServedBus, command: str, *words: str) -> Any:
+        return vla("can", command, "--interface", "vla_hub", "--channel", bus.path, *words)
+
+    return on
 
 
 def test_a_scan_finds_canopen_nodes_with_their_identity(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any]
 ) -> None:
     bus = make_bus(WheelDrive(5), WheelDrive(126))
-    assert on(bus, "scan", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
+    found = on(bus, "scan", "--json").document
     assert [node["node_id"] for node in found["canopen"]] == [5, 126]
     assert found["canopen"][0]["profile"] == 402
     assert found["canopen"][0]["vendor"] == 0x564C4144
@@ -76,12 +79,12 @@ def test_a_scan_finds_canopen_nodes_with_their_identity(
 
 
 def test_a_scan_finds_odrive_axes_and_asks_no_silent_node(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any]
 ) -> None:
     axis = ODriveAxis(48)
     bus = make_bus(axis, ODriveAxis(0))
-    assert on(bus, "scan") == 0
-    told = capsys.readouterr().out
+    code, told, _ = on(bus, "scan")
+    assert code == 0
     assert "ODrive axis    0: firmware 0.0.0, IDLE, errors none" in told
     assert "ODrive axis   48" in told
     assert "silent CANopen nodes were not asked" in told
@@ -89,10 +92,11 @@ def test_a_scan_finds_odrive_axes_and_asks_no_silent_node(
 
 
 def test_a_scan_of_an_empty_bus_fails_with_a_remedy(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any]
 ) -> None:
-    assert on(make_bus(), "scan", "--protocol", "odrive") == 1
-    assert "nobody answers at 1000000 bit/s" in capsys.readouterr().err
+    code, _, error = on(make_bus(), "scan", "--protocol", "odrive")
+    assert code == 1
+    assert "nobody answers at 1000000 bit/s" in error
 
 
 def frames_of(text: str) -> list[dict[str, Any]]:
@@ -100,11 +104,10 @@ def frames_of(text: str) -> list[dict[str, Any]]:
 
 
 def test_the_monitor_prints_odrive_traffic_by_name(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any]
 ) -> None:
     bus = make_bus(ODriveAxis(3))
-    assert on(bus, "monitor", "--protocol", "odrive", "--count", "20", "--json") == 0
-    frames = frames_of(capsys.readouterr().out)
+    frames = frames_of(on(bus, "monitor", "--protocol", "odrive", "--count", "20", "--json").out)
     assert len(frames) == 20
     assert {frame["kind"] for frame in frames} == {"Heartbeat", "Get_Encoder_Estimates"}
     assert {frame["node"] for frame in frames} == {3}
@@ -113,55 +116,22 @@ def test_the_monitor_prints_odrive_traffic_by_name(
 
 
 def test_the_monitor_prints_canopen_traffic_in_words_and_ends_in_time(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any]
 ) -> None:
     drive = WheelDrive(1)
     bus = make_bus(drive)
     fault = threading.Timer(0.5, drive.raise_fault, (0x4310, 0x09))
     fault.start()
-    assert on(bus, "monitor", "--seconds", "1.0") == 0
+    code, told, _ = on(bus, "monitor", "--seconds", "1.0")
     fault.join()
-    assert "EMCY 1  0x4310 drive over-temperature, error register 0x09" in capsys.readouterr().out
+    assert code == 0
+    assert "EMCY 1  0x4310 drive over-temperature, error register 0x09" in told
 
 
 @pytest.mark.parametrize("chosen", [["--node", "3"], ["--id", "0x61"], ["--id", "97"]])
 def test_the_monitor_prints_only_what_it_is_asked_for(
-    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str], chosen: list[str]
+    make_bus: Callable[..., ServedBus], on: Callable[..., Any], chosen: list[str]
 ) -> None:
     bus = make_bus(ODriveAxis(2), ODriveAxis(3))
-    assert on(bus, "monitor", "--protocol", "odrive", "--count", "3", "--json", *chosen) == 0
-    assert {frame["node"] for frame in frames_of(capsys.readouterr().out)} == {3}
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["scan", "--interface", "socketcan"], "needs --channel"),
-        (["scan", "--interface", "vla_hub", "--channel", "none"], "start the twin first"),
-        (["monitor", "--interface", "slcan", "--channel", "/none"], "see /dev/serial/by-id"),
-        (["scan", "--robot", "nobody"], "nobody"),
-    ],
-)
-def test_what_cannot_be_opened_says_what_to_try(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["can", *words]) == 2
-    assert told in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["scan"],
-        ["monitor", "--robot", "butler", "--count", "0"],
-        ["monitor", "--robot", "butler", "--id", "0xyz"],
-        ["monitor", "--robot", "butler", "--node", "-1"],
-    ],
-)
-def test_bad_arguments_are_told_in_one_line(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["can", *words])
-    assert end.value.code == 2
-    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    said = on(bus, "monitor", "--protocol", "odrive", "--count", "3", "--json", *chosen)
+    assert {frame["node"] for frame in frames_of(said.out)} == {3}

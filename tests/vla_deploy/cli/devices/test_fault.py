@@ -37,12 +37,6 @@ def fault(vla: Fault) -> Fault:
     return partial(vla, "fault")
 
 
-def test_without_a_run_it_is_refused(fault: Fault) -> None:
-    said = fault("list")
-    assert said.code == 2
-    assert "no robot runs" in said.err
-
-
 @pytest.mark.parametrize(
     "words", [("list",), ("inject", "servo", "off", "3"), ("clear",), ("run", "servo_off")]
 )

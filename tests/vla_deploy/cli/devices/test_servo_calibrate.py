@@ -4,6 +4,7 @@ import argparse
 import json
 import shutil
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from math import tau
 from pathlib import Path
@@ -143,6 +144,18 @@ def calibrated(butler: Butler, joint: str) -> tuple[int, float]:
     return servo.sign, servo.offset
 
 
+def test_several_joints_come_one_after_another_into_the_file_that_was_named(make_butler, tmp_path):
+    butler = make_butler(left_elbow=(1, 1.2), head_pan=(1, 0.1))
+    other = tmp_path / "mine.toml"
+    words = ("--joint", "left_elbow", "--joint", "head_pan", "--output", str(other))
+    run(butler, Hand(butler), *words)
+    found = read_calibration(other)
+    assert found["left_elbow"].offset == pytest.approx(1.2, abs=0.004)
+    assert found["head_pan"].offset == pytest.approx(0.1, abs=0.004)
+    assert found["left_elbow"].servo_id == 3
+    assert not (butler.folder / CALIBRATION_FILE).exists()
+
+
 @pytest.mark.parametrize("offset", [1.1, 1.3, 1.55])
 def test_a_joint_moved_from_end_to_end_gets_its_true_offset(make_butler, offset):
     butler = make_butler(left_elbow=(1, offset))
@@ -156,13 +169,6 @@ def test_a_joint_moved_from_end_to_end_gets_its_true_offset(make_butler, offset)
         "left_elbow: move it to its UPPER end (2.6), hold it",
     ]
     assert f"left_elbow: sign +1, offset 1.3000 -> {found:.4f} ({found - 1.3:+.4f})" in hand.told
-
-
-def test_several_joints_come_one_after_another_into_one_file(make_butler):
-    butler = make_butler(left_elbow=(1, 1.2), head_pan=(1, 0.1))
-    run(butler, Hand(butler), "--joint", "left_elbow", "--joint", "head_pan")
-    assert calibrated(butler, "left_elbow")[1] == pytest.approx(1.2, abs=0.004)
-    assert calibrated(butler, "head_pan")[1] == pytest.approx(0.1, abs=0.004)
 
 
 def test_a_count_that_starts_over_during_the_sweep_changes_nothing(make_butler):
@@ -250,48 +256,58 @@ def refuses(butler: Butler, hand: Hand, words: str, *arguments: str) -> None:
     assert not (butler.folder / CALIBRATION_FILE).exists()
 
 
-def test_a_joint_that_was_not_moved_is_refused(make_butler):
+Habit = Callable[[Hand, str, Callable[[], None]], None]
+
+
+def moves(*ways: tuple[str, float, float]) -> Habit:
+    """Move joints one after the other, each from a start to an end."""
+
+    def habit(hand: Hand, joint: str, meanwhile: Callable[[], None]) -> None:
+        for name, start, end in ways:
+            hand.move(name, end, meanwhile, start=start)
+
+    return habit
+
+
+def lets_go(hand: Hand, joint: str, meanwhile: Callable[[], None]) -> None:
+    hand.obey(joint, meanwhile)
+    hand.butler.drift = {joint: 0.1}
+
+
+ELBOW_UP, ELBOW_DOWN = moves(("left_elbow", 2.6, 2.6)), moves(("left_elbow", 2.6, 0.0))
+HEAD, ELBOW = ("head_pan", -1.5, 1.5), ("left_elbow", 0.0, 2.6)
+FIT = "it moved by {} degrees, its range 0..2.6 is 149.0 degrees"
+
+
+@pytest.mark.parametrize(
+    ("habits", "words"),
+    [
+        ({UPPER: moves()}, "left_elbow: it did not move; move left_elbow from end to end"),
+        ({UPPER: moves(HEAD)}, "it did not move; head_pan moved instead"),
+        (
+            {UPPER: moves(HEAD, ELBOW)},
+            "head_pan moved too; hold the others and move left_elbow alone",
+        ),
+        ({UPPER: moves(("left_elbow", 0.0, 1.0))}, FIT.format("57.2")),
+        ({UPPER: moves(("left_elbow", 0.0, 4.5))}, FIT.format("257.8")),
+        (
+            {LOWER: ELBOW_UP, UPPER: ELBOW_DOWN},
+            "it went against its declared sign 1: begin at the lower end (0)",
+        ),
+        ({LOWER: lets_go}, "while it was measured; hold it still"),
+        ({"mark": lets_go}, "while it was measured; hold it still"),
+    ],
+)
+def test_a_joint_that_is_moved_in_another_way_than_asked_is_refused(make_butler, habits, words):
     butler = make_butler()
     hand = Hand(butler)
-    hand.habits = {UPPER: lambda joint, meanwhile: None}
-    refuses(butler, hand, "left_elbow: it did not move; move left_elbow from end to end")
+    hand.habits = {end: partial(habit, hand) for end, habit in habits.items()}
+    refuses(butler, hand, words, "--method", "mark" if "mark" in habits else "ends")
 
 
-def test_another_joint_moved_instead_is_named(make_butler):
-    butler = make_butler()
-    hand = Hand(butler)
-    hand.habits = {UPPER: lambda joint, m: hand.move("head_pan", 1.5, m, start=-1.5)}
-    refuses(butler, hand, "it did not move; head_pan moved instead")
-
-
-def test_two_joints_moved_at_once_are_refused(make_butler):
-    butler = make_butler()
-    hand = Hand(butler)
-
-    def both(joint: str, meanwhile: Callable[[], None]) -> None:
-        hand.move("head_pan", 1.5, meanwhile, start=-1.5)
-        hand.move(joint, 2.6, meanwhile, start=0.0)
-
-    hand.habits = {UPPER: both}
-    refuses(butler, hand, "head_pan moved too; hold the others and move left_elbow alone")
-
-
-@pytest.mark.parametrize(("end", "words"), [(1.0, "57.2 degrees"), (4.5, "257.8 degrees")])
-def test_a_travel_that_does_not_fit_the_range_is_refused(make_butler, end, words):
-    butler = make_butler()
-    hand = Hand(butler)
-    hand.habits = {UPPER: lambda joint, m: hand.move(joint, end, m, start=0.0)}
-    refuses(butler, hand, f"it moved by {words}, its range 0..2.6 is 149.0 degrees")
-
-
-def test_ends_in_the_wrong_order_are_refused(make_butler):
-    butler = make_butler()
-    hand = Hand(butler)
-    hand.habits = {
-        LOWER: lambda joint, m: hand.move(joint, 2.6, m),
-        UPPER: lambda joint, m: hand.move(joint, 0.0, m, start=2.6),
-    }
-    refuses(butler, hand, "it went against its declared sign 1: begin at the lower end (0)")
+def test_a_horn_mounted_across_the_end_of_the_turn_is_refused(make_butler):
+    butler = make_butler(left_elbow=(1, 1.3 - 2.5))
+    refuses(butler, Hand(butler), "left_elbow: its travel crosses the end of the servo's turn")
 
 
 def test_a_servo_mounted_the_other_way_round_is_taken_when_asked_for(make_butler):
@@ -301,35 +317,11 @@ def test_a_servo_mounted_the_other_way_round_is_taken_when_asked_for(make_butler
     assert calibrated(butler, "left_elbow") == (-1, pytest.approx(1.35, abs=0.004))
 
 
-@pytest.mark.parametrize("method", ["ends", "mark"])
-def test_a_joint_that_moves_while_it_is_measured_is_refused(make_butler, method):
-    butler = make_butler()
-    hand = Hand(butler)
-
-    def let_go(joint: str, meanwhile: Callable[[], None]) -> None:
-        hand.obey(joint, meanwhile)
-        butler.drift = {joint: 0.1}
-
-    hand.habits = {LOWER: let_go, "mark": let_go}
-    refuses(butler, hand, "while it was measured; hold it still", "--method", method)
-
-
-def test_a_horn_mounted_across_the_end_of_the_turn_is_refused(make_butler):
-    butler = make_butler(left_elbow=(1, 1.3 - 2.5))
-    refuses(butler, Hand(butler), "left_elbow: its travel crosses the end of the servo's turn")
-
-
 def test_a_refusal_is_followed_by_another_try(make_butler):
     butler = make_butler(left_elbow=(1, 1.22))
     hand = Hand(butler)
-    tries = []
-
-    def lazy_at_first(joint: str, meanwhile: Callable[[], None]) -> None:
-        tries.append(joint)
-        if len(tries) > 1:
-            hand.obey(joint, meanwhile)
-
-    hand.habits = {UPPER: lazy_at_first}
+    tries = iter([moves(), Hand.obey])
+    hand.habits = {UPPER: lambda joint, meanwhile: next(tries)(hand, joint, meanwhile)}
     assert run(butler, hand, "--joint", "left_elbow") == 0
     assert calibrated(butler, "left_elbow")[1] == pytest.approx(1.22, abs=0.004)
 
@@ -356,14 +348,6 @@ def test_a_bus_that_is_lost_half_way_keeps_what_was_measured(make_butler):
     with pytest.raises(Exception, match="unplugged"):
         run(butler, hand, "--joint", "left_elbow", "--joint", "head_pan")
     assert list(read_calibration(butler.folder / CALIBRATION_FILE)) == ["left_elbow"]
-
-
-def test_the_other_file_is_written_and_the_robots_stays(make_butler, tmp_path):
-    butler = make_butler(left_elbow=(1, 1.2))
-    other = tmp_path / "mine.toml"
-    run(butler, Hand(butler), "--joint", "left_elbow", "--output", str(other))
-    assert read_calibration(other)["left_elbow"].servo_id == 3
-    assert not (butler.folder / CALIBRATION_FILE).exists()
 
 
 def test_torque_goes_off_only_with_consent(make_butler):

@@ -78,26 +78,3 @@ def test_a_conversion_replaces_nothing_unasked(
     assert (tmp_path / "raw.pgm").read_bytes() == image
     assert main(["map", "convert", str(renamed), str(tmp_path / "other.yaml"), "--replace"]) == 0
     assert read_map_file(tmp_path / "other.yaml").mode is MapMode.TRINARY
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["check", "gone.yaml"], "gone.yaml: cannot read the map"),
-        (["convert", "a.yaml", "a.yaml"], "choose another file"),
-        (["show", str(KEPT), "--png", "noext"], "ends in .png"),
-        (["record", "new.yaml", "--seconds", "1"], "no robot runs"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    words: list[str],
-    message: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["--runtime-base", str(tmp_path / "run"), "map", *words]) == 2
-    told = capsys.readouterr().err
-    assert message in told
-    assert told.count("\n") == 1

@@ -57,16 +57,6 @@ def test_a_model_that_could_not_be_read_back_is_not_added(vla, files, option, va
     assert "mugs" not in vla("list")[1]
 
 
-@pytest.mark.parametrize("drop", ["nan", "-5", "inf", "much"])
-def test_no_limit_of_the_drop_is_no_limit_to_ask_for(vla, files, added, drop, capsys):
-    words = ("--images", files["photos"], "--labelled", files["photos"], "--max-drop", drop)
-    with pytest.raises(SystemExit) as ended:
-        vla("quantise", added, *words)
-
-    assert ended.value.code == 2
-    assert "expected points from 0 to 100" in capsys.readouterr().err
-
-
 def test_a_model_is_added_listed_shown_and_removed(vla, files, base):
     code, out, _ = vla(
         "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"], "--json"
@@ -108,8 +98,6 @@ def test_what_is_wrong_with_a_model_is_one_line_and_code_2(vla, files, tmp_path)
     )
     assert code == 2
     assert errors.startswith(f"vla-deploy: {files['onnx']}: adapter yolo: expected one output")
-    code, _, errors = vla("show", "nothing")
-    assert (code, "no model 'nothing': expected one of" in errors) == (2, True)
 
 
 def test_quantise_makes_the_files_that_bench_then_measures(vla, files, added):
@@ -185,20 +173,4 @@ def test_verify_returns_1_when_a_check_fails(vla, added, base):
     assert failed["check"] == "profile jetson_orin_nx"
     assert "TensorrtExecutionProvider: this onnxruntime" in failed["detail"]
     (models_dir_of(base) / added / "mugs.onnx").write_bytes(b"cut")
-    assert vla("verify", "--profile", "desktop")[0] == 1
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("add", "x"),
-        ("add", "x", "--onnx", "f", "--size", "640"),
-        ("bench", "x", "--rounds", "0"),
-        ("quantise", "x", "--images", "d"),
-    ],
-)
-def test_a_bad_argument_is_one_line(vla, capsys, arguments):
-    with pytest.raises(SystemExit) as caught:
-        vla(*arguments)
-    assert caught.value.code == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert vla("verify", added, "--profile", "desktop")[0] == 1

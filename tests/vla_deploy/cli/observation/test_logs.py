@@ -71,23 +71,12 @@ def test_an_unknown_process_is_refused_with_those_that_logged(run, logs):
     assert error.endswith("there are control, planner\n")
 
 
-def test_without_a_run_the_last_one_is_named(run):
-    code, _, error = run("logs")
-    assert code == 2
-    assert "vla-deploy logs --last-run" in error
-
-
 def test_the_run_that_ended_last_is_shown(run, base):
     for name in ("000009-b", "000010-a"):
         folder = base.with_name("base-state") / "runs" / name
         folder.mkdir(parents=True)
         (folder / "control.log").write_text(line("control", int(name[:6])))
     assert run("logs", "--last-run")[1] == ["t10 control: INFO: control 10"]
-
-
-def test_no_ended_run_is_one_line(run, logs):
-    code, _, error = run("logs", "--last-run")
-    assert (code, error.count("\n")) == (2, 1)
 
 
 def test_following_an_ended_run_is_refused(run, logs):

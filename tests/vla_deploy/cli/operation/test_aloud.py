@@ -8,7 +8,6 @@ import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.main import main
 from vla_deploy.cli.operation.aloud import Aloud, MotionWatch, SpokenCommand, why_deaf
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import SharedSpace
@@ -154,18 +153,3 @@ def test_a_deaf_robot_says_why(
     twin.space.cell_writer("speech_status").put_document(status)
     with pytest.raises(UsageError, match=why):
         Aloud(session)
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["say", "--aloud", "--plan", "plan.json"], "--aloud says a command in words"),
-        (["say", "hello", "--voice", "en-us"], "add --aloud"),
-        (["say", "hello", "--snr", "10"], "add --aloud"),
-    ],
-)
-def test_arguments_that_do_not_go_together_are_one_line(
-    words: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(words) == 2
-    assert complaint in capsys.readouterr().err

@@ -107,15 +107,6 @@ def test_what_a_joint_cannot_do_is_refused_and_nothing_is_sent(
 
 
 @pytest.mark.parametrize(
-    "words", [["--to", "nan"], ["--by", "inf"], ["--to", "left"], ["--to", "0", "--speed", "0"]]
-)
-def test_what_is_no_number_is_refused_with_what_was_expected(capsys, words):
-    with pytest.raises(SystemExit):
-        main(["joint", "move", "head_pan", *words])
-    assert "expected" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
     ("state", "complaint"), [("disarmed", "arm it first"), ("stopped", "reset and arm it first")]
 )
 def test_a_robot_that_is_not_armed_moves_nothing(attached, robot, capsys, state, complaint):

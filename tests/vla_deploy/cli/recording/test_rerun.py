@@ -20,24 +20,6 @@ def test_without_the_extra_one_line_tells_how_to_get_it(
     assert "pip install 'vla-deploy[rerun]'" in told
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        ([str(FLIGHT), "--save", str(FLIGHT)], "expected a name that ends in .rrd"),
-        (["nobodys.mcap", "--save", "out.rrd"], "no recording 'nobodys.mcap'"),
-        (["--without", "nothing_like_it", "--save", "out.rrd"], "no topic matches"),
-        (["--save", "out.rrd"], "no robot runs in"),
-    ],
-)
-def test_what_cannot_be_done_is_told_in_one_line(
-    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    assert main(["--runtime-base", str(tmp_path), "rerun", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert told in error
-    assert error.count("\n") == 1
-
-
 def test_a_flight_becomes_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     pytest.importorskip("rerun", reason="the extra [rerun] is not installed")
     out = tmp_path / "out.rrd"

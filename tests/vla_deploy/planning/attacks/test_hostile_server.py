@@ -54,12 +54,12 @@ def desk(loopback: Any, tmp_path: Path, profile: str) -> Iterator[PlannerSession
     config.mkdir()
     (config / "servers.toml").write_text(SERVER.format(url=loopback.url))
     desk = PlannerSession(tmp_path / "base" / "run", profile)
-    desk.tell(scenes()["tidy"].world(home()))
     yield desk
     desk.close()
 
 
 def asked(desk: PlannerSession, text: str = ODD) -> PlannerAnswer:
+    desk.tell(scenes()["tidy"].world(home()))  # what is told grows old while a server is asked
     return desk.say(text)[1]
 
 
@@ -74,53 +74,25 @@ def assert_goes_on(desk: PlannerSession) -> None:
     assert action["skill"] == "navigate_to"
 
 
+# What such answers are is told by the tests of the model servers; here, that the robot goes on.
 WIRE: Final = {
-    "hangs up at once": (),
-    "ends in the head": (b"HTTP/1.1 200 OK\r\nContent-Le",),
-    "ends in the answer": (b'HTTP/1.1 200 OK\r\nContent-Length: 900\r\n\r\n{"choices": [{"mess',),
-    "speaks no HTTP": (b"\x00\xff\xfe SSH-2.0-OpenSSH_9.2\r\n",),
-    "sends no JSON": (b"HTTP/1.1 200 OK\r\nContent-Length: 5\r\n\r\n<ht>\n",),
-    "sends a head without end": (b"HTTP/1.1 200 OK\r\n" + b"X-Filler: 1\r\n" * 50_000,),
-    "claims a negative length": (b"HTTP/1.1 200 OK\r\nContent-Length: -1\r\n\r\n{}",),
+    "hangs up at once": b"",
+    "speaks no HTTP": b"\x00\xff\xfe SSH-2.0-OpenSSH_9.2\r\n",
+    "ends in the answer": b'HTTP/1.1 200 OK\r\nContent-Length: 900\r\n\r\n{"choices": [{"mess',
+    "claims a negative length": b"HTTP/1.1 200 OK\r\nContent-Length: -1\r\n\r\n{}",
+    "is out of memory": b"HTTP/1.1 500 Oops\r\nContent-Length: 2\r\n\r\n{}",
+    "sends a megabyte": b"HTTP/1.1 200 OK\r\n\r\n" + b"[" * MEGABYTE,
+    "has no choices": b'HTTP/1.1 200 OK\r\nContent-Length: 15\r\n\r\n{"choices": []}',
+    "chooses by a text": b'HTTP/1.1 200 OK\r\nContent-Length: 17\r\n\r\n{"choices": "go"}',
 }
 
 
-@pytest.mark.parametrize("pieces", WIRE.values(), ids=WIRE)
-def test_a_connection_that_breaks_is_no_plan(
-    desk: PlannerSession, loopback: Any, pieces: tuple[bytes, ...]
-) -> None:
-    loopback.then(loopback.raw(*pieces))
+@pytest.mark.parametrize("answer", WIRE.values(), ids=WIRE)
+def test_a_broken_answer_is_no_plan(desk: PlannerSession, loopback: Any, answer: bytes) -> None:
+    loopback.then(loopback.raw(answer))
     assert asked(desk).outcome == "refuse"
     assert len(loopback.heard) >= 1
     assert_goes_on(desk)
-
-
-REPLIES: Final = {
-    "server error": (500, {"error": {"message": "out of memory"}}),
-    "not found": (404, {"error": "no such model"}),
-    "no choices": (200, {"choices": []}),
-    "choices of another type": (200, {"choices": "go to the kitchen"}),
-    "a message that is a list": (200, {"choices": [{"message": [1]}]}),
-    "a megabyte of blanks": (200, b"{" + b" " * MEGABYTE + b"}"),
-    "a megabyte of brackets": (200, b"[" * MEGABYTE),
-    "a list where an object should be": (200, [1, 2, 3]),
-    "bytes that are no text": (200, b'{"choices": [{"message": {"content": "\xff\xfe"}}]}'),
-}
-
-
-@pytest.mark.parametrize(("status", "content"), REPLIES.values(), ids=REPLIES)
-def test_a_reply_of_another_form_is_no_plan(
-    desk: PlannerSession, loopback: Any, status: int, content: object
-) -> None:
-    loopback.then(loopback.sends(status, content))
-    assert asked(desk).outcome == "refuse"
-    assert_goes_on(desk)
-
-
-def test_a_redirect_is_not_followed(desk: PlannerSession, loopback: Any) -> None:
-    loopback.then(loopback.sends(302, {}, Location=f"{loopback.url}/elsewhere"))
-    assert asked(desk).outcome == "refuse"
-    assert all("elsewhere" not in heard.path for heard in loopback.heard)
 
 
 SAID: Final = {

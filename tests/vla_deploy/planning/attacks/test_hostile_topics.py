@@ -1,28 +1,20 @@
 """Whatever other processes write, the planner answers clearly and takes the next command."""
 
 import math
-from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
 
 from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import PlannerSession, fresh_session
+from benchmarks.planner_session import PlannerSession
 from benchmarks.planner_told import scene_document
 
 CLEAR: Final = ("plan", "ask", "refuse")
 
 
-@pytest.fixture
-def desk() -> Iterator[PlannerSession]:
-    with fresh_session() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        yield desk
-
-
-def assert_goes_on(desk: PlannerSession) -> None:
-    desk.tell(scenes()["tidy"].world(home()))
-    assert desk.say("go to the kitchen")[1].outcome == "plan"
+def assert_goes_on(flat: PlannerSession) -> None:
+    flat.tell(scenes()["tidy"].world(home()))
+    assert flat.say("go to the kitchen")[1].outcome == "plan"
 
 
 UTTERANCES: Final[dict[str, dict[str, Any]]] = {
@@ -49,14 +41,14 @@ UTTERANCES: Final[dict[str, dict[str, Any]]] = {
 
 @pytest.mark.parametrize("utterance", UTTERANCES.values(), ids=UTTERANCES)
 def test_an_utterance_of_any_form_has_a_clear_outcome(
-    desk: PlannerSession, utterance: dict[str, Any]
+    flat: PlannerSession, utterance: dict[str, Any]
 ) -> None:
-    _, answer = desk.give(**utterance)
+    _, answer = flat.give(**utterance)
     allowed = CLEAR if utterance.get("text") == "go to the kitchen" else CLEAR[1:]
     assert answer.outcome in allowed, answer.text
     if answer.outcome == "ask":
-        assert desk.say("never mind")[1].outcome == "refuse"
-    assert_goes_on(desk)
+        assert flat.say("never mind")[1].outcome == "refuse"
+    assert_goes_on(flat)
 
 
 def told(**changes: Any) -> dict[str, Any]:
@@ -79,10 +71,10 @@ SCENES: Final[dict[str, dict[str, Any]]] = {
 
 @pytest.mark.parametrize("document", SCENES.values(), ids=SCENES)
 def test_a_scene_of_any_form_keeps_nobody_from_answering(
-    desk: PlannerSession, document: dict[str, Any]
+    flat: PlannerSession, document: dict[str, Any]
 ) -> None:
-    desk.show("scene", document)
+    flat.show("scene", document)
     for text in ("pick up the red cup", "put the ball in the box", "where is the box"):
-        _, answer = desk.say(text)
+        _, answer = flat.say(text)
         assert answer.outcome in CLEAR, answer.text
-    assert_goes_on(desk)
+    assert_goes_on(flat)

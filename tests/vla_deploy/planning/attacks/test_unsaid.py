@@ -1,10 +1,11 @@
 """What is unsaid, forbidden, quoted or only told moves nothing before somebody agrees."""
 
+from collections.abc import Callable
+
 import pytest
 
 from benchmarks.planner_bounds import moves
-from benchmarks.planner_corpus import home, scenes
-from benchmarks.planner_session import fresh_session
+from benchmarks.planner_session import PlannerSession
 
 SENTENCES = (
     "take the ball to the kitchen, I changed my mind",
@@ -40,10 +41,8 @@ SENTENCES = (
 
 
 @pytest.mark.parametrize("sentence", SENTENCES)
-def test_it_does_not_move_at_once(sentence: str) -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        answer = desk.say(sentence)[1]
+def test_it_does_not_move_at_once(flat: PlannerSession, sentence: str) -> None:
+    answer = flat.say(sentence)[1]
     assert answer.outcome != "plan" or not moves(answer.plan or {}), answer
 
 
@@ -55,11 +54,9 @@ def test_it_does_not_move_at_once(sentence: str) -> None:
         "the other one too",
     ],
 )  # fmt: skip
-def test_more_or_less_of_what_was_done_is_not_done_at_once(said: str) -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["tidy"].world(home()))
-        desk.say("turn left 30 degrees")
-        assert desk.say(said)[1].outcome in ("ask", "refuse")
+def test_more_or_less_of_what_was_done_is_not_done_at_once(flat: PlannerSession, said: str) -> None:
+    flat.say("turn left 30 degrees")
+    assert flat.say(said)[1].outcome in ("ask", "refuse")
 
 
 @pytest.mark.parametrize(
@@ -70,10 +67,11 @@ def test_more_or_less_of_what_was_done_is_not_done_at_once(said: str) -> None:
         "take the red book to the bedroom, the purple one I need here",
     ],
 )
-def test_another_thing_that_is_told_of_is_not_taken_at_once(sentence: str) -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["row"].world(home()))
-        answer = desk.say(sentence)[1]
+def test_another_thing_that_is_told_of_is_not_taken_at_once(
+    session_in: Callable[[str], PlannerSession], sentence: str
+) -> None:
+    desk = session_in("row")
+    answer = desk.say(sentence)[1]
     assert answer.outcome != "plan", answer
 
 
@@ -89,17 +87,19 @@ def test_another_thing_that_is_told_of_is_not_taken_at_once(sentence: str) -> No
         "I'd hate the red",
     ],
 )
-def test_an_answer_that_excludes_or_asks_picks_nothing(answer: str) -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["cups"].world(home()))
-        assert desk.say("bring me the cup from the coffee table")[1].outcome == "ask"
-        said = desk.say(answer)[1]
+def test_an_answer_that_excludes_or_asks_picks_nothing(
+    session_in: Callable[[str], PlannerSession], answer: str
+) -> None:
+    desk = session_in("cups")
+    assert desk.say("bring me the cup from the coffee table")[1].outcome == "ask"
+    said = desk.say(answer)[1]
     assert said.outcome != "plan", said
 
 
-def test_an_answer_with_more_words_is_asked_for_again() -> None:
-    with fresh_session() as desk:
-        desk.tell(scenes()["cups"].world(home()))
-        desk.say("bring me the cup from the coffee table")
-        said = desk.say("the red fella, it suits my mood")[1]
+def test_an_answer_with_more_words_is_asked_for_again(
+    session_in: Callable[[str], PlannerSession],
+) -> None:
+    desk = session_in("cups")
+    desk.say("bring me the cup from the coffee table")
+    said = desk.say("the red fella, it suits my mood")[1]
     assert (said.outcome, said.plan) == ("ask", None)

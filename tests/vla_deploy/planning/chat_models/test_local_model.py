@@ -46,8 +46,7 @@ def test_a_chat_model_is_told_what_is_remembered(
     )
     memory.add([before], [])
     desk = open_desk(chat, memory=memory)
-    desk.give(text="water the tulips once more")
-    desk.answers()
+    desk.answers_to("water the tulips once more")
     ((recollection,),) = told
     assert "water the yellow tulips" in recollection
 

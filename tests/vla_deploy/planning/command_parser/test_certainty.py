@@ -37,36 +37,31 @@ WEIGHTS = Certainty(
 )
 
 
-def odd(command: str, *steps: dict[str, str]) -> Oddities:
-    return oddities_of(steps, command.split(), KNOWN)
+PICK = {"do": "pick", "what": "red cup"}
 
 
-def test_a_plain_answer_has_nothing_odd() -> None:
-    assert odd("pick up the red cup", {"do": "pick", "what": "red cup"}).count == 0
-
-
-def test_each_word_that_is_neither_copied_nor_a_filler_is_told() -> None:
-    found = odd("please pick up the cup unless the fella objects", {"do": "pick", "what": "cup"})
-    assert found.uncovered == ("unless", "fella", "objects")
-
-
-def test_a_word_never_shown_is_odd_unless_it_is_copied() -> None:
-    assert odd("pick up the wug", {"do": "pick", "what": "wug"}).strange == 0
-    assert odd("zorble up the red cup", {"do": "pick", "what": "red cup"}).strange == 1
-
-
-def test_a_colour_or_kind_that_is_left_out_is_odd() -> None:
-    assert odd("pick up the red cup", {"do": "pick", "what": "cup"}).left_out == 1
-
-
-def test_what_was_taken_back_may_be_left_out() -> None:
-    taken_back = odd("pick up the red no i mean the blue cup", {"do": "pick", "what": "blue cup"})
-    assert taken_back.count == 0
-
-
-def test_words_of_two_things_copied_as_one_are_odd() -> None:
-    command = "put the red cup in the box"
-    assert odd(command, {"do": "put", "what": "red box", "where": "box", "how": "in"}).jumps > 0
+@pytest.mark.parametrize(
+    ("command", "step", "oddities"),
+    [
+        ("pick up the red cup", PICK, {"count": 0}),
+        ("please pick up the red cup unless the fella objects", PICK,
+         {"uncovered": ("unless", "fella", "objects")}),
+        ("pick up the wug", {"do": "pick", "what": "wug"}, {"strange": 0}),
+        ("zorble up the red cup", PICK, {"strange": 1}),
+        ("pick up the red cup", {"do": "pick", "what": "cup"}, {"left_out": 1}),
+        ("pick up the red no i mean the blue cup", {"do": "pick", "what": "blue cup"},
+         {"count": 0}),
+        ("put the red cup in the box",
+         {"do": "put", "what": "red box", "where": "box", "how": "in"}, {"jumps": 2}),
+    ],
+    ids=["plain", "neither copied nor a filler", "a new word that is copied",
+         "a word never shown", "a colour left out", "taken back", "two things as one"],
+)  # fmt: skip
+def test_what_is_odd_is_counted(
+    command: str, step: dict[str, str], oddities: dict[str, object]
+) -> None:
+    found = oddities_of([step], command.split(), KNOWN)
+    assert {name: getattr(found, name) for name in oddities} == oddities
 
 
 def test_a_span_keeps_the_articles_that_were_said() -> None:

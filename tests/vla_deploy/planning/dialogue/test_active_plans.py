@@ -13,43 +13,49 @@ from vla_deploy.plans.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 
-def set_back(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
-    """Let the first action of a plan fail; return what the planner hands to the executor."""
+def fail(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
+    """Let the first action of a plan fail; return the events of the planner's next step."""
     action_id = plan["plan"]["actions"][0]["id"]
     told = {"action_id": action_id, "error": "the way is blocked", "cause": "skill", "done": []}
     desk.executor_tells(command_id=plan["command_id"], event="setback", **(told | changes))
-    desk.answers()
+    return [one for one in desk.answers() if one["event"] != "setback"]
+
+
+def set_back(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
+    """Let the first action of a plan fail; return what the planner hands to the executor."""
+    fail(desk, plan, **changes)
     return desk.plans()
 
 
-def test_a_plan_that_failed_is_followed_by_another_for_the_same_command(open_desk):
-    desk = open_desk()
-    desk.give(text="go to the kitchen")
-    desk.answers()
-    (first,) = desk.plans()
-    (second,) = set_back(desk, first)
+@pytest.mark.parametrize(
+    ("command", "word"),
+    [
+        ({"text": "go to the kitchen"}, ""),
+        ({"text": "go to the kitchen", "heard": {"confidence": 0.4}}, "yes"),
+        ({"text": "go to the kitchen when I say so"}, "go"),
+    ],
+    ids=["at once", "agreed to", "at a word"],
+)
+def test_a_plan_that_failed_is_followed_by_another_without_another_word(desk, command, word):
+    plans = desk.plans_for(**command)
+    (first,) = desk.plans_for(word) if word else plans
+    (told,) = fail(desk, first)
+    assert (told["event"], told["rung"], told["origin"]) == ("plan", "recovery", "wait")
+    (second,) = desk.plans()
     assert second["command_id"] == "c1"
     assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
     assert all(one["id"].startswith("r1_") for one in second["plan"]["actions"])
 
 
-def test_events_tell_who_made_the_other_plan_and_by_what_idea(open_desk):
-    desk = open_desk()
+def test_what_was_corrected_and_agreed_to_is_mended_without_another_yes(desk):
     desk.give(text="go to the kitchen")
-    desk.answers()
-    failed = desk.plans()[0]["plan"]["actions"][0]["id"]
-    desk.executor_tells(command_id="c1", event="setback", action_id=failed, error="x", done=[])
-    told = [one for one in desk.answers() if one["event"] not in ("setback",)]
-    assert [(one["event"], one["rung"], one["origin"]) for one in told] == [
-        ("plan", "recovery", "wait")
-    ]
+    assert desk.answers_to("no, the bedroom")[-1]["question"] == "Shall I go to the bedroom?"
+    (second,) = set_back(desk, desk.plans_for("yes")[-1])
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
 
 
-def test_after_the_last_strategy_the_command_is_given_up_with_the_first_cause(open_desk):
-    desk = open_desk()
-    desk.give(text="go to the kitchen")
-    desk.answers()
-    (second,) = set_back(desk, desk.plans()[0])
+def test_after_the_last_strategy_the_command_is_given_up_with_the_first_cause(desk):
+    (second,) = set_back(desk, desk.plans_for("go to the kitchen")[0])
     last = second["plan"]["actions"][-1]["id"]
     (end,) = set_back(desk, second, action_id=last)
     assert "the way is blocked" in end["give_up"]
@@ -61,11 +67,8 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
     go = propose(("navigate_to", {"place": "bedroom"}))
     model = back_end("model", Declined("nothing"), go)
     desk = open_desk(model)
-    desk.give(text="sing one")
-    assert desk.answers()[-1]["event"] == "rejected"
-    desk.give(command_id="c2", text="sing two")
-    desk.answers()
-    (plan,) = desk.plans()
+    assert desk.answers_to("sing one")[-1]["event"] == "rejected"
+    (plan,) = desk.plans_for("sing two")
     for _ in range(NOT_BOUNDED.further_plans):
         (plan,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
         assert "plan" in plan
@@ -74,14 +77,8 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
     assert any("the way is blocked" in one for one in model.asked[-1].failed)
 
 
-@pytest.mark.parametrize(
-    ("further_plans", "words"),
-    [
-        (0, "[planning] further_plans of the robot file allows 0 other plans"),
-        (1, "[planning] further_plans of the robot file allows 1 other plans"),
-    ],
-)
-def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str) -> None:
+@pytest.mark.parametrize("further_plans", [0, 1])
+def test_no_more_plans_than_the_robot_file_allows(further_plans: int) -> None:
     active = ActivePlans(further_plans)
     go = {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
     plan = Plan.model_validate({"goal": "go", "actions": [go]})
@@ -90,28 +87,9 @@ def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str
     active.add(command, plan, PlanningResult())
     for _ in range(further_plans):
         active.add(active.set_back("c1", told), plan, PlanningResult())
+    words = f"[planning] further_plans of the robot file allows {further_plans} other plans"
     with pytest.raises(CannotBeDone, match=re.escape(words)):
         active.set_back("c1", told)
-
-
-HEARD = {"text": "go to the kitchen", "heard": {"confidence": 0.4}}
-
-
-def agreed(desk: Any, **utterance: Any) -> dict[str, Any]:
-    """Give a command that is asked about, say yes, and return its plan."""
-    desk.give(**utterance)
-    assert desk.answers()[-1]["event"] == "asked"
-    desk.give(command_id="c2", text="yes")
-    desk.answers()
-    (plan,) = desk.plans()
-    return plan
-
-
-def test_what_the_person_has_agreed_to_is_mended_without_another_yes(open_desk):
-    desk = open_desk()
-    first = agreed(desk, **HEARD)
-    (second,) = set_back(desk, first)
-    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
 
 
 def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(
@@ -119,8 +97,9 @@ def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(
 ):
     back = propose(("move", {"distance_m": -2.0}))
     desk = open_desk(back_end("model", back))
-    plan = agreed(desk, **HEARD)
-    (plan,) = set_back(desk, plan)
+    asked = desk.answers_to("go to the kitchen", heard={"confidence": 0.4})[-1]
+    assert asked["event"] == "asked"
+    (plan,) = set_back(desk, desk.plans_for("yes")[0])
     (end,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
     assert "I would drive 2 m backward" in end["give_up"]
 
@@ -129,31 +108,23 @@ def test_who_takes_time_is_told_what_was_done_before_the_failure(open_desk, back
     go = propose(("speak", {"text": "I go"}), ("move", {"distance_m": 1.0}))
     model = back_end("model", go, Declined("nothing"))
     desk = open_desk(model)
-    desk.give(text="sing one")
-    desk.answers()
-    (plan,) = desk.plans()
+    (plan,) = desk.plans_for("sing one")
     done, failed = (one["id"] for one in plan["plan"]["actions"])
     set_back(desk, plan, action_id=failed, done=[done], left={failed: {}})
     (told,) = model.asked[-1].failed
     assert "done before: speak(text I go)" in told
 
 
-def test_a_plan_that_came_as_one_is_not_changed(open_desk):
-    desk = open_desk()
+def test_a_plan_that_came_as_one_is_not_changed(desk):
     plan = {"goal": "go", "actions": [
         {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
     ]}  # fmt: skip
-    desk.give(plan=plan)
-    desk.answers()
-    (end,) = set_back(desk, desk.plans()[0])
+    (end,) = set_back(desk, desk.plans_for(plan=plan)[0])
     assert "given" in end["give_up"]
 
 
-def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
-    desk = open_desk()
-    desk.give(text="go to the kitchen")
-    desk.answers()
-    (first,) = desk.plans()
+def test_a_planner_that_was_started_again_has_no_other_plan(desk):
+    (first,) = desk.plans_for("go to the kitchen")
     desk.executor_tells(command_id="c1", event="setback", action_id="a1", error="x", done=[])
     desk.start()
     assert [one.get("give_up") for one in desk.plans()] == [
@@ -162,38 +133,10 @@ def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
     assert first["command_id"] == "c1"
 
 
-def test_what_has_begun_at_a_word_waits_for_none_after_a_failure(open_desk):
-    desk = open_desk()
-    desk.give(text="go to the kitchen when I say so")
-    desk.answers()
-    desk.give(command_id="c2", text="go")
-    desk.answers()
-    (first,) = desk.plans()
-    (second,) = set_back(desk, first)
-    assert second["command_id"] == "c1"
-    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
-
-
-def test_what_was_corrected_and_agreed_to_is_mended_without_another_yes(open_desk):
-    desk = open_desk()
-    desk.give(text="go to the kitchen")
-    desk.give(command_id="c2", text="no, the bedroom")
-    assert desk.answers()[-1]["question"] == "Shall I go to the bedroom?"
-    desk.give(command_id="c3", text="yes")
-    desk.answers()
-    (second,) = set_back(desk, desk.plans()[-1])
-    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
-
-
 @pytest.mark.parametrize("said", ["stop", "no, the bedroom", "stay out of the kitchen"])
-def test_a_setback_that_a_cancel_has_overtaken_starts_nothing(open_desk, said):
-    desk = open_desk()
-    desk.give(text="go to the kitchen")
-    desk.answers()
-    (plan,) = desk.plans()
-    desk.give(command_id="c2", text=said)
-    desk.answers()
-    assert "cancel" in desk.plans()[0]
+def test_a_setback_that_a_cancel_has_overtaken_starts_nothing(desk, said):
+    (plan,) = desk.plans_for("go to the kitchen")
+    assert "cancel" in desk.plans_for(said)[0]
     assert [one for one in set_back(desk, plan) if "plan" in one] == []
 
 
@@ -201,12 +144,9 @@ def test_a_stop_ends_the_search_for_another_plan(open_desk, later, back_end, pro
     desk = open_desk(
         back_end("model", propose(("navigate_to", {"place": "bedroom"}))), executor=later
     )
-    desk.give(text="go to the kitchen")
-    desk.answers()
-    (second,) = set_back(desk, desk.plans()[0])
+    (second,) = set_back(desk, desk.plans_for("go to the kitchen")[0])
     assert set_back(desk, second, action_id=second["plan"]["actions"][-1]["id"]) == []
-    desk.give(command_id="c2", text="stop")
-    desk.answers()
+    desk.answers_to("stop")
     later.do_one()
     desk.answers()
     told = desk.plans()

@@ -11,12 +11,17 @@ from vla_deploy.robots.plan_bounds import Confirm
 from vla_deploy.world import Snapshot, Thing
 
 GO = Action(id="a", skill="navigate_to", parameters={"place": "kitchen"})
+SPEAK = Action(id="s", skill="speak", parameters={"text": "hello"})
 PICK = Action(id="p", skill="pick_up", parameters={"object": "bottle"})
 
 
 @pytest.fixture(scope="module")
 def butler() -> World:
     return world_of(load_robot("butler"), {"left": None, "right": None})
+
+
+def asking(world: World, when: Confirm) -> World:
+    return replace(world, bounds=replace(world.bounds, require_confirmation=when))
 
 
 def ask(world: World, *actions: Action, **changes: object) -> str:
@@ -35,18 +40,12 @@ def test_an_ordinary_plan_runs_at_once(butler: World) -> None:
 
 def test_the_robot_file_says_how_far_it_goes(butler: World) -> None:
     back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
-    always, never = (
-        replace(butler, bounds=replace(butler.bounds, require_confirmation=one))
-        for one in (Confirm.ALWAYS, Confirm.NEVER)
-    )
+    always, never = asking(butler, Confirm.ALWAYS), asking(butler, Confirm.NEVER)
     assert ask(always, GO) == "Shall I go to the kitchen?"
-    assert ask(never, back) == ""
+    assert ask(always, SPEAK) == "", "it moves nothing"
     assert ask(butler, back).endswith("I would drive 2 m backward.")
-
-
-def test_what_moves_nothing_needs_no_yes(butler: World) -> None:
-    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
-    assert ask(always, Action(id="s", skill="speak", parameters={"text": "hello"})) == ""
+    assert ask(never, back) == ""
+    assert ask(never, PICK.model_copy(update={"feasibility_score": 0.6})), "doubt is always asked"
 
 
 def test_each_risk_of_a_plan_is_told(butler: World) -> None:
@@ -67,11 +66,6 @@ def test_what_was_left_out_is_named_without_a_word_that_would_end_all(butler: Wo
         'You said "not" and "standstill", which I may not have understood. '
         "Shall I go to the kitchen?"
     )
-
-
-def test_doubt_is_asked_even_where_risks_are_not(butler: World) -> None:
-    never = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.NEVER))
-    assert ask(never, PICK.model_copy(update={"feasibility_score": 0.6}))
 
 
 def test_a_heavy_thing_is_asked_for(butler: World) -> None:
@@ -100,10 +94,8 @@ def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
 
 
 def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> None:
-    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
-    request = PlanRequest(command_id="c", text="x", world=always)
-    speak = Action(id="s", skill="speak", parameters={"text": "hello"})
-    said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
+    request = PlanRequest(command_id="c", text="x", world=asking(butler, Confirm.ALWAYS))
+    said, moved = (Plan(goal="x", actions=(one,)) for one in (SPEAK, GO))
     assert confirmation_of(moved, request, agreed=agreement_to(moved, request)) == ""
     assert confirmation_of(moved, request, agreed=agreement_to(said, request))
 

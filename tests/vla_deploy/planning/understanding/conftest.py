@@ -1,5 +1,6 @@
 """A small home: a coffee table with cups and a ball on it, a box on the side table."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -48,8 +49,13 @@ THINGS = {
 }
 
 
+def _seen(name: str) -> Thing:
+    thing, _, hand = name.partition(" in ")
+    return replace(THINGS[thing], held_by=hand) if hand else THINGS[thing]
+
+
 class Home:
-    """Build requests in a scene of some things, given by their ids or as they are."""
+    """Build requests in a scene of some things, as they are or by names like "cup_1 in left"."""
 
     def __init__(self) -> None:
         self.world = world_of(load_robot("butler"), {"left": None, "right": None})
@@ -57,7 +63,7 @@ class Home:
 
     def ask(self, *things: str | Thing, text: str = "", **changes: Any) -> PlanRequest:
         robot = Viewpoint(x_m=HERE[0], y_m=HERE[1], yaw_rad=HERE[2])
-        seen = tuple(THINGS[one] if isinstance(one, str) else one for one in things)
+        seen = tuple(_seen(one) if isinstance(one, str) else one for one in things)
         fields: dict[str, Any] = {
             "command_id": "c1",
             "text": text,

@@ -58,18 +58,6 @@ def test_a_plan_mentions_what_it_moves_and_where_to(home: "Home") -> None:
     ]
 
 
-def test_the_next_command_goes_on_with_what_the_last_was_about(home: "Home") -> None:
-    first = home.ask("cup_1", "cup_2", "box_1", text="pick up the left cup")
-    plan = ground_plan(pattern_plan(first), first)
-    turn = ConversationTurn(
-        said=first.text, command_id="c1", mentioned=mentions_of(plan, first.scene)
-    )
-    talk = Conversation().after(turn)
-    second = home.ask("cup_1", "cup_2", "box_1", text="look at the other one", conversation=talk)
-    steps = ground_plan(pattern_plan(second), second).actions
-    assert steps[-1].parameters == {"object": "cup_1"}
-
-
 def test_what_a_hand_had_is_mentioned_when_it_is_put_down(home: "Home") -> None:
     held = replace(home.things["cup_1"], rests=None, held_by="left")
     request = home.ask(held, "box_1", text="put it in the box")

@@ -16,116 +16,123 @@ if TYPE_CHECKING:
     from conftest import Home
 
 
+ALL = ("cup_1", "cup_2", "ball_1", "box_1")
+CUPS = ("cup_1", "cup_2", "cup_4")
+
+
 def name(request: PlanRequest, text: str, use: ThingUse = ThingUse.TAKE) -> str:
     return Resolver(request).thing(text, use).name
 
 
 @pytest.mark.parametrize(
-    ("text", "meant"),
+    ("things", "spoken", "text", "use", "meant"),
     [
-        ("a cup", "cup_1"),
-        ("the cup on the left", "cup_2"),
-        ("the nearest cup", "cup_1"),
-        ("the red one", "cup_1"),
-        ("the bottle", "bottle"),
-        ("the red cup on the table", "cup_1"),
+        (ALL, (), "a cup", ThingUse.TAKE, "cup_1"),
+        (ALL, (), "the cup on the left", ThingUse.TAKE, "cup_2"),
+        (ALL, (), "the nearest cup", ThingUse.TAKE, "cup_1"),
+        (ALL, (), "the red one", ThingUse.TAKE, "cup_1"),
+        (ALL, (), "the bottle", ThingUse.TAKE, "bottle"),
+        (ALL, (), "the red cup on the table", ThingUse.TAKE, "cup_1"),
+        (("cup_1", "box_1"), (), "it", ThingUse.TAKE, "cup_1"),
+        (ALL, ("ball_1", "cup_1"), "that one", ThingUse.TAKE, "cup_1"),
+        (ALL, ("ball_1", "cup_1"), "the other cup", ThingUse.TAKE, "cup_2"),
+        (ALL, ("cup_1",), "the blue one", ThingUse.TAKE, "cup_2"),
+        (ALL, ("cup_2", "ball_1"), "the cup", ThingUse.TAKE, "cup_2"),
+        (ALL, ("cup_1", "box_1"), "it", ThingUse.TAKE, "cup_1"),
+        (ALL, ("box_1",), "it", ThingUse.ONTO, "box_1"),
+        (("cup_1 in left", "ball_1"), ("ball_1",), "it", ThingUse.PUT, "cup_1"),
+        (("cup_1 in right",), (), "what is in your right hand", ThingUse.PUT, "cup_1"),
+        (("cup_1 in right", "cup_2"), (), "the cup that you hold", ThingUse.PUT, "cup_1"),
+        # What is held is not what shall be taken, though the word alone finds it as well.
+        (("cup_1 in left", "cup_2"), (), "the cup", ThingUse.TAKE, "cup_2"),
+        (("cup_1 in left", "cup_2"), (), "the blue cup", ThingUse.TAKE, "blue cup"),
     ],
-)
-def test_words_that_single_a_thing_out_resolve(home: "Home", text: str, meant: str) -> None:
-    near = replace(home.things["ball_1"], position_m=(2.15, 1.5, 0.475))
-    assert name(home.ask("cup_1", "cup_2", near, "box_1"), text) == meant
+)  # fmt: skip
+def test_words_that_single_a_thing_out_resolve(
+    home: "Home",
+    things: tuple[str, ...],
+    spoken: tuple[str, ...],
+    text: str,
+    use: ThingUse,
+    meant: str,
+) -> None:
+    assert name(home.ask(*things, conversation=home.spoke_of(*spoken)), text, use) == meant
 
 
 @pytest.mark.parametrize(
-    ("changes", "question"),
+    ("things", "spoken", "text", "use", "meant"),
     [
-        ({}, "Which cup, the red one or the blue one?"),
-        ({"colour": "red"}, "Which cup, the one on the right or the one on the left?"),
+        (ALL, ("cup_1", "ball_1"), "them", ThingUse.TAKE, [("cup_1", ""), ("ball_1", "")]),
+        (ALL, (), "all the cups", ThingUse.TAKE, [("cup_1", ""), ("cup_2", "")]),
+        (ALL, (), "both cups", ThingUse.TAKE, [("cup_1", ""), ("cup_2", "")]),
+        (ALL, (), "the two cups", ThingUse.TAKE, [("cup_1", ""), ("cup_2", "")]),
+        (ALL, (), "two cups", ThingUse.TAKE, [("cup_1", ""), ("cup_2", "")]),
+        *(
+            (("cup_1 in right", "ball_1 in left", "cup_2"), (), held, ThingUse.PUT,
+             [("cup_1", "right"), ("ball_1", "left")])
+            for held in ("them", "both", "what you are holding")
+        ),
+    ],
+)  # fmt: skip
+def test_words_that_mean_several_find_all_of_them(
+    home: "Home",
+    things: tuple[str, ...],
+    spoken: tuple[str, ...],
+    text: str,
+    use: ThingUse,
+    meant: list[tuple[str, str]],
+) -> None:
+    request = home.ask(*things, conversation=home.spoke_of(*spoken))
+    assert [(one.name, one.hand or "") for one in Resolver(request).things(text, use)] == meant
+
+
+@pytest.mark.parametrize(
+    ("things", "text", "refusal", "says"),
+    [
+        ((), "it", UnknownObject, 'I do not know the object "it"'),
+        (("cup_1 in right",), "what is in your left hand", NotAble, "my left hand holds nothing"),
+        ((), "what you are holding", NotAble, "^I hold nothing$"),
+        (CUPS, "everything but that", NotAble, 'I see nothing that is "everything but"'),
+        (CUPS, "both cups", NotAble, 'I see 3 that could be "both cups"'),
+        (CUPS, "the two cups", NotAble, 'I see 3 that could be "two cups"'),
+        (CUPS, "two cups", NotAble, 'I see 3 that could be "two cups"'),
+    ],
+)  # fmt: skip
+def test_words_that_mean_nothing_are_refused(
+    home: "Home",
+    things: tuple[str, ...],
+    text: str,
+    refusal: type[Exception],
+    says: str,
+) -> None:
+    with pytest.raises(refusal, match=says):
+        Resolver(home.ask(*things)).things(text, ThingUse.PUT)
+
+
+@pytest.mark.parametrize(
+    ("changes", "third", "question"),
+    [
+        ({}, (), "Which cup, the red one or the blue one?"),
+        ({}, ("cup_4",), "Which cup, the red one, the blue one or the green one?"),
+        ({"colour": "red"}, (), "Which cup, the one on the right or the one on the left?"),
         (
             {"colour": "red", "rests": Rest("on", "side_table")},
+            (),
             "Which cup, the one on the coffee table or the one on the side table?",
         ),
     ],
 )
-def test_what_nothing_singles_out_is_asked(
-    home: "Home", changes: dict[str, Any], question: str
+def test_what_nothing_singles_out_is_asked_and_an_answer_settles_it(
+    home: "Home", changes: dict[str, Any], third: tuple[str, ...], question: str
 ) -> None:
-    other = replace(home.things["cup_2"], **changes)
+    things = ("cup_1", replace(home.things["cup_2"], **changes), *third)
     with pytest.raises(Ambiguous) as asked:
-        name(home.ask("cup_1", other), "the cup")
+        name(home.ask(*things), "the cup")
     assert asked.value.question == question
     assert asked.value.expression == "cup"
-    assert [one.name for one in asked.value.candidates] == ["cup_1", "cup_2"]
-
-
-def test_three_are_told_apart_too(home: "Home") -> None:
-    with pytest.raises(Ambiguous, match="the red one, the blue one or the green one"):
-        name(home.ask("cup_1", "cup_2", "cup_4"), "the cup")
-
-
-def test_the_answer_settles_it(home: "Home") -> None:
+    assert [one.name for one in asked.value.candidates][:2] == ["cup_1", "cup_2"]
     talk = Conversation(choices={"cup": "cup_2"})
-    assert name(home.ask("cup_1", "cup_2", conversation=talk), "the cup") == "cup_2"
-
-
-@pytest.mark.parametrize(
-    ("text", "use", "spoken", "meant"),
-    [
-        ("that one", ThingUse.TAKE, ("ball_1", "cup_1"), "cup_1"),
-        ("the other cup", ThingUse.TAKE, ("ball_1", "cup_1"), "cup_2"),
-        ("the blue one", ThingUse.TAKE, ("cup_1",), "cup_2"),
-        ("the cup", ThingUse.TAKE, ("cup_2", "ball_1"), "cup_2"),
-        ("it", ThingUse.TAKE, ("cup_1", "box_1"), "cup_1"),
-        ("it", ThingUse.ONTO, ("box_1",), "box_1"),
-    ],
-)
-def test_what_was_spoken_of_is_meant(
-    home: "Home", text: str, use: ThingUse, spoken: tuple[str, ...], meant: str
-) -> None:
-    request = home.ask("cup_1", "cup_2", "ball_1", "box_1", conversation=home.spoke_of(*spoken))
-    assert name(request, text, use) == meant
-
-
-def test_them_are_all_that_the_last_turn_was_about(home: "Home") -> None:
-    resolver = Resolver(
-        home.ask("cup_1", "cup_2", "ball_1", "box_1", conversation=home.spoke_of("cup_1", "ball_1"))
-    )
-    assert [one.name for one in resolver.things("them", ThingUse.TAKE)] == ["cup_1", "ball_1"]
-
-
-def test_all_cups_are_all_cups(home: "Home") -> None:
-    resolver = Resolver(home.ask("cup_1", "cup_2", "ball_1"))
-    assert [one.name for one in resolver.things("all the cups", ThingUse.TAKE)] == [
-        "cup_1",
-        "cup_2",
-    ]
-
-
-def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> None:
-    held = replace(home.things["cup_1"], held_by="left")
-    assert (
-        name(home.ask(held, "ball_1", conversation=home.spoke_of("ball_1")), "it", ThingUse.PUT)
-        == "cup_1"
-    )
-
-
-def test_a_hand_that_holds_nothing_says_so(home: "Home") -> None:
-    cup = replace(home.things["cup_1"], held_by="right")
-    request = home.ask(cup)
-    assert name(request, "what is in your right hand", ThingUse.PUT) == "cup_1"
-    assert name(home.ask(cup, "cup_2"), "the cup that you hold", ThingUse.PUT) == "cup_1"
-    with pytest.raises(NotAble, match="my left hand holds nothing"):
-        name(request, "what is in your left hand", ThingUse.PUT)
-    with pytest.raises(NotAble, match=r"^I hold nothing$"):
-        name(home.ask(), "what you are holding", ThingUse.PUT)
-
-
-@pytest.mark.parametrize("text", ["them", "both", "what you are holding"])
-def test_both_hands_are_meant(home: "Home", text: str) -> None:
-    held = [replace(home.things["cup_1"], held_by="right"),
-            replace(home.things["ball_1"], held_by="left")]  # fmt: skip
-    found = Resolver(home.ask(*held, "cup_2")).things(text, ThingUse.PUT)
-    assert [(one.name, one.hand) for one in found] == [("cup_1", "right"), ("ball_1", "left")]
+    assert name(home.ask(*things, conversation=talk), "the cup") == "cup_2"
 
 
 def test_which_hand_is_meant_is_asked(home: "Home") -> None:
@@ -138,21 +145,6 @@ def test_which_hand_is_meant_is_asked(home: "Home") -> None:
             name(home.ask(*held, "ball_1"), text, ThingUse.PUT)
         assert "the one in my right hand" in asked.value.question
         assert ["right" in one.features for one in asked.value.candidates].count(True) == 1
-
-
-def test_what_is_held_is_not_what_shall_be_taken(home: "Home") -> None:
-    request = home.ask(replace(home.things["cup_1"], held_by="left"), "cup_2")
-    assert name(request, "the cup") == "cup_2", "the word alone would find the held one as well"
-    assert name(request, "the blue cup") == "blue cup"
-
-
-def test_the_only_thing_in_sight_is_it(home: "Home") -> None:
-    assert name(home.ask("cup_1", "box_1"), "it") == "cup_1"
-
-
-def test_a_pronoun_for_nothing_is_refused(home: "Home") -> None:
-    with pytest.raises(UnknownObject):
-        name(home.ask(), "it")
 
 
 def test_an_unseen_thing_on_furniture_is_looked_for_there(home: "Home") -> None:
@@ -168,14 +160,6 @@ def test_every_decision_is_logged_with_its_reason(home: "Home") -> None:
         '"left cup" is cup_2 (blue cup) (the only one that fits)',
         '"bottle" is bottle (not seen yet)',
     ]
-
-
-@pytest.mark.parametrize("text", ["both cups", "the two cups", "two cups"])
-def test_both_are_two_of_two_and_of_three_none(home: "Home", text: str) -> None:
-    found = Resolver(home.ask("cup_1", "cup_2", "ball_1")).things(text, ThingUse.TAKE)
-    assert [one.name for one in found] == ["cup_1", "cup_2"]
-    with pytest.raises(NotAble, match=f'I see 3 that could be "{text.removeprefix("the ")}"'):
-        Resolver(home.ask("cup_1", "cup_2", "cup_4")).things(text, ThingUse.TAKE)
 
 
 # --- what only the things around tell ---------------------------------------------------------
@@ -269,11 +253,6 @@ def test_what_is_not_there_is_said_to_be_not(home: "Home", text: str, says: str)
     )
     with pytest.raises(NotAble, match=says):
         name(home.ask(*BOTTLES, CAN, conversation=talk), text)
-
-
-def test_all_but_what_nobody_has_spoken_of_are_none(home: "Home") -> None:
-    with pytest.raises(NotAble):
-        Resolver(home.ask("cup_1", "cup_2")).things("everything but that", ThingUse.PUT)
 
 
 def test_the_big_one_is_of_the_kind_spoken_of_that_can_be_taken(home: "Home") -> None:

@@ -47,57 +47,31 @@ def in_short(plan: dict) -> str:
     return " ".join([last["skill"], *(str(value) for value in last["parameters"].values())])
 
 
-def test_a_question_is_answered_and_the_command_goes_on(talk) -> None:
-    assert talk("pick up the cup") == "asked: Which cup, the red one or the blue one?"
-    assert talk("the blue one") == "pick_up cup_2"
-
-
 @pytest.mark.parametrize(
-    "answer", ["not the red one", "the second one", "the left one", "the one on the left"]
-)
-def test_an_answer_may_count_or_leave_out(talk, answer: str) -> None:
-    talk("pick up the cup")
-    assert talk(answer) == "pick_up cup_2"
-
-
-def test_neither_drops_the_command_that_waits(talk) -> None:
-    talk("pick up the cup")
-    assert talk("neither of them").startswith("rejected: ")
-
-
-def test_never_mind_drops_the_command_that_waits(talk) -> None:
-    talk("pick up the cup")
-    assert talk("never mind").startswith("rejected: ")
-
-
-def test_it_and_the_other_one_are_what_was_spoken_of_before(talk) -> None:
-    assert talk("look at the left cup") == "look_at cup_2"
-    assert talk("pick it up") == "pick_up cup_2"
-    assert talk("look at the other one") == "look_at cup_1"
-
-
-def test_a_question_about_a_thing_mentions_it(talk) -> None:
-    assert talk("where is the ball?") == "speak The green ball is on the coffee table, in view."
-    assert talk("pick it up") == "pick_up ball_1"
-
-
-def test_what_the_speaker_sees_is_not_guessed(talk) -> None:
-    assert "left, right, in front and behind change" in talk("pick up the cup on my left")
-
-
-def test_the_map_is_asked_before_a_straight_way(talk) -> None:
-    assert "the map shows 1.1 m of room" in talk("drive backwards 1.5 m")
-
-
-def test_a_misheard_name_is_refused_with_what_is_known(talk) -> None:
-    assert "I do not know" in talk("pick up the red cap")
-
-
-def test_an_unclear_answer_may_say_where_it_is(talk) -> None:
-    assert talk("pick up the cup").startswith("asked: Which cup")
-    assert talk("the left one on the coffee table") == "pick_up cup_2"
-
-
-def test_a_place_may_be_answered_with_the_way_there(talk) -> None:
-    assert talk("go there") == "asked: Where do you mean?"
-    assert talk("over in the kitchen") == "navigate_to kitchen"
+    "turns",
+    [
+        [("pick up the cup", "asked: Which cup, the red one or the blue one?"),
+         ("the blue one", "pick_up cup_2")],
+        [("pick up the cup", "asked: "), ("not the red one", "pick_up cup_2")],
+        [("pick up the cup", "asked: "), ("the second one", "pick_up cup_2")],
+        [("pick up the cup", "asked: "), ("the one on the left", "pick_up cup_2")],
+        [("pick up the cup", "asked: "), ("the left one on the coffee table", "pick_up cup_2")],
+        [("pick up the cup", "asked: "), ("neither of them", "rejected: ")],
+        [("pick up the cup", "asked: "), ("never mind", "rejected: ")],
+        [("go there", "asked: Where do you mean?"), ("over in the kitchen", "navigate_to kitchen")],
+        [("look at the left cup", "look_at cup_2"), ("pick it up", "pick_up cup_2"),
+         ("look at the other one", "look_at cup_1")],
+        [("where is the ball?", "speak The green ball is on the coffee table, in view."),
+         ("pick it up", "pick_up ball_1")],
+        [("pick up the cup on my left",
+          'rejected: "the cup on my left": left, right, in front and behind change while I drive')],
+        [("drive backwards 1.5 m",
+          'rejected: the plan was refused: action "a1": move breaks "area allowed": -1.5 m asked, '
+          "the map shows 1.1 m of room")],
+        [("pick up the red cap", 'rejected: I do not know the object "the red cap"')],
+    ],
+    ids=lambda turns: turns[-1][0],
+)  # fmt: skip
+def test_what_is_said_is_understood_by_what_was_said_before(talk, turns) -> None:
+    for said, answer in turns:
+        assert talk(said).startswith(answer), said

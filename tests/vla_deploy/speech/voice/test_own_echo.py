@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +19,7 @@ ROOM = Acoustics()
 SENTENCES = ("I have put the red cup into the box", "now I go back to the kitchen table")
 
 
+@cache
 def spoken(text: str) -> Wave:
     return EspeakEngine().synthesise(text).at_rate(RATE_HZ).wave * np.float32(0.8)
 
@@ -59,6 +63,20 @@ class Ear:
         return np.concatenate(parts)
 
 
+@pytest.fixture(scope="module")
+def learnt() -> Ear:
+    """Return an ear that has heard itself say both sentences."""
+    ear = Ear()
+    for sentence in SENTENCES:
+        ear.speak(spoken(sentence), echo_of(spoken(sentence)))
+    return ear
+
+
+@pytest.fixture
+def ear(learnt: Ear) -> Ear:
+    return deepcopy(learnt)
+
+
 def weaker_db(before: Wave, after: Wave) -> float:
     return float(10 * np.log10(np.mean(before**2) / np.mean(after[: len(before)] ** 2)))
 
@@ -73,10 +91,7 @@ def test_an_echo_is_learnt_and_from_then_on_taken_out() -> None:
     assert min(reductions[2:]) > 10.0
 
 
-def test_what_a_person_says_into_it_stands_out() -> None:
-    ear = Ear()
-    for sentence in SENTENCES:
-        ear.speak(spoken(sentence), echo_of(spoken(sentence)))
+def test_what_a_person_says_into_it_stands_out(ear: Ear) -> None:
     wave = spoken(SENTENCES[0])
     heard = echo_of(wave)
     person = arrival("robot stop", Talker(), RATE_HZ, ROOM).sound.wave
@@ -89,10 +104,7 @@ def test_what_a_person_says_into_it_stands_out() -> None:
 
 
 @pytest.mark.parametrize("late_rows", [0, 3, 40, 160, 2_400])
-def test_what_is_left_of_the_echo_is_never_louder_than_told(late_rows: int) -> None:
-    ear = Ear()
-    for sentence in SENTENCES:
-        ear.speak(spoken(sentence), echo_of(spoken(sentence)))
+def test_what_is_left_of_the_echo_is_never_louder_than_told(ear: Ear, late_rows: int) -> None:
     ear.louder = 0
     for sentence in SENTENCES:
         ear.speak(spoken(sentence), echo_of(spoken(sentence), late_rows))
@@ -105,9 +117,8 @@ def test_while_the_robot_is_silent_everything_passes_as_it_is() -> None:
     assert echo.clean(frame) is frame
 
 
-def test_a_sound_that_is_no_echo_passes_while_the_robot_speaks() -> None:
-    ear = Ear()
-    for sentence in (*SENTENCES, *SENTENCES):
+def test_a_sound_that_is_no_echo_passes_while_the_robot_speaks(ear: Ear) -> None:
+    for sentence in SENTENCES:
         ear.speak(spoken(sentence), echo_of(spoken(sentence)))
     wave = spoken(SENTENCES[0])
     echo = echo_of(wave)
