@@ -384,7 +384,9 @@ class Refuse:
         if top not in OURS and top not in sys.stdlib_module_names:
             raise ImportError(f"{name} is not there")
 sys.meta_path.insert(0, Refuse())
+from vla_deploy.robots import load_robot
 from vla_deploy.robots.kinematics.frame_tree import FrameTree
+from vla_deploy.robots.kinematics.urdf import urdf_of
 robot = load_robot("butler")
 FrameTree.of(robot).transforms({})
 sys.stdout.write(urdf_of(robot))
