@@ -9,10 +9,11 @@ import time
 from typing import Final
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Pose, Quaternion
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
+from vla_deploy.navigation.pose import Pose2D
 
 
 class RosTime:
@@ -62,6 +63,13 @@ def quaternion_of(yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float = 0.0)
         y=cr * sp * cy + sr * cp * sy,
         z=cr * cp * sy - sr * sp * cy,
     )
+
+
+def fill_pose(message: Pose, pose: Pose2D, z_m: float = 0.0) -> None:
+    """Fill in a pose that is turned about the vertical axis only."""
+    position = message.position
+    position.x, position.y, position.z = pose.x_m, pose.y_m, z_m
+    message.orientation = quaternion_of(pose.yaw_rad)
 
 
 def yaw_of(rotation: Quaternion) -> float:

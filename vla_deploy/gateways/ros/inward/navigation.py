@@ -8,7 +8,7 @@ from nav2_msgs.action import NavigateToPose
 from rclpy.duration import Duration
 
 from vla_deploy.client.following import Event
-from vla_deploy.gateways.ros.conversions import quaternion_of, yaw_of
+from vla_deploy.gateways.ros.conversions import fill_pose, yaw_of
 from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.inward.action_server import (
     Feedback,
@@ -159,9 +159,7 @@ class Driving:
         )
         message.current_pose.header.frame_id = MAP
         message.current_pose.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
-        pose = message.current_pose.pose
-        pose.position.x, pose.position.y = here.x_m, here.y_m
-        pose.orientation = quaternion_of(here.yaw_rad)
+        fill_pose(message.current_pose.pose, here)
         self._feedback(message)
 
     def _left_m(self, here: tuple[float, float], executor: Mapping[str, Any]) -> float:

@@ -10,9 +10,10 @@ from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from drivers.clock import NS_PER_S
-from vla_deploy.gateways.ros.conversions import RosTime, quaternion_of
+from vla_deploy.gateways.ros.conversions import RosTime, fill_pose
 from vla_deploy.gateways.ros.part import MAP
 from vla_deploy.ipc.ros_goals import GoalKind, GoalRequest, GoalState
+from vla_deploy.navigation.pose import Pose2D
 
 ACTIONS: Final[Mapping[GoalKind, Any]] = {
     GoalKind.NAVIGATE: NavigateToPose,
@@ -29,12 +30,10 @@ def goal_of(request: GoalRequest, time: RosTime) -> Any:
     """Return the goal message of a request."""
     if request.kind is GoalKind.NAVIGATE:
         assert request.pose is not None  # `read_request` has judged it
-        x_m, y_m, yaw_rad = request.pose
         goal = NavigateToPose.Goal()
         goal.pose.header.frame_id = MAP
         goal.pose.header.stamp = time.now()
-        goal.pose.pose.position.x, goal.pose.pose.position.y = x_m, y_m
-        goal.pose.pose.orientation = quaternion_of(yaw_rad)
+        fill_pose(goal.pose.pose, Pose2D(*request.pose))
         return goal
     goal = FollowJointTrajectory.Goal()  # no stamp: it begins when it arrives
     goal.trajectory.joint_names = list(request.joints)

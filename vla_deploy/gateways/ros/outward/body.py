@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from vla_deploy.gateways.ros.conversions import quaternion_of
+from vla_deploy.gateways.ros.conversions import fill_pose, quaternion_of
 from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway, GatewayPart
@@ -123,9 +123,7 @@ class BodyTopics(GatewayPart):
         message = Odometry(child_frame_id=BASE_FRAME)
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
         message.header.frame_id = ODOM
-        position = message.pose.pose.position
-        position.x, position.y = pose.x_m, pose.y_m
-        message.pose.pose.orientation = quaternion_of(pose.yaw_rad)
+        fill_pose(message.pose.pose, pose)
         message.twist.twist.linear.x = float(data["v_m_s"])
         message.twist.twist.angular.z = float(data["w_rad_s"])
         message.pose.covariance = message.twist.covariance = _COVARIANCE

@@ -11,7 +11,7 @@ from vla_deploy_msgs.msg import DetectedObject, DetectedObjectArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.conversions import quaternion_of
+from vla_deploy.gateways.ros.conversions import fill_pose
 from vla_deploy.gateways.ros.geometry import (
     BodyFrames,
     Floats,
@@ -176,9 +176,8 @@ class SceneObjects(GatewayPart):
                 last_seen=time.stamp(thing["last_seen_ns"]),
                 seen_count=int(thing.get("seen_count", 0)),
             )
-            position = one.pose.position
-            position.x, position.y, position.z = map(float, thing["position_m"])
-            one.pose.orientation = quaternion_of(float(thing.get("yaw_rad", 0.0)))
+            x_m, y_m, z_m = map(float, thing["position_m"])
+            fill_pose(one.pose, Pose2D(x_m, y_m, float(thing.get("yaw_rad", 0.0))), z_m)
             one.size.x, one.size.y, one.size.z = map(float, thing["size_m"])
             message.objects.append(one)
         return message
