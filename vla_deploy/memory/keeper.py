@@ -28,6 +28,7 @@ _MOST_KEPT: Final = 200
 # A long run names many things anew, perception tells 64 at once: those not seen for longest are
 # dropped here, not from the file.
 MOST_THINGS: Final = 512
+_ENDS: Final = frozenset({"rejected", "finished", "answered"})
 _log = logging.getLogger(__name__)
 
 
@@ -108,12 +109,11 @@ class MemoryKeeper:
 
     def _follow(self, told: Mapping[str, Any]) -> None:
         command_id = str(told.get("command_id", ""))
-        episode = self._open.get(command_id)
-        follow = _FOLLOW.get(str(told.get("event")))
-        if episode is None or follow is None:
+        event, before = str(told.get("event")), self._open.get(command_id)
+        episode = None if before is None else _after(event, told, before)
+        if episode is None:
             return
-        episode, has_ended = follow(episode, told)
-        if not has_ended:
+        if event not in _ENDS:
             self._open[command_id] = episode
             return
         del self._open[command_id]
@@ -195,38 +195,24 @@ def _is_news(before: LastSeen, now: LastSeen) -> bool:
     )
 
 
-def _planned(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
-    plan = told.get("plan") or {}
-    planned = replace(
-        episode,
-        goal=str(plan.get("goal", "")),
-        reasoning=str(plan.get("reasoning", "")),
-        plan=plan,
-        rung=str(told.get("rung", "")),
-    )
-    return planned, False
-
-
-def _refused(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
-    return replace(
-        episode, outcome=EpisodeOutcome.REFUSED, error=str(told.get("reason") or "")
-    ), True
-
-
-def _finished(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
-    outcome = EpisodeOutcome.SUCCEEDED if told.get("success") else EpisodeOutcome.FAILED
-    return replace(episode, outcome=outcome, error=str(told.get("error") or "")), True
-
-
-def _answered(episode: Episode, _: Mapping[str, Any]) -> tuple[Episode, bool]:
-    """End an utterance that answered a question: what came of it is told of the question."""
-    return replace(episode, outcome=EpisodeOutcome.SUCCEEDED), True
-
-
-_Follow = Callable[[Episode, Mapping[str, Any]], tuple[Episode, bool]]
-_FOLLOW: Final[Mapping[str, _Follow]] = {
-    "plan": _planned,
-    "rejected": _refused,
-    "finished": _finished,
-    "answered": _answered,
-}
+def _after(event: str, told: Mapping[str, Any], episode: Episode) -> Episode | None:
+    """Return the episode after an event of its command, None where the event says nothing of it."""
+    match event:
+        case "plan":
+            plan = told.get("plan") or {}
+            return replace(
+                episode,
+                goal=str(plan.get("goal", "")),
+                reasoning=str(plan.get("reasoning", "")),
+                plan=plan,
+                rung=str(told.get("rung", "")),
+            )
+        case "rejected":
+            error = str(told.get("reason") or "")
+            return replace(episode, outcome=EpisodeOutcome.REFUSED, error=error)
+        case "finished":
+            outcome = EpisodeOutcome.SUCCEEDED if told.get("success") else EpisodeOutcome.FAILED
+            return replace(episode, outcome=outcome, error=str(told.get("error") or ""))
+        case "answered":  # It answered a question: what came of it is told of the question.
+            return replace(episode, outcome=EpisodeOutcome.SUCCEEDED)
+    return None

@@ -52,7 +52,7 @@ class StillFlat:
     def __init__(self) -> None:
         self.robot = load_robot("butler")
         self.kinematics = RobotModel(self.robot)
-        self.body_mask = BodyMask(self.robot)
+        self.body_mask = BodyMask(self.kinematics)
         self.world = load_world("flat")
         self.model = compose(self.robot.mjcf_path, self.world.mjcf_path)
         self.data = mujoco.MjData(self.model)

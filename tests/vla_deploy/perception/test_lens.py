@@ -18,6 +18,7 @@ from vla_deploy.perception.geometry.lens import (
     undistorted,
 )
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.kinematics.model import RobotModel
 
 PINHOLE = Intrinsics(width=320, height=240, fx=216.5, fy=215.0, cx=161.0, cy=118.0)
 LENSES = {
@@ -89,7 +90,7 @@ def test_the_robots_own_hands_are_masked_where_the_lens_shows_them() -> None:
     )
     index = robot.joint_index
     positions[index["head_tilt"]] = 1.0
-    body = BodyMask(robot)
+    body = BodyMask(RobotModel(robot))
     plain, bent = (body.mask(positions, camera) for camera in (PINHOLE, BARREL))
     assert np.count_nonzero(plain) > 500
     # Barrel distortion draws everything towards the middle: more of the body is in the image.

@@ -48,19 +48,21 @@ class Watcher:
         self.tracker = Tracker()
         self.images = 0
 
-    def image(self, *detections: Detection, in_view: bool = True) -> list[dict[str, Any]]:
-        self.images += 1
-        clear = self.tracker.tracks if in_view else []
-        stamp_ns = self.images * 200_000_000
-        self.tracker.update([sighting(one, stamp_ns) for one in detections], clear, stamp_ns)
+    def image(
+        self, *detections: Detection, in_view: bool = True, times: int = 1
+    ) -> list[dict[str, Any]]:
+        for _ in range(times):
+            self.images += 1
+            clear = self.tracker.tracks if in_view else []
+            stamp_ns = self.images * 200_000_000
+            self.tracker.update([sighting(one, stamp_ns) for one in detections], clear, stamp_ns)
         return [track.document() for track in self.tracker.objects]
 
 
 def knowing(*detections: Detection) -> Watcher:
     """Return a watcher that has confirmed some things."""
     watcher = Watcher()
-    watcher.image(*detections)
-    watcher.image(*detections)
+    watcher.image(*detections, times=2)
     return watcher
 
 
@@ -93,8 +95,7 @@ def test_noise_is_averaged_and_the_id_stays() -> None:
 def test_two_of_a_kind_get_two_ids() -> None:
     watcher = Watcher()
     pair = (seen(at=(1.0, 2.0, 0.5)), seen(at=(1.3, 2.0, 0.5)))
-    watcher.image(*pair)
-    objects = watcher.image(*pair)
+    objects = watcher.image(*pair, times=2)
     assert {o["id"]: o["position_m"][0] for o in objects} == {"cup_1": 1.0, "cup_2": 1.3}
 
 
@@ -107,8 +108,7 @@ def test_a_wrong_class_now_and_then_changes_nothing() -> None:
 
 def test_what_is_hidden_stays_in_memory() -> None:
     watcher = knowing(seen())
-    for _ in range(50):
-        objects = watcher.image(in_view=False)
+    objects = watcher.image(in_view=False, times=50)
     assert [o["id"] for o in objects] == ["cup_1"]
     assert objects[0]["last_seen_ns"] == 400_000_000
 
@@ -122,11 +122,9 @@ def test_what_has_left_its_place_is_forgotten_after_several_clear_views() -> Non
 
 def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
     watcher = knowing(seen())
-    for _ in range(6):
-        watcher.image()
+    watcher.image(times=6)
     elsewhere = seen(at=(4.0, 0.5, 0.6))
-    watcher.image(elsewhere)
-    (cup,) = watcher.image(elsewhere)
+    (cup,) = watcher.image(elsewhere, times=2)
     assert cup["id"] == "cup_1"
     assert cup["position_m"] == [4.0, 0.5, 0.6]
 
@@ -134,16 +132,14 @@ def test_a_thing_that_was_carried_away_keeps_its_id() -> None:
 def test_a_thing_that_is_pushed_in_view_keeps_its_id() -> None:
     watcher = knowing(seen())
     pushed = seen(at=(1.4, 2.0, 0.5))
-    watcher.image(pushed)
-    (cup,) = watcher.image(pushed)
+    (cup,) = watcher.image(pushed, times=2)
     assert cup["id"] == "cup_1"
     assert cup["position_m"][0] == 1.4
 
 
 def test_another_colour_is_another_thing() -> None:
     watcher = knowing(seen())
-    for _ in range(8):
-        objects = watcher.image(seen(colour="blue", at=(1.09, 2.0, 0.5)))
+    objects = watcher.image(seen(colour="blue", at=(1.09, 2.0, 0.5)), times=8)
     assert [(o["id"], o["colour"]) for o in objects] == [("cup_2", "blue")]
 
 
@@ -151,10 +147,8 @@ def test_a_truncated_sighting_makes_no_thing_but_keeps_one_alive() -> None:
     watcher = Watcher()
     for _ in range(3):
         assert watcher.image(seen(truncated=True)) == []
-    watcher.image(seen())
-    watcher.image(seen())
-    for _ in range(9):
-        objects = watcher.image(seen("object", at=(1.02, 2.0, 0.45), truncated=True))
+    watcher.image(seen(), times=2)
+    objects = watcher.image(seen("object", at=(1.02, 2.0, 0.45), truncated=True), times=9)
     assert [(o["id"], o["class"]) for o in objects] == [("cup_1", "cup")]
     assert objects[0]["position_m"][0] < 1.01
 
@@ -179,15 +173,13 @@ def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
 
 def test_a_vague_sighting_begins_no_track() -> None:
     watcher = Watcher()
-    for _ in range(4):
-        objects = watcher.image(seen("object", "brown", occluded=True))
+    objects = watcher.image(seen("object", "brown", occluded=True), times=4)
     assert objects == []
 
 
 def test_a_thing_too_far_to_be_recognised_keeps_its_class() -> None:
     watcher = Watcher()
-    for _ in range(3):
-        watcher.image(seen("ball", "blue"))
+    watcher.image(seen("ball", "blue"), times=3)
     for _ in range(6):
         (ball,) = watcher.image(seen("object", "blue", confidence=0.4))
     assert (ball["class"], ball["seen_count"]) == ("ball", 9)
@@ -206,10 +198,8 @@ def test_a_box_seen_better_from_near_replaces_its_far_sighting() -> None:
     watcher = Watcher()
     far = seen("box", "brown", at=(4.14, 0.52, 0.475), size_m=(0.28, 0.145, 0.11))
     near = seen("box", "orange", at=(4.21, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
-    for _ in range(3):
-        watcher.image(far)
-    for _ in range(3):
-        boxes = watcher.image(near, in_view=False)
+    watcher.image(far, times=3)
+    boxes = watcher.image(near, in_view=False, times=3)
     assert [(box["id"], box["colour"]) for box in boxes] == [("box_1", "orange")]
 
 
@@ -217,8 +207,7 @@ def test_a_half_hidden_second_sighting_of_a_box_is_no_second_box() -> None:
     watcher = Watcher()
     box = seen("box", "orange", at=(4.2, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
     part = seen("box", "orange", at=(4.14, 0.46, 0.49), size_m=(0.24, 0.14, 0.13), occluded=True)
-    for _ in range(4):
-        boxes = watcher.image(box, part)
+    boxes = watcher.image(box, part, times=4)
     assert [one["id"] for one in boxes] == ["box_1"]
 
 
@@ -227,8 +216,7 @@ def test_half_hidden_sightings_of_its_box_make_a_cup_no_larger() -> None:
     watcher = knowing(cup, box)
     wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
     shard = seen("object", "orange", at=(1.02, 2.0, 0.5), size_m=(0.16, 0.08, 0.1), truncated=True)
-    for _ in range(30):
-        objects = watcher.image(box, wall, shard, in_view=False)
+    objects = watcher.image(box, wall, shard, in_view=False, times=30)
     kept = {one["id"]: one for one in objects}
     assert kept["cup_1"]["size_m"] == [0.066, 0.066, 0.095]
 
@@ -236,8 +224,7 @@ def test_half_hidden_sightings_of_its_box_make_a_cup_no_larger() -> None:
 def test_a_cup_that_is_seen_as_one_with_its_box_now_and_then_gets_no_larger() -> None:
     watcher = Watcher()
     both = seen(size_m=(0.215, 0.215, 0.126))
-    for _ in range(KNOWN_LOOKS):
-        watcher.image(seen())
+    watcher.image(seen(), times=KNOWN_LOOKS)
     for _ in range(3):
         for _ in range(MAX_ODD_SIGHTINGS):
             (cup,) = watcher.image(both)
@@ -247,8 +234,7 @@ def test_a_cup_that_is_seen_as_one_with_its_box_now_and_then_gets_no_larger() ->
 
 def test_a_size_that_was_wrong_from_the_start_is_given_up() -> None:
     watcher = Watcher()
-    for _ in range(2 * KNOWN_LOOKS):
-        watcher.image(seen(size_m=(0.215, 0.215, 0.126)))
+    watcher.image(seen(size_m=(0.215, 0.215, 0.126)), times=2 * KNOWN_LOOKS)
     for _ in range(MAX_ODD_SIGHTINGS + 15):
         (cup,) = watcher.image(seen())
     assert cup["size_m"] == pytest.approx([0.066, 0.066, 0.095], rel=0.1)
@@ -258,8 +244,7 @@ def test_crossing_sightings_of_two_alike_things_are_shared_out_as_a_whole() -> N
     """The nearest pair alone would leave the second thing without its sighting."""
     watcher = Watcher()
     pair = (seen(at=(1.0, 2.0, 0.5)), seen(at=(1.05, 2.0, 0.5)))
-    for _ in range(4):
-        watcher.image(*pair)
+    watcher.image(*pair, times=4)
     objects = watcher.image(seen(at=(1.028, 2.0, 0.5)), seen(at=(1.09, 2.0, 0.5)))
     assert {o["id"] for o in objects} == {"cup_1", "cup_2"}
     first, second = sorted(objects, key=lambda o: str(o["id"]))
@@ -290,30 +275,23 @@ def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
 
 def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_old_id() -> None:
     watcher = knowing(seen())
-    for _ in range(20):
-        watcher.image(in_view=False)
+    watcher.image(in_view=False, times=20)
     elsewhere = seen(at=(4.0, 0.5, 0.6))
-    for _ in range(2):
-        both = watcher.image(elsewhere, in_view=False)
+    both = watcher.image(elsewhere, in_view=False, times=2)
     assert {o["id"] for o in both} == {"cup_1", "cup_2"}
-    for _ in range(5):
-        objects = watcher.image(elsewhere)
+    objects = watcher.image(elsewhere, times=5)
     assert [(o["id"], o["aliases"]) for o in objects] == [("cup_1", ["cup_2"])]
 
 
 def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_only() -> None:
     watcher = Watcher()
     places = ((1.0, 2.0, 0.5), (4.0, 0.5, 0.6))
-    watcher.image(seen())
-    watcher.image(seen())
+    watcher.image(seen(), times=2)
     for move in range(1, 9):
         at = places[move % 2]
-        for _ in range(20):
-            watcher.image(in_view=False)
-        for _ in range(2):
-            watcher.image(seen(at=at), in_view=False)
-        for _ in range(5):
-            watcher.image(seen(at=at))
+        watcher.image(in_view=False, times=20)
+        watcher.image(seen(at=at), in_view=False, times=2)
+        watcher.image(seen(at=at), times=5)
     (cup,) = watcher.tracker.objects
     assert (cup.object_id, cup.aliases) == ("cup_1", ("cup_9", "cup_8", "cup_7"))
 
@@ -321,8 +299,7 @@ def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_
 def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
     pair = (seen(), seen(at=(4.0, 0.5, 0.6)))
     watcher = knowing(*pair)
-    for _ in range(6):
-        objects = watcher.image(pair[1])
+    objects = watcher.image(pair[1], times=6)
     assert [(o["id"], o.get("aliases")) for o in objects] == [("cup_2", None)]
     assert [one.object_id for one in watcher.tracker.vanished] == ["cup_1"]
 
@@ -337,11 +314,9 @@ def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
 )
 def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], why: str) -> None:
     watcher = knowing(seen())
-    for _ in range(6):
-        watcher.image()
+    watcher.image(times=6)
     other = seen(**({"at": (2.0, 2.0, 0.5)} | changes))
-    watcher.image(other)
-    (thing,) = watcher.image(other)
+    (thing,) = watcher.image(other, times=2)
     assert thing["id"] == "cup_2", why
 
 
@@ -368,8 +343,7 @@ def test_the_memory_of_tracks_is_bounded() -> None:
     watcher = Watcher()
     for number in range(200):
         spot = seen("object", at=(number * 1.0, 0.0, 0.5))
-        watcher.image(spot, in_view=False)
-        watcher.image(spot, in_view=False)
+        watcher.image(spot, in_view=False, times=2)
     assert len(watcher.tracker.tracks) <= 128
     assert len(watcher.tracker.objects) <= 64
 
@@ -387,8 +361,7 @@ def test_what_a_hand_has_lost_is_not_found_in_whatever_else_lies_there(other: De
     watcher = knowing(seen())
     watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.6), 500_000_000)
     watcher.tracker.lose("left", "it slipped out")
-    for _ in range(3):
-        told = watcher.image(other, in_view=False)
+    told = watcher.image(other, in_view=False, times=3)
     lost = next(one for one in told if one["id"] == "cup_1")
     assert lost["cause"] == "it slipped out"
     assert (lost["class"], lost["colour"]) == ("cup", "red")

@@ -149,14 +149,10 @@ class BodyState:
     """Hold the joints' positions over time, from control's joint states."""
 
     def __init__(self, robot: RobotDescription, model: RobotModel) -> None:
-        """Read the body's shapes.
-
-        Raises:
-            RobotFileError: the MJCF does not fit the robot file.
-        """
+        """Read the body's shapes."""
         self._robot = robot
         self._model = model
-        self._mask = BodyMask(robot)
+        self._mask = BodyMask(model)
         self._joints = JointHistory()
         self._hands = Hands(robot)
 

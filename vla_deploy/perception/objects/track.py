@@ -13,6 +13,7 @@ from vla_deploy.perception.images.detection import Detection, Vector
 from vla_deploy.perception.naming.class_fusion import NameEvidence
 from vla_deploy.perception.naming.classes import OTHER
 from vla_deploy.perception.objects.filtering import Estimate, carried, dropped, updated
+from vla_deploy.world.document import read_thing
 from vla_deploy.world.thing import Rest, Thing
 
 LEAST_GAIN = 0.2
@@ -205,24 +206,23 @@ def mark_dropped(track: Track, cause: str) -> None:
 
 def restored_track(document: Mapping[str, Any]) -> Track:
     """Return the track of an object of the scene topic."""
-    x_m, y_m, z_m = (float(value) for value in document["size_m"])
-    stamp_ns, looks = int(document["last_seen_ns"]), int(document["seen_count"])
+    thing, looks = read_thing(document), int(document["seen_count"])
     track = Track(
         estimate=Estimate(
-            position_m=np.array(document["position_m"], dtype=np.float64),
-            covariance_m2=np.diag(np.square(np.array(document["sigma_m"], dtype=np.float64))),
-            stamp_ns=stamp_ns,
+            position_m=np.array(thing.position_m),
+            covariance_m2=np.diag(np.square(thing.sigma_m)),
+            stamp_ns=thing.last_seen_ns,
         ),
-        size_m=(x_m, y_m, z_m),
-        yaw_rad=float(document["yaw_rad"]),
+        size_m=thing.size_m,
+        yaw_rad=thing.yaw_rad,
         # The published confidence is that in the observations times that in the class.
-        confidence=float(document["confidence"]) / max(document["classes"].values()),
-        first_seen_ns=stamp_ns,
-        last_seen_ns=stamp_ns,
+        confidence=thing.confidence / max(document["classes"].values()),
+        first_seen_ns=thing.last_seen_ns,
+        last_seen_ns=thing.last_seen_ns,
         seen_count=looks,
-        object_id=str(document["id"]),
-        aliases=tuple(document.get("aliases", ())),
-        rests=Rest(**document["rests"]) if "rests" in document else None,
+        object_id=thing.thing_id,
+        aliases=thing.aliases,
+        rests=thing.rests,
         cause=str(document.get("cause", "")),
     )
     track.classes.restore(document["classes"], looks)

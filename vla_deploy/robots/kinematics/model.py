@@ -3,7 +3,7 @@
 Poses are 4x4 matrices in the base frame; positions are arrays in the robot file's joint order.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pinocchio
@@ -26,7 +26,8 @@ class RobotModel:
         Raises:
             RobotFileError: pinocchio does not find the robot file's joints in the MJCF.
         """
-        whole = pinocchio.buildModelFromMJCF(str(robot.mjcf_path))
+        self._path = str(robot.mjcf_path)
+        whole = pinocchio.buildModelFromMJCF(self._path)
         self._check_joints(robot, whole)
         mimics = read_mjcf_names(robot.mjcf_path).mimics
         moving = {*robot.joint_names, *mimics}
@@ -98,6 +99,23 @@ class RobotModel:
         """
         pose: Array = self.site_pose(self._camera_site, positions) @ self._site_from_camera
         return pose
+
+    @property
+    def camera_joint(self) -> str:
+        """Return the joint that carries the camera."""
+        frame = self._model.frames[self._frame(self._camera_site)]
+        return str(self._model.names[frame.parentJoint])
+
+    def shapes(
+        self, kind: pinocchio.GeometryType
+    ) -> Iterator[tuple[str | None, pinocchio.GeometryObject]]:
+        """Yield the MJCF's shapes of a kind, each with the joint in whose frame it is placed.
+
+        The joint is None for those of the base.
+        """
+        for shape in pinocchio.buildGeomFromMJCF(self._model, self._path, kind).geometryObjects:
+            joint = shape.parentJoint
+            yield (str(self._model.names[joint]) if joint else None), shape
 
     def _frame(self, site: str) -> int:
         frame = self._frames.get(site)
