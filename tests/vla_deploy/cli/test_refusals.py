@@ -44,6 +44,8 @@ REFUSALS = [
     ("validate soak --workers x", "argument --workers: expected"),
     *((f"validate soak --hours {hours}", "argument --hours: expected")
       for hours in ("0", "-1", "nan", "inf")),
+    ("robot urdf --out nowhere/it.urdf", "nowhere/it.urdf: No such file or directory"),
+    ("robot urdf --robot nobody", "nobody: (file): got no such file, expected a robot file, its"),
     ("servo", "vla-deploy servo: the following arguments are required: SERVO_COMMAND"),
     ("servo set-id 253 1", "expected an id in 0..252, got '253'"),
     ("servo scan --baud 12345", "argument --baud: invalid choice"),

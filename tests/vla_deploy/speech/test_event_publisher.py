@@ -76,20 +76,6 @@ def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
     assert publisher.document()["end_to_text_p95_s"] == pytest.approx(0.3, rel=0.13)
 
 
-def test_a_stop_presses_the_button_and_is_no_command(publisher: SpeechEvents, told: Any) -> None:
-    publisher.publish(heard("stop!", PhraseVerdict.STOP))
-    (press,) = told("operator")
-    assert (press["act"], press["source"], press["reason"]) == ("estop", "voice", 'heard "stop!"')
-    assert told("utterance") == []
-    assert [event["verdict"] for event in told("heard")] == ["stop"]
-
-
-def test_a_refusal_is_never_a_command(publisher: SpeechEvents, told: Any) -> None:
-    publisher.publish(heard("nice weather", PhraseVerdict.REJECTED))
-    assert told("utterance") == told("operator") == told("say") == []
-    assert told("heard")[0]["reason"] == "because"
-
-
 def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
     publisher: SpeechEvents, told: Any
 ) -> None:

@@ -274,7 +274,7 @@ def test_an_unsure_reading_is_asked_again_and_never_carried_out(bench: MakeBench
     french, english = rig.told("heard")
     assert french["verdict"] == english["verdict"] == "rejected"
     assert "at least 50% is needed" in french["reason"]
-    assert rig.told("utterance") == []
+    assert rig.told("utterance") == rig.told("operator") == []
     (asked,) = rig.told("say")
     assert "say it again" in asked["text"], "once, not for each"
 
@@ -302,8 +302,9 @@ def test_a_spoken_stop_presses_the_button(bench: MakeBench) -> None:
     rig.quiet(1.0)
     rig.say("stop")
     (press,) = rig.told("operator")
-    assert (press["act"], press["source"]) == ("estop", "voice")
-    assert rig.told("utterance") == []
+    assert press == {"act": "estop", "source": "voice", "reason": 'heard "stop"'}
+    assert rig.told("utterance") == rig.told("say") == []
+    assert rig.told("heard")[0]["verdict"] == "stop"
 
 
 def test_a_phrase_that_a_listener_has_taken_is_no_command(bench: MakeBench) -> None:

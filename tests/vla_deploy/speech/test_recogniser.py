@@ -49,44 +49,6 @@ def test_a_text_is_read_with_what_speaks_for_it(
         recogniser.read(SECOND)
 
 
-def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: Any) -> None:
-    trimmed, padded = (
-        opened(scripted_whisper.model(name, "turn left", context=context))
-        for name, context in (("short", EncoderContext.TRIMMED), ("long", EncoderContext.PADDED))
-    )
-    frames: list[int] = []
-    for recogniser in (trimmed, padded):
-        model = recogniser._whisper
-        encode = model.model.encode
-
-        def spied(features: Any, *, to_cpu: bool = False, encode: Any = encode) -> Any:
-            frames.append(features.shape[-1])
-            return encode(features, to_cpu=to_cpu)
-
-        model.model = _Spied(model.model, encode=spied)
-        recogniser.read(SECOND)
-    assert frames == [140, 3000]
-
-
-def test_no_length_of_sound_is_encoded_twice(scripted_whisper: Any) -> None:
-    """CTranslate2 takes states for features where there are as many of them as mel bands."""
-    recogniser = opened(scripted_whisper.model("ours", "turn left", context=EncoderContext.TRIMMED))
-    model = recogniser._whisper
-    encode = model.model.encode
-    states: list[tuple[int, ...]] = []
-
-    def spied(features: Any, *, to_cpu: bool = False) -> Any:
-        states.append(encode(features, to_cpu=True).shape)
-        return encode(features, to_cpu=to_cpu)
-
-    model.model = _Spied(model.model, encode=spied)
-    for milliseconds in range(1100, 1300, 20):
-        recogniser.read(np.zeros(16 * milliseconds, np.float32))
-    mel_bands = model.feature_extractor.mel_filters.shape[0]
-    assert mel_bands - 1 in [shape[1] for shape in states], "the lengths around it were tried"
-    assert mel_bands not in [shape[1] for shape in states]
-
-
 class _Spied:
     """Let a test see what a model is asked."""
 
@@ -96,6 +58,42 @@ class _Spied:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
+
+
+def encoded(recogniser: Recogniser, *sounds: Any) -> list[tuple[int, int]]:
+    """Read sounds; return how many frames of features and of states each has."""
+    model, found = recogniser._whisper, []
+    encode = model.model.encode
+
+    def spied(features: Any, *, to_cpu: bool = False) -> Any:
+        found.append((features.shape[-1], encode(features, to_cpu=True).shape[1]))
+        return encode(features, to_cpu=to_cpu)
+
+    model.model = _Spied(model.model, encode=spied)
+    for sound in sounds:
+        recogniser.read(sound)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("context", "frames"), [(EncoderContext.TRIMMED, 140), (EncoderContext.PADDED, 3000)]
+)
+def test_trimmed_sound_costs_a_small_part_of_a_padded_window(
+    scripted_whisper: Any, context: EncoderContext, frames: int
+) -> None:
+    recogniser = opened(scripted_whisper.model("ours", "turn left", context=context))
+    ((found, _),) = encoded(recogniser, SECOND)
+    assert found == frames
+
+
+def test_no_length_of_sound_is_encoded_twice(scripted_whisper: Any) -> None:
+    """CTranslate2 takes states for features where there are as many of them as mel bands."""
+    recogniser = opened(scripted_whisper.model("ours", "turn left", context=EncoderContext.TRIMMED))
+    sounds = [np.zeros(16 * milliseconds, np.float32) for milliseconds in range(1100, 1300, 20)]
+    mel_bands = recogniser._whisper.feature_extractor.mel_filters.shape[0]
+    states = [count for _, count in encoded(recogniser, *sounds)]
+    assert mel_bands - 1 in states, "the lengths around it were tried"
+    assert mel_bands not in states
 
 
 def test_what_may_have_been_said_instead_is_told_the_likeliest_first() -> None:

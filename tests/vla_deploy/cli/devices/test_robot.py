@@ -14,15 +14,3 @@ def test_urdf_is_printed_or_written(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["robot", "urdf", "--robot", "butler", "--out", str(out)]) == 0
     assert out.read_text(encoding="utf-8") == expected
     assert str(out) in capsys.readouterr().out
-
-
-def test_what_cannot_be_read_or_written_is_named_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "nowhere" / "butler.urdf"
-    assert main(["robot", "urdf", "--out", str(out)]) == 2
-    assert f"{out}: No such file or directory" in capsys.readouterr().err
-    assert main(["robot", "urdf", "--robot", "nobody"]) == 2
-    told = capsys.readouterr().err
-    assert "nobody" in told
-    assert "butler" in told

@@ -37,8 +37,13 @@ def files(tmp_path, blobs):
 
 
 @pytest.fixture
-def added(vla, files):
-    code, _, errors = vla("add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"])
+def add(vla, files):
+    return partial(vla, "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"])
+
+
+@pytest.fixture
+def added(add):
+    code, _, errors = add()
     assert (code, errors) == (0, "")
     return "mugs"
 
@@ -47,20 +52,15 @@ def added(vla, files):
     ("option", "value"),
     [("--score", "7"), ("--score", "nan"), ("--iou", "5"), ("--fill", "999"), ("--licence", "")],
 )
-def test_a_model_that_could_not_be_read_back_is_not_added(vla, files, option, value):
-    code, _, errors = vla(
-        "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"], option, value
-    )
-
+def test_a_model_that_could_not_be_read_back_is_not_added(vla, add, option, value):
+    code, _, errors = add(option, value)
     assert code == 2
     assert option.strip("-") in errors.replace("score_threshold", "score")
     assert "mugs" not in vla("list")[1]
 
 
-def test_a_model_is_added_listed_shown_and_removed(vla, files, base):
-    code, out, _ = vla(
-        "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"], "--json"
-    )
+def test_a_model_is_added_listed_shown_and_removed(vla, add, base):
+    code, out, _ = add("--json")
     assert code == 0
     assert json.loads(out)["adapter"] == "yolo"
     _, out, _ = vla("list", "--json")
@@ -126,9 +126,8 @@ def test_images_to_measure_with_are_others_than_those_to_calibrate_with(
     assert errors.count("\n") == 1
 
 
-def test_calibrate_writes_down_what_a_detectors_words_are_worth(vla, files, added):
-    assert "it names nothing by itself" in vla("add", added, "--onnx", files["onnx"], "--classes",
-                                               files["classes"], "--replace")[1]  # fmt: skip
+def test_calibrate_writes_down_what_a_detectors_words_are_worth(vla, files, add, added):
+    assert "it names nothing by itself" in add("--replace")[1]
     assert "measured" not in json.loads(vla("show", added, "--json")[1])["detection"]
     code, out, _ = vla("calibrate", added, "--labelled", files["photos"])
     assert code == 0
@@ -149,9 +148,11 @@ def test_calibrate_takes_labelled_images_for_detectors_that_were_added_only(vla,
     assert (code, "was not added as a Whisper" in errors) == (2, True)
 
 
-def test_a_quantised_model_that_sees_worse_is_refused_with_code_1(vla, files, added, base, blobs):
+def test_a_quantised_model_that_sees_worse_is_refused_with_code_1(
+    vla, files, add, added, base, blobs
+):
     Path(files["onnx"]).write_bytes(blobs.raw(red_gain=3000.0).SerializeToString())
-    vla("add", added, "--onnx", files["onnx"], "--classes", files["classes"], "--replace")
+    add("--replace")
     code, _, errors = vla(
         "quantise", added, "--images", files["others"], "--labelled", files["photos"]
     )

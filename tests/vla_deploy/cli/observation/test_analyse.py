@@ -25,18 +25,13 @@ def seen(robot, clock):
     scene = {"stamp_ns": clock.now_ns(), "objects": [CUP | {"last_seen_ns": clock.now_ns()}]}
     robot.space.cell_writer("scene").put_document(scene)
     robot.space.cell_writer("process_table").put_document({"robot": "butler", "processes": []})
-    robot.space.cell_writer("pose").put(**pose())
+    place = {"x_m": 2.2, "y_m": 2.05, "yaw_rad": -1.5708, "state": PlaceState.TRACKING}
+    robot.space.cell_writer("pose").put(**place, match_ratio=1.0, covariance=np.zeros(9), doubt=0)
     robot.executes(None)
     image = np.zeros((4, 6, 3), np.uint8)
     image[0, 0] = (250, 1, 2)
     payload = image.tobytes() + bytes(2 * 4 * 6)
     robot.space.frame_writer("rgbd").put(payload, width=6, height=4, stamp_ns=clock.now_ns())
-
-
-def pose(state: PlaceState = PlaceState.TRACKING) -> dict:
-    covariance = np.zeros(9)
-    place = {"x_m": 2.2, "y_m": 2.05, "yaw_rad": -1.5708, "match_ratio": 1.0}
-    return place | {"covariance": covariance, "state": state, "doubt": 0}
 
 
 def arguments(**changes) -> argparse.Namespace:
@@ -65,13 +60,6 @@ def test_a_server_that_is_not_there_leaves_the_measured_analysis(session, seen, 
     analysis = analyser_for(session, chosen).analyse(ask(session, ""))
     assert json.loads(analysis.model_dump_json())["analyser"] == "geometric"
     assert "note: measured only, server gone gave nothing" in as_text(analysis)
-
-
-def test_a_robot_that_is_lost_tells_no_sides(session, seen, robot):
-    robot.space.cell_writer("pose").put(**pose(PlaceState.LOST))
-    analysis = analyser_for(session, arguments()).analyse(ask(session, "go to the kitchen"))
-    assert analysis.objects[0].side is None
-    assert analysis.task.prerequisites == ("find out where the robot is",)
 
 
 def test_a_robot_that_is_silent_is_told(session, robot):

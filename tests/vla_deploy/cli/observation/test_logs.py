@@ -135,6 +135,8 @@ def test_crashes_are_listed_the_newest_last(run, crashed):
     told = run("crashes", "list")[1]
     assert [one.split()[0] for one in told] == ["000001-planner", "000002-planner"]
     assert told[0].endswith("planner_status silent for 5.1 s, limit 5 s")
+    told = json.loads("\n".join(run("crashes", "list", "--json")[1]))
+    assert [one["pid"] for one in told] == [41, 42]
 
 
 def test_the_newest_crash_is_shown_unless_one_is_named(run, crashed):
@@ -143,11 +145,6 @@ def test_the_newest_crash_is_shown_unless_one_is_named(run, crashed):
     assert told[0].startswith("planner (pid 41): ")
     assert "  File x" in told
     assert "  scene: 0.2 s" in told
-
-
-def test_crashes_are_told_as_json(run, crashed):
-    told = json.loads("\n".join(run("crashes", "list", "--json")[1]))
-    assert [one["pid"] for one in told] == [41, 42]
     shown = json.loads("\n".join(run("crashes", "show", "--json")[1]))
     assert shown["pid"] == 42
 

@@ -17,9 +17,13 @@ MODEL = {
 }
 
 
+def text_of(**told: Any) -> str:
+    return as_text({**dict.fromkeys(SILENT), "scene": None, **told})
+
+
 def told(sight: dict[str, Any], *faults: str) -> str:
     scene = {"objects": [], "sight": sight, "image": {"use": "all", "faults": list(faults)}}
-    return as_text({**dict.fromkeys(SILENT), "scene": scene})
+    return text_of(scene=scene)
 
 
 def test_the_network_at_work_is_told_with_its_cost_and_what_is_not_as_asked() -> None:
@@ -48,13 +52,13 @@ def test_that_the_chosen_profile_does_not_load_is_told() -> None:
         "last": {},
         "fault": "the chosen profile x is gone",
     }
-    lines = as_text({**dict.fromkeys(SILENT), "scene": None, "profile": profile}).splitlines()
+    lines = text_of(profile=profile).splitlines()
     assert lines[lines.index("profile: desktop") + 1] == "  alarm: the chosen profile x is gone"
 
 
 def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
     def ears(speech: dict[str, Any] | None) -> str:
-        return as_text({**dict.fromkeys(SILENT), "scene": None, "speech": speech}).split("\n")[-2]
+        return text_of(speech=speech).split("\n")[-2]
 
     assert ears(None) == "hears: nothing, speech is silent"
     deaf = {"state": "deaf", "why": "robot butler has no [microphone]"}
@@ -72,7 +76,7 @@ def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
         "away": {"cloud": "no key"},
         "question": "Which cup?",
     }
-    text = as_text({**dict.fromkeys(SILENT), "scene": None, "planner": planner})
+    text = text_of(planner=planner)
     assert "plans by: rules 3, server bench 0; refused 1" in text
     assert "  without cloud: no key" in text
     assert "asks: Which cup?" in text
@@ -84,5 +88,5 @@ def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
 )
 def test_how_fast_the_twins_time_goes_and_who_holds_it_is_shown(factor: float, words: str) -> None:
     twin = {"pace": "real", "real_time_factor": factor, "held_by": "perception"}
-    lines = as_text({**dict.fromkeys(SILENT), "scene": None, "twin": twin}).splitlines()
+    lines = text_of(twin=twin).splitlines()
     assert words in lines

@@ -200,6 +200,8 @@ def test_what_is_ambiguous_or_unknown_is_not_grounded(home: "Home") -> None:
         grounded(home, ("pick_up", {"object": "the cup"}), scene=("cup_1", "cup_2"))
     with pytest.raises(UnknownPlace):
         grounded(home, ("navigate_to", {"place": "moon"}))
+    with pytest.raises(PlanInvalid):
+        grounded(home, ("place", {"destination": 7}))
     with pytest.raises(Ambiguous, match="Which one, the coffee table"):
         grounded(home, ("navigate_to", {"place": "table"}), here=(6.0, 2.0, 0.0))
     with pytest.raises(PlanInvalid):
