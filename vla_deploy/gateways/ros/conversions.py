@@ -13,7 +13,7 @@ from geometry_msgs.msg import Pose, Quaternion
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 
 class RosTime:

@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.gateways.ros.conversions import RosTime, fill_pose
 from vla_deploy.gateways.ros.part import MAP
 from vla_deploy.ipc.ros_goals import GoalKind, GoalRequest, GoalState
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.robots.floor_pose import Pose2D
 
 ACTIONS: Final[Mapping[GoalKind, Any]] = {
     GoalKind.NAVIGATE: NavigateToPose,
