@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.ipc import CellReader
 from vla_deploy.robots.kinematics.model import RobotModel
@@ -109,15 +109,13 @@ def _row(percentiles_nm: np.ndarray, limit_nm: float) -> dict[str, float]:
 @contextmanager
 def _listening(seed: int) -> Iterator[tuple[LockstepStack, TorqueListener]]:
     """Own an armed robot whose joints are listened to from then on."""
-    with tempfile.TemporaryDirectory() as folder:
-        stack = LockstepStack(Path(folder), seed=seed)
-        try:
-            stack.arm()
-            listener = TorqueListener(stack)
-            stack.lockstep.add(listener)
-            yield stack, listener
-        finally:
-            stack.close()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        armed_lockstep(Path(folder), seed=seed) as stack,
+    ):
+        listener = TorqueListener(stack)
+        stack.lockstep.add(listener)
+        yield stack, listener
 
 
 def main(argv: Sequence[str] | None = None) -> int:

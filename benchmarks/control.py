@@ -25,7 +25,7 @@ from benchmarks.command import parser, rows, show
 from benchmarks.spans import REST, Spans, Tally
 from benchmarks.stopwatch import answering
 from drivers.clock import NS_PER_S
-from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.control.judging import safety_stage
 
 _COMMAND: Final = "pick up the red cup and put it in the box"
@@ -67,10 +67,11 @@ _KINDS: Final = {
 
 def measure(seconds: float, seed: int) -> dict[str, Any]:
     """Return shares of the period, after control is armed and a command is given."""
-    with tempfile.TemporaryDirectory(prefix="vla-", dir=_SHARED_MEMORY) as folder:
-        stack = LockstepStack(Path(folder), seed=seed)
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-", dir=_SHARED_MEMORY) as folder,
+        armed_lockstep(Path(folder), seed=seed) as stack,
+    ):
         try:
-            stack.arm()
             stack.give(text=_COMMAND)
             gc.collect()
             gc.freeze()  # as control's own process does
@@ -81,7 +82,6 @@ def measure(seconds: float, seed: int) -> dict[str, Any]:
             return _report(spans, seconds, stack.control.period_s)
         finally:
             gc.unfreeze()
-            stack.close()
 
 
 def _instrument(spans: Spans, stack: LockstepStack) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
-from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.perception.images.detection import Detection
 from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate
@@ -275,13 +275,11 @@ def _place(
 
 @contextmanager
 def _stack(seed: int) -> Iterator[LockstepStack]:
-    with tempfile.TemporaryDirectory() as folder:
-        stack = LockstepStack(Path(folder), seed=seed)
-        try:
-            stack.arm()
-            yield stack
-        finally:
-            stack.close()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        armed_lockstep(Path(folder), seed=seed) as stack,
+    ):
+        yield stack
 
 
 def main(argv: Sequence[str] | None = None) -> int:

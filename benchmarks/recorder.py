@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.spans import REST, Spans
 from drivers.clock import NS_PER_S
-from sim_twin.harness.lockstep_stack import LockstepStack
+from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.control.judging.tick_recorder import TickRecorder
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.safety import SafetyInputs
@@ -41,13 +41,9 @@ def measure(seconds: float, seed: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         run_dir = Path(folder) / "run"
         run_dir.mkdir()
-        stack = LockstepStack(run_dir, seed=seed)
-        try:
-            stack.arm()
+        with armed_lockstep(run_dir, seed=seed) as stack:
             ticks, calls = _ticks(stack, seconds / 2, Path(folder) / "again")
             return {**ticks, "ticks": calls, **_recorder(stack, seconds / 2, Path(folder))}
-        finally:
-            stack.close()
 
 
 def _ticks(stack: LockstepStack, seconds: float, again: Path) -> tuple[dict[str, float], int]:

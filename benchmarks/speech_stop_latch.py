@@ -53,8 +53,7 @@ def _stop(
     listener = build_stop_words(context, profile)
     clock.add(SpeechNode(context, rig.robot, profile, microphone, stop_words=listener))
     rig.arm()
-    goal = {"kind": "goal", "motion_id": 1, "targets": _TARGETS, "speed_ratio": 0.1}
-    rig.space.ring_writer("motion_command").publish(goal)
+    rig.go(_TARGETS, 0.1)
     if not clock.run_until(lambda: _fastest(rig) > _MOVING_RAD_S, _PATIENCE_S):
         return None, None
     ends_ns = rig.speak(text, Talker(engine=EspeakEngine(voice=voice)), snr_db).ends_ns

@@ -124,16 +124,12 @@ def lockstep(make_lockstep: Callable[..., Lockstep]) -> Lockstep:
 @pytest.fixture
 def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepStack]:
     """Give the whole robot in lock-step, armed."""
-    from sim_twin.harness.lockstep_stack import LockstepStack
+    from sim_twin.harness.lockstep_stack import armed_lockstep
 
     run_dir = tmp_path / "twin"
     run_dir.mkdir()
-    stack = LockstepStack(run_dir, **_chosen(request))
-    try:
-        stack.arm()
+    with armed_lockstep(run_dir, **_chosen(request)) as stack:
         yield stack
-    finally:
-        stack.close()
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Run a robot whose lateness and budgets are judged, so by the wall clock, and measure it."""
 
 import contextlib
-import itertools
 import subprocess
 import sys
 import uuid
@@ -16,7 +15,6 @@ from sim_twin.harness.robot import RobotFailed
 
 _SWITCH_S: Final = 90.0
 _FRESH_S: Final = 3.0
-_FIRST_MOTION: Final = 1_000_000
 
 
 class WorkingRobot(ProcessStack):
@@ -36,7 +34,6 @@ class WorkingRobot(ProcessStack):
             RobotFailed: it does not come up and arm.
         """
         super().__init__(base, *options, log=log, environment=environment)
-        self._motions = itertools.count(_FIRST_MOTION)
         try:
             self.wait_until_armed()
         except BaseException:
@@ -68,11 +65,6 @@ class WorkingRobot(ProcessStack):
         return {name: _anonymous_mib(pid) for name, pid in self.pids().items()}
 
     # --- act ----------------------------------------------------------------------------------
-
-    def go(self, **targets: float) -> None:
-        """Send joints somewhere, past the executor: it must be idle."""
-        goal = {"kind": "goal", "motion_id": next(self._motions), "speed_ratio": 1.0}
-        self.session.publish("motion_command", {**goal, "targets": targets})
 
     def use_profile(self, path: Path, meanwhile: Callable[[], object]) -> dict[str, Any]:
         """Ask for a profile, as `vla-deploy profile use` does, and return how that ended."""

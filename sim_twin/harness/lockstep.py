@@ -88,8 +88,13 @@ class Schedule:
         while self._entries:
             self._entries.pop().node.stop()
 
-    def run_until(self, predicate: Callable[[], bool], deadline_ns: int) -> bool:
-        """Run until `predicate()` or `deadline_ns`; return whether the predicate came true."""
+    def run_for(self, duration_s: float) -> None:
+        """Run for a span of simulated time."""
+        self.run_until(lambda: False, duration_s)
+
+    def run_until(self, predicate: Callable[[], object], timeout_s: float) -> bool:
+        """Run until `predicate()`; return False when `timeout_s` of simulated time passed first."""
+        deadline_ns = self._simulation.now_ns + round(timeout_s * NS_PER_S)
         while not predicate():
             if self._simulation.now_ns >= deadline_ns:
                 return False
@@ -207,7 +212,7 @@ class _Leaver:
         self._bus.shutdown()
 
 
-class Lockstep:
+class Lockstep(Schedule):
     """Own a twin, its clock and the nodes that run against it.
 
     Build nodes with `context` (its run directory is `tmp_path`) and `devices`, then `add` them.
@@ -236,7 +241,7 @@ class Lockstep:
         self.context = NodeContext(
             run_dir=tmp_path, robot=robot, profile=profile, devices_dir=None, clock=self.clock
         )
-        self._schedule = Schedule(self.twin, self.devices.opened)
+        super().__init__(self.twin, self.devices.opened)
 
     @property
     def now_s(self) -> float:
@@ -247,39 +252,6 @@ class Lockstep:
     def faults(self) -> FaultInjector:
         """Return what makes the twin's devices fail."""
         return self.twin.faults
-
-    @property
-    def nodes(self) -> tuple[Node, ...]:
-        """Return the running nodes in order of arrival."""
-        return self._schedule.nodes
-
-    def add(self, node: Node) -> None:
-        """Start a node and step it from now on."""
-        self._schedule.add(node)
-
-    def remove(self, node: Node) -> None:
-        """Stop a node in order.
-
-        Raises:
-            KeyError: the node does not run.
-        """
-        self._schedule.remove(node)
-
-    def kill(self, node: Node) -> None:
-        """End a node as `kill -9` does: it is not told, and its open devices just close.
-
-        Raises:
-            KeyError: the node does not run.
-        """
-        self._schedule.kill(node)
-
-    def run_for(self, duration_s: float) -> None:
-        """Run for a span of simulated time."""
-        self._schedule.run_until(lambda: False, self._deadline(duration_s))
-
-    def run_until(self, predicate: Callable[[], bool], timeout_s: float) -> bool:
-        """Run until `predicate()`; return False when `timeout_s` of simulated time passed first."""
-        return self._schedule.run_until(predicate, self._deadline(timeout_s))
 
     def truth(self) -> dict[str, Any]:
         """Return what the physics knows; see `sim_twin.physics.truth.Referee`."""
@@ -295,8 +267,5 @@ class Lockstep:
 
     def close(self) -> None:
         """Stop every node, the latest first, and release the twin."""
-        self._schedule.stop()
+        self.stop()
         self.twin.close()
-
-    def _deadline(self, duration_s: float) -> int:
-        return self.twin.now_ns + round(duration_s * NS_PER_S)

@@ -1,7 +1,9 @@
 """Run the whole robot stack in lock-step: the processes' nodes, one thread, simulated time."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +22,7 @@ from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.client.link import RobotLink
 from vla_deploy.control.node import ControlNode
-from vla_deploy.ipc import BY_NAME, SharedSpace
+from vla_deploy.ipc import BY_NAME, CellWriter, SharedSpace
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
@@ -35,6 +37,7 @@ from vla_deploy.speech.voice.robot_voice import build_voice
 
 COMMAND_TIMEOUT_S: Final = 300.0
 LOOK_PERIOD_S: Final = 1.0 / BY_NAME["near_obstacles"].rate_hz
+_COMMAND_S: Final = 0.02
 _ACT_S: Final = 3.0
 _ACT_EVERY_S: Final = 0.5
 _REACHED: Final = {"reset": "disarmed", "arm": "armed"}
@@ -82,9 +85,10 @@ class LockstepControl(RobotUnderTest):
         context, devices = self.lockstep.context, self.lockstep.devices
         return ControlNode(context, self.robot, self._profile, devices)
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
-        """Return the newest document of a cell, empty when there is none that young."""
-        return self._link.document(topic, age_limit_s) or {}
+    @property
+    def link(self) -> RobotLink:
+        """Return the way to the robot's topics."""
+        return self._link
 
     def status(self) -> dict[str, Any]:
         """Return control's newest status, or an empty document before the first."""
@@ -94,8 +98,6 @@ class LockstepControl(RobotUnderTest):
         """Publish an operator's act."""
         self._link.publish("operator", {"act": act, "source": "test", "reason": ""})
 
-    publish_act = operate
-
     def insist(self, act: str) -> None:
         """Do an operator's act again and again, as a person would, until it has its effect."""
         for _ in range(round(_ACT_S / _ACT_EVERY_S)):
@@ -103,9 +105,20 @@ class LockstepControl(RobotUnderTest):
             if self.wait_until(lambda: self.state() == _REACHED[act], _ACT_EVERY_S):
                 return
 
+    @cached_property
+    def _base_command(self) -> CellWriter:
+        return self.space.cell_writer("base_command")
+
+    def drive_for(self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0) -> None:
+        """Drive for a time, past the executor: control wants its commands again and again."""
+        end_s = self.lockstep.now_s + duration_s
+        while self.lockstep.now_s < end_s - 1e-9:
+            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
+            self.lockstep.run_for(min(_COMMAND_S, end_s - self.lockstep.now_s))
+
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
         """Run until `condition()`; return whether it came true in time."""
-        return self.lockstep.run_until(lambda: bool(condition()), timeout_s)
+        return self.lockstep.run_until(condition, timeout_s)
 
     def pause(self, duration_s: float) -> None:
         """Let simulated time pass, in which every node runs."""
@@ -198,6 +211,18 @@ class LockstepStack(LockstepControl):
         if not self.wait_until(lambda: self.outcome(command_id) is not None, timeout_s):
             raise RobotFailed(f'"{text}" did not end within {timeout_s:g} s')
         return self._outcomes.pop(command_id)
+
+
+@contextmanager
+def armed_lockstep(run_dir: Path, **chosen: Any) -> Iterator[LockstepStack]:
+    """Give the whole robot in lock-step, armed; `chosen` are arguments of `LockstepStack`.
+
+    Raises:
+        RobotFailed: control does not arm.
+    """
+    with closing(LockstepStack(run_dir, **chosen)) as stack:
+        stack.arm()
+        yield stack
 
 
 def lockstep_robot(tmp_path: Path, seed: int = 0, *, takes_all: bool) -> LockstepControl:

@@ -1,12 +1,14 @@
 """Ask a robot, operate it and wait for it in the same words in every form of the harness."""
 
+import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -14,6 +16,7 @@ import psutil
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.client.link import RobotLink
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import environment_of
 
@@ -22,6 +25,8 @@ ARM_S: Final = 30.0
 _WAY: Final[Mapping[str, str]] = {"stopped": "reset", "fault": "reset", "disarmed": "arm"}
 """The act that leads from a state towards being armed; elsewhere control is under way."""
 _AGAIN_S: Final = 0.5
+_FIRST_MOTION: Final = 1_000_000
+"""Its id is far from the executor's."""
 _ANSWER_S: Final = 600.0
 """By the wall clock, and so for a busy computer: a command line that hangs ends with the test."""
 _FRESH_S: Final = 3.0
@@ -40,17 +45,18 @@ class RobotUnderTest(ABC):
     status_age_limit_s: ClassVar[float | None] = 1.0
     """Control counts as silent where its newest status is older."""
 
+    @property
     @abstractmethod
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
-        """Return the newest document of a cell, empty when there is none that young."""
-
-    @abstractmethod
-    def publish_act(self, act: str) -> None:
-        """Publish an operator's act, and do not wait for its effect."""
+    def link(self) -> RobotLink:
+        """Return the way to the robot's topics."""
 
     @abstractmethod
     def close(self) -> None:
         """End the robot in order; ending twice is allowed."""
+
+    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
+        """Return the newest document of a cell, empty when there is none that young."""
+        return self.link.document(topic, age_limit_s) or {}
 
     def control_status(self) -> dict[str, Any]:
         """Return what control says of itself, empty where it is silent."""
@@ -72,12 +78,27 @@ class RobotUnderTest(ABC):
                 status = json.dumps(self.document("control_status"))
                 raise RobotFailed(f"control is not armed after {timeout_s:g} s: {status}")
             if state in _WAY:
-                self.publish_act(_WAY[state])
+                self.link.operate(_WAY[state])
             self.await_change(state)
 
     def await_change(self, state: str) -> None:
         """Return once control is not in this state any more, or after half a second."""
         self.wait_until(lambda: self.state() != state, _AGAIN_S)
+
+    @cached_property
+    def _motions(self) -> Iterator[int]:
+        return itertools.count(_FIRST_MOTION)
+
+    def go(
+        self,
+        targets: Mapping[str, float],
+        speed_ratio: float = 1.0,
+        effort_ratio: Mapping[str, float] | None = None,
+    ) -> None:
+        """Send joints somewhere, past the executor: it must be idle."""
+        goal = {"kind": "goal", "motion_id": next(self._motions), "targets": dict(targets)}
+        effort = {} if effort_ratio is None else {"effort_ratio": dict(effort_ratio)}
+        self.link.publish("motion_command", {**goal, "speed_ratio": speed_ratio, **effort})
 
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
         """Return whether `condition()` came true in time."""
@@ -107,13 +128,10 @@ class RunningRobot(RobotUnderTest):
     def session(self) -> RobotSession:
         """Return the way to the run's shared memory."""
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
-        """Return the newest document of a cell, empty when there is none that young."""
-        return self.session.document(topic, age_limit_s) or {}
-
-    def publish_act(self, act: str) -> None:
-        """Publish an operator's act, and do not wait for its effect."""
-        self.session.operate(act)
+    @property
+    def link(self) -> RobotLink:
+        """Return the way to the robot's topics."""
+        return self.session
 
     # --- as a user ----------------------------------------------------------------------------
 

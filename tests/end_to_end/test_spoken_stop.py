@@ -41,8 +41,7 @@ class Moving:
         )
         self.rig.lockstep.add(self.node)
         self.rig.arm()
-        goal = {"kind": "goal", "motion_id": 1, "targets": TARGETS, "speed_ratio": 0.1}
-        self.rig.space.ring_writer("motion_command").publish(goal)
+        self.rig.go(TARGETS, 0.1)
         assert self.rig.lockstep.run_until(lambda: self.fastest() > 0.1, 3.0)
 
     def fastest(self) -> float:

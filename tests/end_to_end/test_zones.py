@@ -46,11 +46,8 @@ class Course:
             self.lockstep.context, self.rig.robot, load_profile("desktop"), self.lockstep.devices
         )
         self.lockstep.add(perception)
-        self._command = self.rig.space.cell_writer("base_command")
-        self._motions = self.rig.space.ring_writer("motion_command")
         self.rig.arm()
-        goal = {"head_pan": 0.0, "head_tilt": 0.3}
-        self._motions.publish({"kind": "goal", "motion_id": 1, "targets": goal, "speed_ratio": 1.0})
+        self.rig.go({"head_pan": 0.0, "head_tilt": 0.3})
         self.lockstep.run_for(1.0)
         self.y_m = self.rig.robot.start_pose.y_m
 
@@ -61,11 +58,6 @@ class Course:
     @property
     def speed_m_s(self) -> float:
         return float(self.engine.data.body("base").cvel[3])
-
-    def drive(self, v_m_s: float, seconds: float) -> None:
-        for _ in range(round(seconds / 0.02)):
-            self._command.put(v_m_s=v_m_s, w_rad_s=0.0)
-            self.lockstep.run_for(0.02)
 
     def gap_m(self, body: str) -> float:
         """Return the distance of the robot's base from a thing, as MuJoCo has it."""
@@ -98,18 +90,18 @@ def course(tmp_path: Path) -> Iterator[Course]:
 
 
 def test_what_the_lidar_sees_suddenly_at_cruising_speed_is_not_touched(course: Course) -> None:
-    course.drive(CRUISE_M_S, 1.5)
+    course.rig.drive_for(1.5, CRUISE_M_S)
     assert course.speed_m_s > 0.9 * CRUISE_M_S
     course.lockstep.add(Holder(course, "box", course.x_m + 0.24 + 0.40 + 0.116, 0.12))
     closest_m = course.gap_m("box")
     for _ in range(150):
-        course.drive(CRUISE_M_S, 0.02)
+        course.rig.drive_for(0.02, CRUISE_M_S)
         closest_m = min(closest_m, course.gap_m("box"))
     assert abs(course.speed_m_s) < STANDSTILL_M_S
     assert 0.0 < closest_m < 0.15
     assert course.rig.status()["cause"] == "obstacle_stop_zone"
     before_m = course.x_m
-    course.drive(-0.2, 1.0)
+    course.rig.drive_for(1.0, -0.2)
     assert course.x_m < before_m - 0.1, "the way out is open"
 
 
@@ -120,7 +112,7 @@ def test_a_cup_on_the_floor_is_seen_from_afar_and_remembered_when_it_is_close(
     start_m = course.x_m
     closest_m = course.gap_m("red_cup")
     for _ in range(400):
-        course.drive(CRUISE_M_S, 0.02)
+        course.rig.drive_for(0.02, CRUISE_M_S)
         closest_m = min(closest_m, course.gap_m("red_cup"))
     assert course.x_m > start_m + 1.0
     assert abs(course.speed_m_s) < STANDSTILL_M_S
@@ -128,6 +120,6 @@ def test_a_cup_on_the_floor_is_seen_from_afar_and_remembered_when_it_is_close(
 
 
 def test_without_anything_in_the_way_cruising_is_not_restricted(course: Course) -> None:
-    course.drive(CRUISE_M_S, 2.0)
+    course.rig.drive_for(2.0, CRUISE_M_S)
     assert course.speed_m_s > 0.9 * CRUISE_M_S
     assert course.rig.status()["cause"] == ""

@@ -34,8 +34,7 @@ def test_a_robot_that_rests_and_reaches_is_no_hazard(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
     stack.arm()
     watch = stack.lockstep.twin.hazards
-    goal = {"kind": "goal", "motion_id": 1, "targets": {"left_elbow": 1.9}, "speed_ratio": 1.0}
-    stack.space.ring_writer("motion_command").publish(goal)
+    stack.go({"left_elbow": 1.9})
     stack.lockstep.run_for(2.0)
     assert watch.found == ()
     stack.close()

@@ -55,14 +55,11 @@ class PhaseStage:
     def __init__(self, stack: LockstepControl) -> None:
         self._stack = stack
         self._lockstep = stack.lockstep
-        self._motions = stack.space.ring_writer("motion_command")
-        self._base = stack.space.cell_writer("base_command")
-        self._number = 0
         self._speeds: tuple[float, float] | None = None
         self._begin: Mapping[Phase, Callable[[], None]] = {
             Phase.IDLE: lambda: None,
             Phase.DRIVING: self._drive_at_the_wall,
-            Phase.REACHING: lambda: self._go(_REACH, 0.7),
+            Phase.REACHING: lambda: self._stack.go(_REACH, 0.7),
             Phase.CARRYING: self._carry,
         }
 
@@ -81,12 +78,10 @@ class PhaseStage:
 
     def run_for(self, seconds: float) -> None:
         """Run on; who drives is told to go on, as the executor would."""
-        end_s = self._lockstep.now_s + seconds
-        while self._lockstep.now_s < end_s - 1e-9:
-            if self._speeds is not None:
-                v_m_s, w_rad_s = self._speeds
-                self._base.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
-            self._lockstep.run_for(min(_COMMAND_S, end_s - self._lockstep.now_s))
+        if self._speeds is None:
+            self._lockstep.run_for(seconds)
+        else:
+            self._stack.drive_for(seconds, *self._speeds)
 
     @property
     def holds_payload(self) -> bool:
@@ -98,7 +93,7 @@ class PhaseStage:
 
     def _drive_at_the_wall(self) -> None:
         """Turn to the wall, and drive until something stops the robot: its separation counts."""
-        self._go(_GAZE, 1.0)
+        self._stack.go(_GAZE, 1.0)
         self._speeds = (0.0, _TURN_RAD_S)
         end_s = self._lockstep.now_s + _TURN_TIMEOUT_S
         while self._lockstep.truth()["robot"]["yaw_rad"] < _TO_THE_WALL_RAD:
@@ -116,10 +111,10 @@ class PhaseStage:
         fingers = robot.group(hand.gripper).joints
         widest = dict(zip(robot.joint_names, robot.position_max.tolist(), strict=True))
         open_m = {name: widest[name] for name in fingers}
-        self._go({**robot.poses[_TUCK], **_POSE, **open_m}, 1.0)
+        self._stack.go({**robot.poses[_TUCK], **_POSE, **open_m}, 1.0)
         self.run_for(_POSE_S)
         grip = engine.data.site(hand.grip_site)
-        self._go(dict.fromkeys(fingers, 0.004), 0.5, dict.fromkeys(fingers, 0.5))
+        self._stack.go(dict.fromkeys(fingers, 0.004), 0.5, dict.fromkeys(fingers, 0.5))
         for _ in range(round(_CLOSE_S / _COMMAND_S)):
             self._lockstep.run_for(_COMMAND_S)
             if self.holds_payload:
@@ -130,12 +125,4 @@ class PhaseStage:
         if not self.holds_payload:
             raise NotSet(f"{PAYLOAD} at {grip.xpos} did not stay in the {_HAND} hand")
         self._drive()
-        self._go(_CARRY_REACH, 0.5)
-
-    def _go(
-        self, targets: Mapping[str, float], speed: float, effort: Mapping[str, float] | None = None
-    ) -> None:
-        self._number += 1
-        goal = {"kind": "goal", "motion_id": self._number, "targets": dict(targets)}
-        extra = {"effort_ratio": dict(effort)} if effort else {}
-        self._motions.publish({**goal, "speed_ratio": speed, **extra})
+        self._stack.go(_CARRY_REACH, 0.5)

@@ -88,8 +88,7 @@ class Rehearsal:
         """Set the robot in motion; return the command's id on a travel, else nothing."""
         match self._scenario.meanwhile:
             case Meanwhile.REACH:
-                goal = {"kind": "goal", "motion_id": 1, "targets": _REACH, "speed_ratio": 0.7}
-                self._stack.space.ring_writer("motion_command").publish(goal)
+                self._stack.go(_REACH, 0.7)
             case Meanwhile.TRAVEL:
                 return self._give("move", distance_m=_TRAVEL_M)
             case Meanwhile.TURN:

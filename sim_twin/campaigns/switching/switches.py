@@ -93,7 +93,7 @@ class SwitchCampaign:
     def _tuck(self) -> None:
         """Fold the arms."""
         # Arms rest on the base without power: moving there is what a protective stop is for.
-        self._robot.go(**load_robot("butler").poses["tuck"])
+        self._robot.go(load_robot("butler").poses["tuck"])
         self._robot.pause(_TUCK_S)
 
     def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> SwitchSeen:
@@ -144,7 +144,7 @@ class SwitchCampaign:
         if self._clock.now_ns() >= self._swing_ns:
             self._swing_ns = self._clock.now_ns() + round(_SWING_S * NS_PER_S)
             side = next(self._targets)
-            self._robot.go(head_pan=side, left_wrist_roll=1.2 + 0.5 * side)
+            self._robot.go({"head_pan": side, "left_wrist_roll": 1.2 + 0.5 * side})
         return False
 
 

@@ -69,7 +69,7 @@ class _Closed:
     def __init__(self, *_words: object, **_options: object) -> None:
         pass
 
-    def go(self, **_targets: float) -> None:
+    def go(self, _targets: object) -> None:
         raise SystemExit(EXIT_TERMINATED)
 
     def close(self) -> None:

@@ -1,5 +1,6 @@
 """A robot is led to where it is armed from every state, and a wait ends in time."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.harness.robot import RobotFailed, RobotUnderTest
+from vla_deploy.client.link import RobotLink
 
 STARTING_S = 2.0
 NEXT = {
@@ -14,6 +16,13 @@ NEXT = {
     ("fault", "reset"): "disarmed",
     ("disarmed", "arm"): "armed",
 }
+
+
+class ScriptedLink(RobotLink):
+    """Pass on an operator's acts."""
+
+    def __init__(self, operate: Callable[[str], None]) -> None:
+        self.operate = operate  # type: ignore[method-assign,assignment]
 
 
 class ScriptedRobot(RobotUnderTest):
@@ -31,7 +40,11 @@ class ScriptedRobot(RobotUnderTest):
             self._state = {"silent": "disarmed", "arming": "armed"}.get(self._state, self._state)
         return {} if self._state == "silent" else {"state": self._state}
 
-    def publish_act(self, act: str) -> None:
+    @property
+    def link(self) -> RobotLink:
+        return ScriptedLink(self._follow)
+
+    def _follow(self, act: str) -> None:
         self.acts.append(act)
         if self._obeys:
             self._state = NEXT[self._state, act]

@@ -86,7 +86,7 @@ def test_nodes_step_at_their_own_periods_in_order_of_arrival(
     schedule = Schedule(simulation)
     schedule.add(RecordingNode("fast", 0.004, simulation, log))
     schedule.add(RecordingNode("slow", 0.008, simulation, log))
-    schedule.run_until(lambda: False, 10 * MS)
+    schedule.run_until(lambda: False, 0.01)
     assert log == [
         "fast start 0",
         "slow start 0",
@@ -103,18 +103,18 @@ def test_a_node_that_overruns_skips_the_periods_it_missed(
 ) -> None:
     schedule = Schedule(simulation)
     schedule.add(SlowNode("late", 0.004, simulation, log))
-    schedule.run_until(lambda: False, 30 * MS)
+    schedule.run_until(lambda: False, 0.03)
     assert log == ["late start 0", "late step 0", "late step 10", "late step 20"]
 
 
 def test_running_ends_as_soon_as_the_predicate_holds(simulation: FakeSimulation) -> None:
     schedule = Schedule(simulation)
-    assert schedule.run_until(lambda: simulation.now_ns >= 6 * MS, 100 * MS)
+    assert schedule.run_until(lambda: simulation.now_ns >= 6 * MS, 0.1)
     assert simulation.now_ns == 6 * MS
 
 
 def test_a_predicate_that_never_holds_ends_at_the_deadline(simulation: FakeSimulation) -> None:
-    assert not Schedule(simulation).run_until(lambda: False, 6 * MS)
+    assert not Schedule(simulation).run_until(lambda: False, 0.006)
     assert simulation.now_ns == 6 * MS
 
 
@@ -123,7 +123,7 @@ def test_a_removed_node_is_stopped(simulation: FakeSimulation, log: list[str]) -
     node = RecordingNode("node", 0.002, simulation, log)
     schedule.add(node)
     schedule.remove(node)
-    schedule.run_until(lambda: False, 10 * MS)
+    schedule.run_until(lambda: False, 0.01)
     assert log == ["node start 0", "node stop 0"]
 
 
@@ -132,7 +132,7 @@ def test_a_killed_node_is_never_called_again(simulation: FakeSimulation, log: li
     node = RecordingNode("node", 0.002, simulation, log)
     schedule.add(node)
     schedule.kill(node)
-    schedule.run_until(lambda: False, 10 * MS)
+    schedule.run_until(lambda: False, 0.01)
     assert log == ["node start 0"]
 
 

@@ -42,7 +42,6 @@ class Rig(LockstepControl):
         self.folder = FlightFolder(tmp_path / "flights")
         self.events = self.space.ring_reader("flight_event", from_start=True)
         self.requests = self.space.ring_writer("flight_request")
-        self.base_command = self.space.cell_writer("base_command")
         self.process_table = self.space.cell_writer("process_table")
         self._sees = False
         self.arm()
@@ -75,9 +74,7 @@ class Rig(LockstepControl):
         if not self._sees:
             self._sees = True
             self.add_senses()
-        for _ in range(round(seconds / 0.02)):
-            self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
-            self.run(0.02)
+        self.drive_for(seconds, 0.2, 0.1)
 
     def flights(self) -> list[RecordedFile]:
         return [read_flight(path) for path in self.folder.files()]

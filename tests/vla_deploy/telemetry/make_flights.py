@@ -22,16 +22,12 @@ _WALL_NS = 1_800_000_000_000_000_000
 
 def drive(stack: LockstepControl, seconds: float, w_rad_s: float = 0.2) -> None:
     """Drive a curve, or with no turning straight ahead."""
-    command = stack.space.cell_writer("base_command")
-    for _ in range(round(seconds / 0.02)):
-        command.put(v_m_s=0.3, w_rad_s=w_rad_s)
-        stack.lockstep.run_for(0.02)
+    stack.drive_for(seconds, 0.3, w_rad_s)
 
 
 def reach(stack: LockstepControl, seconds: float, **targets: float) -> None:
     """Move joints."""
-    goal = {"kind": "goal", "motion_id": 1, "targets": targets, "speed_ratio": 1.0}
-    stack.space.ring_writer("motion_command").publish(goal)
+    stack.go(targets)
     stack.lockstep.run_for(seconds)
 
 
