@@ -235,7 +235,7 @@ class Manifest:
     role: str
     summary: str
     licence: str
-    card: str
+    card: str = ""
     inputs: tuple[Tensor, ...] = ()
     outputs: tuple[Tensor, ...] = ()
     files: Mapping[Variant, ModelFile] = field(default_factory=dict)

@@ -54,7 +54,7 @@ class StructuredAsker(Generic[Shape]):
 
         Raises:
             PrivacyRefused: that may not leave the robot.
-            RequestRefused: the server will not answer this.
+            ServerRefused: the server will not answer this.
             Unavailable: there is no answer now.
             AnswerUnusable: also after the repair, it has the wrong shape.
         """

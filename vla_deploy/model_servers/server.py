@@ -77,7 +77,7 @@ class ModelServer:
 
         Raises:
             PrivacyRefused: that may not leave the robot, or the server is not where it should be.
-            RequestRefused: the server will not answer this.
+            ServerRefused: the server will not answer this.
             Unavailable: there is no answer now.
             AnswerUnusable: there is one that is none.
         """
@@ -102,7 +102,7 @@ class ModelServer:
         """Ask what the server tells of its models; no text or image of the robot is in it.
 
         Raises:
-            RequestRefused: the server does not tell.
+            ServerRefused: the server does not tell.
             Unavailable: there is no answer now.
             AnswerUnusable: there is one that is none.
         """

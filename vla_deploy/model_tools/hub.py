@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, PackageMissing
-from vla_deploy.inference.file_check import sha256_of
+from vla_deploy.inference.store import sha256_of
 from vla_deploy.runtime.one_line import one_line
 
 TIMEOUT_S: Final = 20.0
@@ -45,7 +45,7 @@ class HubCommit:
 
         Raises:
             FetchFailed: it cannot be reached, or does not have the repository.
-            ToolMissing: its client is not installed.
+            PackageMissing: its client is not installed.
         """
         self._place = place
         self._hub = _client()

@@ -9,9 +9,8 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelUnknown
-from vla_deploy.inference.language_schema import GENAI_CONFIG
+from vla_deploy.inference.manifest_schema import GENAI_CONFIG, WHISPER_PARTS
 from vla_deploy.inference.store import ModelStore
-from vla_deploy.inference.whisper_schema import NEEDED_PARTS
 from vla_deploy.model_tools.hub import HubCommit, HubPlace
 from vla_deploy.model_tools.language_models import is_part
 from vla_deploy.model_tools.whispers import PARTS
@@ -37,7 +36,7 @@ class ModelFormat:
 WHISPER: Final = ModelFormat(
     name="CTranslate2",
     option="--whisper",
-    landmark=NEEDED_PARTS[0],
+    landmark=WHISPER_PARTS[0],
     is_part=PARTS.__contains__,
 )
 LANGUAGE: Final = ModelFormat(
@@ -173,7 +172,7 @@ def fetch(
     Raises:
         FetchFailed: the hub cannot be reached, or has no such model there, or the disk is full.
         ModelFileSpoiled: a file is not what the hub says it is.
-        ToolMissing: the hub's client is not installed.
+        PackageMissing: the hub's client is not installed.
     """
     form = published.format
     commit = HubCommit(

@@ -6,14 +6,13 @@ from functools import partial
 
 from platforms import ModelChoice, Profile
 from vla_deploy.inference.errors import InferenceError
-from vla_deploy.inference.file_check import check_parts, checked_file
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools import language_models, whispers
-from vla_deploy.model_tools.detectors.trial import only, try_out
+from vla_deploy.model_tools.detectors.trial import try_out
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.speech.errors import SpeechError
 
@@ -58,18 +57,18 @@ def _finding(model: str, check: str, act: Callable[[], str]) -> ModelFinding:
 
 
 def _all_parts(model: StoredModel) -> str:
-    check_parts(model)
+    model.check_parts()
     return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
 
 
 def _whole(model: StoredModel, variant: Variant) -> str:
-    return f"{checked_file(model, variant).name}, SHA-256 as in the manifest"
+    return f"{model.checked_file(variant).name}, SHA-256 as in the manifest"
 
 
 def _trial(shelf: ModelShelf, model: StoredModel, variant: Variant) -> str:
     """Run one file on the CPU, whatever it is made for."""
     session = open_session(
-        only(model, variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
+        model.only(variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
     )
     return _tried(session)
 

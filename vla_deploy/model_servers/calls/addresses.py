@@ -19,7 +19,7 @@ def resolve(host: str, port: int, timeout_s: float) -> tuple[str, ...]:
 
     Raises:
         TimedOut: the resolver does not answer in time; its thread is left behind.
-        Unreachable: there is no such host.
+        ServerUnreachable: there is no such host.
     """
     if _is_literal(host):
         return (host,)

@@ -42,7 +42,7 @@ class GuardedBackend(httpcore2.NetworkBackend):
 
         Raises:
             PrivacyRefused: one of the addresses is none that the server may have.
-            Unreachable: none of them answers.
+            ServerUnreachable: none of them answers.
             TimedOut: no time is left.
         """
         addresses = self._resolve(host, port, self._deadline.bound_s(timeout))

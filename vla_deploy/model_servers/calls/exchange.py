@@ -47,11 +47,11 @@ class Exchange:
 
         Raises:
             PrivacyRefused: the server is not where it was declared to be.
-            Unreachable: there is no connection, or it broke.
+            ServerUnreachable: there is no connection, or it broke.
             TimedOut: it takes too long.
             AnswerTooLarge: the reply is larger than allowed.
             AnswerMalformed: it is compressed.
-            RequestRefused: the server's certificates cannot be checked.
+            ServerRefused: the server's certificates cannot be checked.
         """
         import httpcore2  # 60 ms that most commands do without
 

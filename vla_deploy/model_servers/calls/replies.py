@@ -30,7 +30,7 @@ def document_of(reply: ServerReply, settings: ServerSettings, key: Secret | None
     """Return the JSON object that a server answers with.
 
     Raises:
-        RequestRefused: it will not answer this request, or points elsewhere.
+        ServerRefused: it will not answer this request, or points elsewhere.
         ServerFailed: it cannot answer now.
         AnswerMalformed: what it sends is no JSON object.
     """

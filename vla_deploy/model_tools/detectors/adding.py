@@ -6,7 +6,6 @@ from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.inference.errors import ImagesInvalid, ModelMismatch
-from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     DetectionOutputs,
     Fit,
@@ -17,9 +16,9 @@ from vla_deploy.inference.manifest import (
     TensorLayout,
     Variant,
 )
-from vla_deploy.inference.opening import PLAIN_CHOICE, Graph, read_graph
+from vla_deploy.inference.opening import PLAIN_CHOICE, GraphSession, open_graph
 from vla_deploy.inference.session import open_session
-from vla_deploy.inference.store import ModelStore, StoredModel
+from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
 from vla_deploy.model_tools.detectors.trial import DetectorTrial, try_out
 from vla_deploy.model_tools.keeping import CARD, keep_tried, require_free
 from vla_deploy.perception.detectors.adapters import ADAPTERS
@@ -69,7 +68,7 @@ def add_model(
         OSError: the model cannot be stored.
     """
     require_free(store, source.name, replace=replace)
-    manifest = describe(source, read_graph(source.onnx))
+    manifest = describe(source, open_graph(source.onnx))
     return keep_tried(
         store,
         manifest,
@@ -92,7 +91,7 @@ def try_model(model: StoredModel, *, engines: Path, clock: Clock) -> DetectorTri
         detector.close()
 
 
-def describe(source: DetectorSource, graph: Graph) -> Manifest:
+def describe(source: DetectorSource, graph: GraphSession) -> Manifest:
     """Return the manifest for a source and the graph that it is about.
 
     Raises:
@@ -122,7 +121,7 @@ def describe(source: DetectorSource, graph: Graph) -> Manifest:
 
 
 def _with_adapter(
-    source: DetectorSource, graph: Graph, detection: DetectionOutputs
+    source: DetectorSource, graph: GraphSession, detection: DetectionOutputs
 ) -> DetectionOutputs:
     """Return the detection with an adapter: the one that was named, or the only one that fits."""
     fitting = [
@@ -144,7 +143,7 @@ def _with_adapter(
     raise ModelMismatch(str(source.onnx), faults)
 
 
-def _image_input(source: DetectorSource, graph: Graph) -> tuple[Tensor, ImageInput]:
+def _image_input(source: DetectorSource, graph: GraphSession) -> tuple[Tensor, ImageInput]:
     """Return the input as declared, its free dimensions settled, and how an image becomes it."""
     if len(graph.inputs) != 1 or len(graph.inputs[0].shape) != 4:
         shapes = [list(tensor.shape) for tensor in graph.inputs]
@@ -177,7 +176,7 @@ def _scale(tensor: Tensor) -> float:
     return _SHARE if tensor.dtype.startswith("float") else 1.0
 
 
-def _classes(source: DetectorSource, graph: Graph) -> tuple[str, ...]:
+def _classes(source: DetectorSource, graph: GraphSession) -> tuple[str, ...]:
     """Return the classes by the file that was given, else those that the export names."""
     if source.classes is None:
         if graph.classes:

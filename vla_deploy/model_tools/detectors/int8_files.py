@@ -36,7 +36,7 @@ def write_int8(
     """Write the int8 files; `inputs` begins the calibration inputs, for each file anew.
 
     Raises:
-        ToolMissing: the packages to do so are not installed.
+        PackageMissing: the packages to do so are not installed.
         ModelFileSpoiled: the graph cannot be quantised.
     """
     onnx, tools = _tools()
@@ -107,7 +107,7 @@ def _tools() -> tuple[Any, Any]:
     """Import what only this needs.
 
     Raises:
-        ToolMissing: it is not installed.
+        PackageMissing: it is not installed.
     """
     try:
         return import_module("onnx"), import_module("onnxruntime.quantization")

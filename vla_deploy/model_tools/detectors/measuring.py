@@ -18,7 +18,6 @@ from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools.detectors.accuracy import Accuracy, AccuracyCount
 from vla_deploy.model_tools.detectors.labelled import LabelledImage
-from vla_deploy.model_tools.detectors.trial import only
 from vla_deploy.perception.detectors.detector import Detector
 
 # Precision over recall needs the boxes that a robot would not act on, too.
@@ -80,7 +79,7 @@ def measure(
     detection = model.manifest.detection
     assert detection is not None, "only detectors are measured"
     keen = dataclasses.replace(detection, weak_score_threshold=_MEASURING_SCORE)
-    manifest = dataclasses.replace(only(model, variant).manifest, detection=keen)
+    manifest = dataclasses.replace(model.only(variant).manifest, detection=keen)
     keen_model = dataclasses.replace(model, manifest=manifest)
     detector = Detector(open_session(keen_model, PLAIN_CHOICE, engines=engines, clock=clock))
     count = AccuracyCount(detection.classes, detection.score_threshold)

@@ -15,7 +15,6 @@ from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.detectors.trial import only
 
 
 def memory_mb(session: ModelSession, choice: ModelChoice, shelf: ModelShelf) -> float:
@@ -47,9 +46,9 @@ def main() -> None:
     values: dict[str, Any] = told["choice"]
     lists = {key: tuple(values[key]) for key in ("tiers", "providers")}
     choice = ModelChoice(**{**values, **lists})
-    model = StoredModel(manifest=read_manifest(folder), folder=folder, is_embedded=False)
+    model = StoredModel(manifest=read_manifest(folder), folder=folder)
     session = open_session(
-        only(model, Variant(told["variant"])),
+        model.only(Variant(told["variant"])),
         choice,
         engines=Path(told["engines"]),
         clock=MonotonicClock(),

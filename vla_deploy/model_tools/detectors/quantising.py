@@ -13,10 +13,9 @@ from vla_deploy.inference.errors import (
     ImagesInvalid,
     ModelMismatch,
 )
-from vla_deploy.inference.file_check import checked_file, sha256_of
 from vla_deploy.inference.manifest import DetectionOutputs, Manifest, ModelFile, Variant
 from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.store import ModelStore, StoredModel
+from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
 from vla_deploy.model_tools.detectors.accuracy import Accuracy
 from vla_deploy.model_tools.detectors.images import read_image
 from vla_deploy.model_tools.detectors.int8_files import TYPES, Feed, write_int8
@@ -55,7 +54,7 @@ def quantise(
 
     Raises:
         AccuracyLost: mAP50 drops by more than `max_drop_points` percent; nothing was installed.
-        ToolMissing: the packages to quantise with are not installed.
+        PackageMissing: the packages to quantise with are not installed.
         ModelUnknown: the name cannot be used.
         ModelMismatch: it is no detector, or has no fp32 file.
         ModelFileSpoiled: its fp32 file is not what was checked in, or cannot be quantised.
@@ -66,7 +65,7 @@ def quantise(
         raise ModelMismatch(model.manifest.name, ("expected a detector with an fp32 file",))
     if not calibration or not labelled:
         raise ImagesInvalid("expected images to calibrate and labelled ones to measure with")
-    source = checked_file(model, Variant.FP32)
+    source = model.checked_file(Variant.FP32)
     draft = store.draft(name)
     try:
         _copy_original(model, source, draft, name)
@@ -115,7 +114,7 @@ def _describe(
         for variant, path in every.items()
     }
     manifest = dataclasses.replace(model.manifest, name=name, files=files)
-    return StoredModel(manifest=manifest, folder=draft, is_embedded=False)
+    return StoredModel(manifest=manifest, folder=draft)
 
 
 def _judge(accuracy: Mapping[Variant, Accuracy], max_drop_points: float) -> float:

@@ -1,6 +1,5 @@
 """Try a detector out on images that say nothing: it must answer, and find nothing for sure."""
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -8,8 +7,6 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.inference.errors import RunFailed
-from vla_deploy.inference.manifest import Variant
-from vla_deploy.inference.store import StoredModel
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import Image
 
@@ -55,10 +52,3 @@ def try_out(detector: Detector) -> DetectorTrial:
         except RunFailed as error:
             raise RunFailed(f"{error} (on an image that is {name})") from error
     return DetectorTrial(boxes=boxes)
-
-
-def only(model: StoredModel, variant: Variant) -> StoredModel:
-    """Return a model that has no file but one, so that every precision gives that."""
-    files = {variant: model.manifest.files[variant]}
-    manifest = dataclasses.replace(model.manifest, files=files)
-    return dataclasses.replace(model, manifest=manifest)
