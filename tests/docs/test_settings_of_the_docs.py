@@ -10,7 +10,7 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.inference.manifest_schema import manifest_faults
-from vla_deploy.model_servers.servers_file import read_servers
+from vla_deploy.model_servers.settings import read_servers
 from vla_deploy.robots import load_robot, schema
 from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE
 from vla_deploy.robots.loader import NAMED, ROBOTS_DIR, SINGLE

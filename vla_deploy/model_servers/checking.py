@@ -56,7 +56,7 @@ class ServerCheck:
 
 
 def check_server(server: ModelServer, ask: bool) -> ServerCheck:
-    """Look at a server; with `ask`, let its model answer a question, about a picture if it may."""
+    """Check a server; with `ask`, ask its model a question too, about a picture if it sees."""
     began_ns = server.clock.now_ns()
     try:
         facts = server.models()
@@ -91,7 +91,7 @@ def _asked(server: ModelServer, found: ServerCheck) -> ServerCheck:
         answers=True,
         sees=colour == "red" if images else None,
         answer_s=_since_s(server, began_ns),
-        asked_by=asker.rung,
+        asked_by=asker.schema_mode,
         detail="" if colour == "red" else f'it says "{colour}" where red is right',
     )
 

@@ -11,7 +11,7 @@ from vla_deploy.model_servers.errors import TimedOut
 class Deadline:
     """Hold when a call must have ended, and how long it was given.
 
-    It has ended at once when its owner sets `recall`: nobody waits for the answer any more.
+    Setting `recall` ends it at once: the answer is not wanted any more.
     """
 
     clock: Clock
@@ -38,13 +38,13 @@ class Deadline:
         )
 
     def call_in(self) -> None:
-        """Let nobody wait for the answer any more, where that can still be said."""
+        """Set `recall`, where there is one: the answer is not wanted any more."""
         if self.recall is not None:
             self.recall.set()
 
     @property
     def is_recalled(self) -> bool:
-        """Return whether nobody waits for the answer any more."""
+        """Return whether the answer is not wanted any more."""
         return self.recall is not None and self.recall.is_set()
 
     @property
@@ -58,7 +58,7 @@ class Deadline:
         """Return the time that one wait may take: what is wanted, at most what is left.
 
         Raises:
-            TimedOut: nothing is left, or nobody waits any more.
+            TimedOut: nothing is left, or it was recalled.
         """
         left_s = self.left_s
         if self.is_recalled:

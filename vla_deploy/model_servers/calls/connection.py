@@ -1,4 +1,4 @@
-"""Connect to addresses that were checked, and let no single wait outlast the call's deadline.
+"""Connect to addresses that were checked, and bound each wait by the call's deadline.
 
 The one module that imports the HTTP client, which takes a moment; import it late.
 """
@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import httpcore2
 
-from vla_deploy.model_servers.calls.addresses import Resolve, check_address
+from vla_deploy.model_servers.calls.privacy import Resolve, check_address
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import ServerUnreachable, TimedOut
 from vla_deploy.model_servers.settings import ServerSettings
