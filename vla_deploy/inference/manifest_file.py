@@ -1,4 +1,4 @@
-"""Read and write `model.toml`, the manifest that lies beside a model's files."""
+"""Read and write `model.toml`, the manifest in the folder of a model's files."""
 
 import json
 import math

@@ -30,7 +30,7 @@ class SessionStats:
 
     `memory_mb` is by how much the process grew while the session was opened and warmed up; other
     threads of the process may have a share in it. `busy_s` is the time of all runs. `notices`
-    tell where it is not as was asked.
+    say where it is not as was asked.
     """
 
     model: str

@@ -1,7 +1,7 @@
 """Fetch files of a published model from the Hugging Face hub: only ever when a person asks for it.
 
-The hub tells the commit, and the hash of each file in it; every file is fetched at that commit, and
-what does not have its hash is refused. Nothing about this robot is sent but the request.
+The hub states the commit, and the hash of each file in it; every file is fetched at that commit,
+and one that does not have its hash is refused. Nothing about this robot is sent but the request.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ class HubPlace:
 
 
 class HubCommit:
-    """Hold what the hub tells of one commit of a repository, and fetch files of it."""
+    """Hold what the hub says of one commit of a repository, and fetch files of it."""
 
     def __init__(self, place: HubPlace) -> None:
         """Ask the hub.
@@ -69,8 +69,8 @@ class HubCommit:
         card = self._info.card_data
         return str(card.get("license") or "") if card is not None else ""
 
-    def fetch(self, paths: Sequence[str], folder: Path, tell: Callable[[str], None]) -> None:
-        """Fetch files into a folder, at their paths, and check them; `tell` gets a line for each.
+    def fetch(self, paths: Sequence[str], folder: Path, report: Callable[[str], None]) -> None:
+        """Fetch files into a folder, at their paths, and check them; `report` gets a line for each.
 
         Raises:
             FetchFailed: one does not come, or the disk has no room for them.
@@ -79,7 +79,7 @@ class HubCommit:
         self._check_room(sum(self._files[path].size or 0 for path in paths), folder)
         for path in paths:
             file = self._files[path]
-            tell(f"fetching {path}, {(file.size or 0) / _BYTES_PER_GB:.3f} GB")
+            report(f"fetching {path}, {(file.size or 0) / _BYTES_PER_GB:.3f} GB")
             with self._translated():
                 self._hub.hf_hub_download(
                     self._place.repository,

@@ -95,8 +95,8 @@ def keep_tried(
             shutil.copyfile(card, draft / CARD)
         write_manifest(draft, manifest)
         read_manifest(draft)
-        told = try_out(StoredModel(manifest=manifest, folder=draft))
+        trial = try_out(StoredModel(manifest=manifest, folder=draft))
         folder = store.install(draft)
     finally:
         store.abandon(draft)
-    return StoredModel(manifest=manifest, folder=folder), told
+    return StoredModel(manifest=manifest, folder=folder), trial

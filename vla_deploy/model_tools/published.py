@@ -162,10 +162,10 @@ def fetched(
 def fetch(
     published: PublishedModel,
     folder: Path,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     endpoint: str | None = None,
 ) -> tuple[Path, str]:
-    """Fetch a model's files into an empty folder, and check them; `tell` gets a line for each.
+    """Fetch a model's files into an empty folder, and check them; `report` gets a line for each.
 
     Returns the folder that they lie in, and the licence as the table or the hub states it.
 
@@ -192,5 +192,5 @@ def fetch(
             f"{published}: no {form.landmark} lies there; expected the layout of {form.name}, "
             f"which is in: {models or 'no folder of it'}"
         )
-    commit.fetch(wanted, folder, tell)
+    commit.fetch(wanted, folder, report)
     return folder / published.folder, published.licence or commit.licence or "not stated"

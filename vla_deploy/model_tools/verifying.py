@@ -12,8 +12,7 @@ from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools import language_models, whispers
-from vla_deploy.model_tools.detectors.trial import try_out
-from vla_deploy.perception.detectors.detector import Detector
+from vla_deploy.model_tools.detectors.adding import try_out
 from vla_deploy.speech.errors import SpeechError
 
 
@@ -78,8 +77,8 @@ def _as_profile(shelf: ModelShelf, model: StoredModel, profile: Profile) -> str:
     if model.manifest.parts:
         return _parts_tried(shelf, model, choice)
     session = open_session(model, choice, engines=shelf.engines, clock=shelf.clock)
-    told = "; ".join((f"{session.variant} on {session.provider}", *session.notices))
-    return f"{told}; {_tried(session)}"
+    opened = f"{session.variant} on {session.provider}"
+    return "; ".join((opened, *session.notices, _tried(session)))
 
 
 def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | None) -> str:
@@ -94,9 +93,7 @@ def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | No
 
 
 def _tried(session: ModelSession) -> str:
-    try:
-        if session.model.manifest.detection is None:
-            return f"warm in {session.load_s:.2g} s"
-        return str(try_out(Detector(session)))
-    finally:
-        session.close()
+    if session.model.manifest.detection is not None:
+        return str(try_out(session))
+    session.close()
+    return f"warm in {session.load_s:.2g} s"

@@ -38,7 +38,7 @@ class AnswerBounds:
         """Accept an answer that has so many tokens and is not whole yet.
 
         Raises:
-            AnswerFailed: the deadline passed, nobody waits, or it may not be longer.
+            AnswerFailed: the deadline passed, it was recalled, or it may not be longer.
         """
         if self.deadline.is_recalled:
             why = "nobody waits for it any more"

@@ -8,8 +8,7 @@ from vla_deploy.inference.errors import RunFailed
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.detectors.benching import bench
-from vla_deploy.model_tools.detectors.memory import memory_mb
+from vla_deploy.model_tools.detectors.benching import bench, memory_mb
 
 NOISE = [np.random.default_rng(1).integers(0, 256, (64, 96, 3), dtype=np.uint8)]
 
