@@ -9,7 +9,6 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -24,35 +23,28 @@ _BYTES_PER_GB: Final = 1e9
 _COPIES: Final = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HubPlace:
-    """Name a repository of the hub, a branch, tag or commit of it, and who serves it.
-
-    `by_hand` is the command that adds the files without the hub.
-    """
-
-    repository: str
-    by_hand: str
-    revision: str = "main"
-    endpoint: str | None = None
-
-
 class HubCommit:
     """Hold what the hub says of one commit of a repository, and fetch files of it."""
 
-    def __init__(self, place: HubPlace) -> None:
-        """Ask the hub.
+    def __init__(
+        self, repository: str, *, revision: str, endpoint: str | None, by_hand: str
+    ) -> None:
+        """Ask the hub, or the server at `endpoint`, for a branch, tag or commit of a repository.
+
+        `by_hand` is the command that adds the files without the hub.
 
         Raises:
             FetchFailed: it cannot be reached, or does not have the repository.
             PackageMissing: its client is not installed.
         """
-        self._place = place
+        self._repository = repository
+        self._endpoint = endpoint
+        self._by_hand = by_hand
         self._hub = _client()
         with self._translated():
-            self._info = self._hub.HfApi(endpoint=place.endpoint, token=False).model_info(
-                place.repository,
-                revision=place.revision,
+            self._info = self._hub.HfApi(endpoint=endpoint, token=False).model_info(
+                repository,
+                revision=revision,
                 files_metadata=True,
                 timeout=TIMEOUT_S,
             )
@@ -82,11 +74,11 @@ class HubCommit:
             report(f"fetching {path}, {(file.size or 0) / _BYTES_PER_GB:.3f} GB")
             with self._translated():
                 self._hub.hf_hub_download(
-                    self._place.repository,
+                    self._repository,
                     path,
                     revision=self._info.sha,
                     local_dir=folder,
-                    endpoint=self._place.endpoint,
+                    endpoint=self._endpoint,
                     token=False,
                 )
             _check(folder / path, file)
@@ -95,7 +87,7 @@ class HubCommit:
         needed_bytes, free_bytes = _COPIES * size_bytes, shutil.disk_usage(folder).free
         if needed_bytes > free_bytes:
             raise FetchFailed(
-                f"{self._place.repository}: its files need {needed_bytes / _BYTES_PER_GB:.1f} GB "
+                f"{self._repository}: its files need {needed_bytes / _BYTES_PER_GB:.1f} GB "
                 f"of {folder} while they are tried out, {free_bytes / _BYTES_PER_GB:.1f} GB are "
                 "free; make room, or choose a smaller model"
             )
@@ -106,9 +98,9 @@ class HubCommit:
             yield
         except (self._hub.errors.HTTPError, OSError, ValueError) as error:
             raise FetchFailed(
-                f"{self._place.repository}: the hub was not reached or does not have it: "
+                f"{self._repository}: the hub was not reached or does not have it: "
                 f"{one_line(error)[:300]}; this computer needs a way to huggingface.co for this "
-                f"once; or copy the files here by hand, then: {self._place.by_hand}"
+                f"once; or copy the files here by hand, then: {self._by_hand}"
             ) from error
 
 
