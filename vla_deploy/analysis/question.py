@@ -33,7 +33,7 @@ class FloorPlanBystander:
 class SceneQuestion:
     """Hold the world as it is known, an image (rows, columns, RGB) or none, and a goal or none.
 
-    `holding` tells which kind of thing each hand holds.
+    `holding` is the kind of thing that each hand holds.
     """
 
     world: Snapshot
@@ -123,8 +123,8 @@ def _pose(topics: RobotTopics) -> Viewpoint | None:
     return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
-def _bystander(told: Mapping[str, Any]) -> FloorPlanBystander:
-    x_m, y_m = (float(value) for value in told["position_m"][:2])
+def _bystander(entry: Mapping[str, Any]) -> FloorPlanBystander:
+    x_m, y_m = (float(value) for value in entry["position_m"][:2])
     return FloorPlanBystander(
-        kind=str(told["class"]), x_m=x_m, y_m=y_m, width_m=float(told["width_m"])
+        kind=str(entry["class"]), x_m=x_m, y_m=y_m, width_m=float(entry["width_m"])
     )
