@@ -12,8 +12,7 @@ from platforms import load_profile
 from vla_deploy.inference.manifest_schema import manifest_faults
 from vla_deploy.model_servers.settings import read_servers
 from vla_deploy.robots import load_robot, schema
-from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE
-from vla_deploy.robots.loader import NAMED, ROBOTS_DIR, SINGLE
+from vla_deploy.robots.loader import NAMED, OVERRIDES_FILE, ROBOTS_DIR, SINGLE
 from vla_deploy.robots.ros_settings import ROS
 from vla_deploy.runtime.net import faults_of
 from vla_deploy.telemetry.recording.settings import TelemetrySettings

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,15 +11,10 @@ from platforms.profile_source import merged
 from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
-from vla_deploy.robots.calibration.overrides import read_overrides, traced
+from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
-    Audio,
     BaseGeometry,
-    CameraDescription,
-    CanBus,
-    Drive,
-    EstopButtonDescription,
     FloorPose,
     Hand,
     Home,
@@ -26,12 +22,18 @@ from vla_deploy.robots.description import (
     KeepOutZone,
     Place,
     RobotDescription,
+    StopCategory,
+    StopGroup,
+)
+from vla_deploy.robots.devices import (
+    Audio,
+    CanBus,
+    Drive,
+    EstopButtonDescription,
     SerialSensor,
     Servo,
     ServoBus,
     ServoModel,
-    StopCategory,
-    StopGroup,
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
@@ -42,6 +44,8 @@ from vla_deploy.robots.schema import RobotFileFault, Shape, check_record
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
+OVERRIDES_FILE = "overrides.toml"
+"""What differs on this one robot, in the folder of its robot file."""
 Document = Mapping[str, Any]
 
 SINGLE: Mapping[str, Shape] = {
@@ -91,7 +95,7 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     own = _parse(file)
     overrides, override_faults = read_overrides(file.parent)
     document, calibration_faults = calibrated(merged(own, overrides), file.parent)
-    found = (traced(fault, overrides, own) for fault in _faults(document, file.parent))
+    found = (_traced(fault, overrides, own) for fault in _faults(document, file.parent))
     faults = (*override_faults, *calibration_faults, *found)
     if faults:
         raise RobotFileError(file, faults)
@@ -129,6 +133,38 @@ def _parse(file: Path) -> Document:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
+
+
+def read_overrides(directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
+    """Return the overrides of a robot's folder, empty where it has none, and the file's faults."""
+    try:
+        text = (directory / OVERRIDES_FILE).read_text(encoding="utf-8")
+        return tomllib.loads(text), ()
+    except FileNotFoundError:
+        return {}, ()
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return {}, (
+            RobotFileFault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),
+        )
+
+
+def _traced(fault: RobotFileFault, overrides: Document, own: Document) -> RobotFileFault:
+    """Return the fault of a merged document, with the name of the overrides where they made it.
+
+    A value that lacks in a table is theirs where the robot file itself has no such table.
+    """
+    above: Any = overrides
+    below: Any = own
+    for part in fault.key.partition("[")[0].split("."):
+        if not isinstance(above, dict):
+            break  # a value of theirs, in which something is wrong
+        if part not in above:
+            if above is not overrides and not isinstance(below, dict):
+                break
+            return fault
+        above = above[part]
+        below = below.get(part) if isinstance(below, dict) else None
+    return replace(fault, key=f"{OVERRIDES_FILE}: {fault.key}")
 
 
 def _faults(document: Document, directory: Path) -> Iterator[RobotFileFault]:

@@ -5,13 +5,14 @@ It names the servo too: when another one is mounted, the old measurement is refu
 """
 
 import json
+import os
+import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.robots.calibration.replacing import replace_text
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.schema import SERVO, TABLE, TEXT, RobotFileFault, Shape, check_record
@@ -62,6 +63,28 @@ def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) 
         RobotFileError: it cannot be written; the old file stays.
     """
     replace_text(file, _as_toml(calibrations))
+
+
+def replace_text(file: Path, text: str) -> None:
+    """Write a file under another name, then put it in place; `<file>.bak` is the one before.
+
+    Raises:
+        RobotFileError: it cannot be written; the old file stays.
+    """
+    fresh = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        with fresh.open("w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if file.exists():
+            shutil.copy2(file, file.with_name(file.name + ".bak"))
+        fresh.replace(file)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        expected = "a file that can be written; choose one with --output"
+        fault = RobotFileFault(key="(file)", got=error.strerror or str(error), expected=expected)
+        raise RobotFileError(file, (fault,)) from error
 
 
 def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:

@@ -18,9 +18,9 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.robots.calibration.calibration import replace_text
 from vla_deploy.robots.calibration.lens_schema import lens_faults
-from vla_deploy.robots.calibration.replacing import replace_text
-from vla_deploy.robots.description import CameraDescription, CameraMounting, LensCalibration
+from vla_deploy.robots.camera import CameraDescription, CameraMounting, LensCalibration
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.schema import (
     NUMBER,

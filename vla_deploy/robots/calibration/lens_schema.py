@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.robots.description import CameraDescription
+from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.schema import RobotFileFault, is_number
 
 Document = Mapping[str, Any]
