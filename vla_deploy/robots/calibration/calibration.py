@@ -1,4 +1,4 @@
-"""Keep what calibration has measured in a file beside the robot file, and lay it over that file.
+"""Keep what calibration has measured in a file next to the robot file, and lay it over that file.
 
 `calibration.toml` has a table per calibrated joint; sign and offset replace those of `robot.toml`.
 It names the servo too: when another one is mounted, the old measurement is refused.
@@ -93,12 +93,12 @@ def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[Rob
     try:
         calibrations = read_calibration(file)
     except RobotFileError as error:
-        return document, tuple(_told(fault) for fault in error.faults)
+        return document, tuple(_with_file_name(fault) for fault in error.faults)
     if not calibrations:
         return document, ()
     bus = table(document, "servo_bus")
     servos = rows(bus, "servos")
-    faults = tuple(_told(fault) for fault in _mismatches(servos, calibrations))
+    faults = tuple(_with_file_name(fault) for fault in _mismatches(servos, calibrations))
     laid_over = [_laid_over(row, calibrations) for row in servos]
     return {**document, "servo_bus": {**bus, "servos": laid_over}}, faults
 
@@ -125,7 +125,7 @@ def _mismatches(
             )
 
 
-def _told(fault: RobotFileFault) -> RobotFileFault:
+def _with_file_name(fault: RobotFileFault) -> RobotFileFault:
     return RobotFileFault(
         key=f"{CALIBRATION_FILE}: {fault.key}", got=fault.got, expected=fault.expected
     )

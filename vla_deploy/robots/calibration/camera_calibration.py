@@ -1,4 +1,4 @@
-"""Keep what calibration has measured of the camera in files beside the robot file.
+"""Keep what calibration has measured of the camera in files next to the robot file.
 
 `camera.yaml` holds the lens in the format of ROS' camera_info, so that existing files do; without
 it the camera's own intrinsics count. `camera_mounting.toml` holds by how much the camera sits
@@ -75,12 +75,12 @@ def with_calibration(
     try:
         camera = replace(camera, lens=read_lens(directory / LENS_FILE, camera))
     except RobotFileError as error:
-        faults += _told(LENS_FILE, error)
+        faults += _with_file_name(LENS_FILE, error)
     try:
         # Judged with the lens in force: through another one it was measured differently.
         camera = replace(camera, mounting=read_mounting(directory / MOUNTING_FILE, camera))
     except RobotFileError as error:
-        faults += _told(MOUNTING_FILE, error)
+        faults += _with_file_name(MOUNTING_FILE, error)
     return camera, tuple(faults)
 
 
@@ -180,8 +180,8 @@ def write_mounting(file: Path, mounting: CameraMounting) -> None:
 def _wrong(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:
     for key in ("site", "model"):
         if document[key] != (expected := getattr(camera, key)):
-            told = f"{expected!r}, as in the robot file: measure this camera's mounting again"
-            yield RobotFileFault(key=key, got=repr(document[key]), expected=told)
+            wanted = f"{expected!r}, as in the robot file: measure this camera's mounting again"
+            yield RobotFileFault(key=key, got=repr(document[key]), expected=wanted)
     length = float(np.linalg.norm(document["quaternion_xyzw"]))
     if abs(length - 1.0) > 1e-3:
         yield RobotFileFault(
@@ -191,24 +191,23 @@ def _wrong(document: Document, camera: CameraDescription) -> Iterator[RobotFileF
         )
     shift_m = float(np.linalg.norm(document["translation_m"]))
     if shift_m > MAX_SHIFT_M:
-        told = f"at most {MAX_SHIFT_M} m; correct the site in the MJCF if it sits there"
-        yield RobotFileFault(key="translation_m", got=f"{shift_m:.3f} m", expected=told)
+        wanted = f"at most {MAX_SHIFT_M} m; correct the site in the MJCF if it sits there"
+        yield RobotFileFault(key="translation_m", got=f"{shift_m:.3f} m", expected=wanted)
     turn_rad = 2.0 * math.acos(min(1.0, abs(document["quaternion_xyzw"][3])))
     if turn_rad > MAX_TURN_RAD:
-        told = f"at most {math.degrees(MAX_TURN_RAD):.0f} degrees; correct the site in the MJCF"
+        wanted = f"at most {math.degrees(MAX_TURN_RAD):.0f} degrees; correct the site in the MJCF"
         yield RobotFileFault(
-            key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=told
+            key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=wanted
         )
     focal_px = camera.intrinsics.fx
     if abs(document["focal_px"] / focal_px - 1.0) > SAME_FOCAL_RATIO:
-        told = f"{focal_px:.1f}, the lens in force: run `vla-deploy camera hand-eye` again"
-        yield RobotFileFault(key="focal_px", got=repr(document["focal_px"]), expected=told)
+        wanted = f"{focal_px:.1f}, the lens in force: run `vla-deploy camera hand-eye` again"
+        yield RobotFileFault(key="focal_px", got=repr(document["focal_px"]), expected=wanted)
 
 
 def _lens(document: Document) -> LensCalibration:
     matrix = [float(value) for value in document["camera_matrix"]["data"]]
-    told = document["distortion_coefficients"]["data"]
-    coefficients = tuple(float(value) for value in told)
+    coefficients = tuple(float(value) for value in document["distortion_coefficients"]["data"])
     return LensCalibration(
         intrinsics=Intrinsics(
             width=document["image_width"],
@@ -240,7 +239,7 @@ def _text(file: Path) -> str | None:
         raise _unreadable(file, str(error), "a text file that can be read") from error
 
 
-def _told(file: str, error: RobotFileError) -> list[RobotFileFault]:
+def _with_file_name(file: str, error: RobotFileError) -> list[RobotFileFault]:
     return [replace(fault, key=f"{file}: {fault.key}") for fault in error.faults]
 
 

@@ -38,17 +38,17 @@ def lens_faults(
 
 def _of_another_camera(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:
     """Only files of our own tool name the model; those of other tools say nothing of it."""
-    told = document.get("camera_model", camera.model)
-    if told != camera.model:
+    model = document.get("camera_model", camera.model)
+    if model != camera.model:
         expected = f"{camera.model!r}, as in the robot file: calibrate this camera"
-        yield RobotFileFault(key="camera_model", got=repr(told), expected=expected)
+        yield RobotFileFault(key="camera_model", got=repr(model), expected=expected)
 
 
 def _size_faults(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:
     for key, expected in (("image_width", camera.width), ("image_height", camera.height)):
         if (got := document.get(key)) != expected:
-            told = f"{expected}, the camera's in the robot file: calibrate at that resolution"
-            yield RobotFileFault(key=key, got=repr(got), expected=told)
+            wanted = f"{expected}, the camera's in the robot file: calibrate at that resolution"
+            yield RobotFileFault(key=key, got=repr(got), expected=wanted)
 
 
 def _matrix_faults(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:

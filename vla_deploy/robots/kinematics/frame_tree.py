@@ -213,18 +213,18 @@ def _joint_faults(document: MjcfDocument, leads: Collection[str]) -> Iterator[Ro
                 key="body", got=f"one without a name in {body.parent!r}", expected="a name"
             )
         for joint in body.element.findall("joint"):
-            told = document.attributes(joint, body.child_class)
-            name, kind = told.get("name", ""), told.get("type", "hinge")
+            attributes = document.attributes(joint, body.child_class)
+            name, kind = attributes.get("name", ""), attributes.get("type", "hinge")
             if name not in moving:
                 continue
             if kind not in MOVING:
                 yield RobotFileFault(
                     key=f"joint {name}", got=f"a {kind} joint", expected="a hinge or a slide"
                 )
-            if float(told.get("ref", "0")) != 0.0:
+            if float(attributes.get("ref", "0")) != 0.0:
                 expected = "no ref: the joint's zero is where the body is drawn"
                 yield RobotFileFault(
-                    key=f"joint {name}", got=f"ref {told['ref']}", expected=expected
+                    key=f"joint {name}", got=f"ref {attributes['ref']}", expected=expected
                 )
             if not body.parent:
                 expected = "a root body that nothing moves against the base"
