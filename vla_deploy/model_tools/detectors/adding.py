@@ -22,6 +22,7 @@ from vla_deploy.inference.manifest import (
 from vla_deploy.inference.opening import PLAIN_CHOICE, GraphSession, open_graph
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
+from vla_deploy.model_tools.detectors.labelled import read_names
 from vla_deploy.model_tools.keeping import CARD, keep_tried, require_free
 from vla_deploy.perception.detectors.adapters import ADAPTERS
 from vla_deploy.perception.detectors.detector import ROLE, Detector
@@ -221,11 +222,7 @@ def _classes(source: DetectorSource, graph: GraphSession) -> tuple[str, ...]:
         if graph.classes:
             return graph.classes
         raise ModelMismatch(str(source.onnx), ("it names no classes; give them by --classes FILE",))
-    try:
-        lines = source.classes.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ImagesInvalid(f"{source.classes}: expected a name in each line: {error}") from error
-    names = tuple(line.strip() for line in lines if line.strip())
+    names = read_names(source.classes)
     if not names or len(set(names)) != len(names):
         raise ImagesInvalid(
             f"{source.classes}: expected a name in each line, none twice; got {names}"

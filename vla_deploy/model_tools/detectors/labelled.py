@@ -147,10 +147,19 @@ def _yolo(folder: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
         )
 
 
+def read_names(file: Path) -> tuple[str, ...]:
+    """Return the classes that a file names, one in each line.
+
+    Raises:
+        ImagesInvalid: it cannot be read as text.
+    """
+    return tuple(line.strip() for line in _lines(file) if line.strip())
+
+
 def _check_names(file: Path, classes: tuple[str, ...]) -> None:
     if not file.is_file():
         return
-    names = tuple(line.strip() for line in _lines(file) if line.strip())
+    names = read_names(file)
     if names != classes:
         raise ImagesInvalid(
             f"{file}: expected the model's classes {list(classes)}, got {list(names)}"
