@@ -15,6 +15,7 @@ from vla_deploy.robots import load_robot, schema
 from vla_deploy.robots.loader import NAMED, OVERRIDES_FILE, ROBOTS_DIR, SINGLE
 from vla_deploy.robots.ros_settings import ROS
 from vla_deploy.runtime.net import faults_of
+from vla_deploy.runtime.table_schema import check_record
 from vla_deploy.telemetry.recording.settings import TelemetrySettings
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -74,7 +75,7 @@ def test_tables_of_robot_toml(page: str) -> None:
             records = [table] if key in SINGLE else table.values()
             for record in records:
                 shape = SINGLE.get(key) or NAMED[key]
-                assert schema.check_record(record, key, shape) == ()
+                assert check_record(record, key, shape) == ()
 
 
 def test_overrides_toml_and_every_key_of_ros(tmp_path: Path) -> None:

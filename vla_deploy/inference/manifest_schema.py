@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any, Final
 
@@ -14,19 +13,20 @@ from vla_deploy.inference.manifest import (
     TensorLayout,
     Variant,
 )
-from vla_deploy.robots.schema import (
+from vla_deploy.runtime.table_schema import (
     NUMBER,
-    OPTIONAL_TABLE,
-    OPTIONAL_TEXT,
     POSITIVE,
     TABLE,
     TABLES,
     TEXT,
-    RobotFileFault,
     Shape,
+    TableFault,
     ValueCheck,
     check_record,
+    integer,
     is_number,
+    number,
+    numbers,
     one_of,
 )
 
@@ -53,13 +53,6 @@ def is_name(value: object) -> bool:
     return isinstance(value, str) and _NAME.fullmatch(value) is not None
 
 
-def _integer(expected: str, least: int, most: float = float("inf")) -> ValueCheck:
-    def holds(value: object) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
-
-    return ValueCheck(expected=expected, holds=holds)
-
-
 def _is_shape(value: object) -> bool:
     return isinstance(value, list) and all(
         COUNT.holds(one) or (isinstance(one, str) and one != "") for one in value
@@ -72,10 +65,6 @@ def _is_file_name(value: object) -> bool:
         return False
     path = PurePosixPath(value)
     return not path.is_absolute() and ".." not in path.parts
-
-
-def _is_three(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
 
 
 def _are_names(value: object) -> bool:
@@ -95,26 +84,24 @@ def _are_words(value: object) -> bool:
     )
 
 
-COUNT: Final = _integer("an integer above 0", 1)
-TALLY: Final = _integer("an integer from 0", 0)
-RATIO: Final = ValueCheck(
-    expected="a number from 0 to 1", holds=lambda value: is_number(value) and 0 <= value <= 1
-)
+COUNT: Final = integer(1)
+TALLY: Final = integer(0)
+RATIO: Final = number(0, 1)
 
 _HEAD: Shape = {
     "name": ValueCheck(expected="small letters, digits, '_', '-' or '.'", holds=is_name),
     "role": one_of(*ROLES),
     "summary": TEXT,
     "licence": TEXT,
-    "card": OPTIONAL_TEXT,
+    "card": TEXT.optional,
 }
 _GRAPH: Shape = {
     **_HEAD,
     "inputs": TABLES,
     "outputs": TABLES,
     "files": TABLE,
-    "detection": OPTIONAL_TABLE,
-    "key_words": OPTIONAL_TABLE,
+    "detection": TABLE.optional,
+    "key_words": TABLE.optional,
 }
 _TENSOR: Shape = {
     "name": TEXT,
@@ -133,24 +120,24 @@ _FILE: Shape = {
 _SHAPES: Final[Mapping[str, Shape]] = {
     "inputs": _TENSOR,
     "outputs": _TENSOR,
-    "files": dict.fromkeys(Variant, OPTIONAL_TABLE),
+    "files": dict.fromkeys(Variant, TABLE.optional),
     **{f"files.{variant}": _FILE for variant in Variant},
     "parts": _FILE,
     "detection": {
         "adapter": TEXT,
         "classes": ValueCheck(expected="a list of names, none twice", holds=_are_names),
         "score_threshold": RATIO,
-        "weak_score_threshold": replace(RATIO, is_optional=True),
+        "weak_score_threshold": RATIO.optional,
         "iou_threshold": RATIO,
         "image": TABLE,
-        "measured": OPTIONAL_TABLE,
+        "measured": TABLE.optional,
     },
     "detection.measured": {
         "precision": RATIO,
         "recall": RATIO,
-        "boxes": replace(TALLY, is_optional=True),
-        "things": replace(TALLY, is_optional=True),
-        "classes": replace(TABLES, is_optional=True),
+        "boxes": TALLY.optional,
+        "things": TALLY.optional,
+        "classes": TABLES.optional,
     },
     "detection.measured.classes": {
         "name": TEXT,
@@ -165,12 +152,12 @@ _SHAPES: Final[Mapping[str, Shape]] = {
         "layout": one_of(*TensorLayout),
         "colour": one_of(*COLOURS),
         "fit": one_of(*Fit),
-        "fill": _integer("an integer in 0..255", 0, 255),
+        "fill": integer(0, 255),
         "scale": POSITIVE,
-        "mean": ValueCheck(expected="three numbers", holds=_is_three),
+        "mean": numbers(3),
         "std": ValueCheck(
             expected="three numbers above 0",
-            holds=lambda value: _is_three(value) and min(value) > 0,
+            holds=lambda value: numbers(3).holds(value) and min(value) > 0,
         ),
     },
     "key_words": {
@@ -178,10 +165,10 @@ _SHAPES: Final[Mapping[str, Shape]] = {
         "words": ValueCheck(
             expected="a list of words in small letters, none twice", holds=_are_words
         ),
-        "smoothing_frames": _integer("an integer in 1..50", 1, 50),
+        "smoothing_frames": integer(1, 50),
         "refractory_s": POSITIVE,
         "thresholds": TABLE,
-        "measured": OPTIONAL_TABLE,
+        "measured": TABLE.optional,
     },
     "key_words.thresholds": dict.fromkeys(
         THRESHOLDS,
@@ -199,8 +186,8 @@ _SHAPES: Final[Mapping[str, Shape]] = {
         ),
         "context": one_of(*EncoderContext),
         # Manifests of earlier releases have it; it has no meaning any more.
-        "hot_words": ValueCheck(expected="true or false", holds=lambda _: True, is_optional=True),
-        "calibration": OPTIONAL_TABLE,
+        "hot_words": ValueCheck(expected="true or false", holds=lambda _: True).optional,
+        "calibration": TABLE.optional,
     },
     "whisper.calibration": dict.fromkeys(
         ("bias", "log_probability", "no_speech", "compression"), NUMBER
@@ -208,7 +195,7 @@ _SHAPES: Final[Mapping[str, Shape]] = {
     "language": {
         "use": one_of(*LanguageUse),
         "most_tokens": COUNT,
-        "certainty": OPTIONAL_TABLE,
+        "certainty": TABLE.optional,
     },
     "language.certainty": dict.fromkeys(
         ("bias", "least", "mean", "strange", "read_back_below", "decline_below"), NUMBER
@@ -217,13 +204,13 @@ _SHAPES: Final[Mapping[str, Shape]] = {
 """What each table holds, by its key; one that is absent where it may be is not looked at."""
 
 
-def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[RobotFileFault]:
+def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[TableFault]:
     """Find every key that is unknown, missing or wrong, then what does not fit together."""
     faults = [*_key_faults(document)]
     yield from faults or _cross_faults(document, folder_name)
 
 
-def _key_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _key_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
     parts_of = next((name for name in ("whisper", "language") if name in document), None)
     shape = {**_HEAD, "parts": TABLES, parts_of: TABLE} if parts_of else _GRAPH
     yield from check_record(document, "", shape)
@@ -239,15 +226,15 @@ def _tables(document: Mapping[str, Any], path: str) -> Iterator[tuple[str, Mappi
         value = value.get(name) if isinstance(value, dict) else None
     if isinstance(value, dict):
         yield path, value
-    for number, row in enumerate(value if isinstance(value, list) else ()):
+    for index, row in enumerate(value if isinstance(value, list) else ()):
         if isinstance(row, dict):
-            yield f"{path}[{number}]", row
+            yield f"{path}[{index}]", row
 
 
-def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[RobotFileFault]:
+def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[TableFault]:
     if document["name"] != folder_name:
         expected = f"{folder_name!r}, as its folder"
-        yield RobotFileFault(key="name", got=repr(document["name"]), expected=expected)
+        yield TableFault(key="name", got=repr(document["name"]), expected=expected)
     paths = [part["path"] for part in document.get("parts", ())]
     if "whisper" in document:
         needed = [*WHISPER_PARTS]
@@ -263,23 +250,23 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Rob
 
 def _part_faults(
     document: Mapping[str, Any], paths: list[str], table: str, role: str, needed: Sequence[str]
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     """Find a role that is not that of the manifest's `[table]`, and parts that are missing."""
     if document["role"] != role:
-        yield RobotFileFault(key="role", got=document["role"], expected=f"{role}, for [{table}]")
+        yield TableFault(key="role", got=document["role"], expected=f"{role}, for [{table}]")
     for name in needed:
         if name not in paths:
-            yield RobotFileFault(key="parts", got=f"{paths}", expected=f"{name} among them")
+            yield TableFault(key="parts", got=f"{paths}", expected=f"{name} among them")
 
 
-def _graph_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _graph_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
     for group in ("inputs", "outputs", "files"):
         if not document[group]:
-            yield RobotFileFault(key=group, got="none", expected="one at least")
+            yield TableFault(key=group, got="none", expected="one at least")
     for table, role in (("key_words", KEY_WORDS), ("detection", DETECTOR)):
         if document["role"] == role and table not in document:
             expected = f"a table, as the role is {role}"
-            yield RobotFileFault(key=table, got="nothing", expected=expected)
+            yield TableFault(key=table, got="nothing", expected=expected)
     if "key_words" in document:
         yield from _word_score_faults(document)
     if "detection" in document and document["inputs"]:
@@ -288,35 +275,33 @@ def _graph_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
         yield from _class_faults(document["detection"])
 
 
-def _word_score_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _word_score_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
     """Find a spotter whose scores are not those of its words."""
     wanted = 1 + len(document["key_words"]["words"])
     shapes = [record["shape"] for record in document["outputs"]]
     if len(shapes) != 1 or len(shapes[0]) != 3 or shapes[0][1] != wanted:
         expected = f"one of shape [1, {wanted}, moments], none and each word"
-        yield RobotFileFault(key="outputs", got=f"shapes {shapes}", expected=expected)
+        yield TableFault(key="outputs", got=f"shapes {shapes}", expected=expected)
 
 
-def _score_faults(detection: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _score_faults(detection: Mapping[str, Any]) -> Iterator[TableFault]:
     """Find a weak score that is above the sure one."""
     sure = detection["score_threshold"]
     weak = detection.get("weak_score_threshold", sure)
     if weak > sure:
         expected = f"at most score_threshold, {sure}"
-        yield RobotFileFault(
-            key="detection.weak_score_threshold", got=repr(weak), expected=expected
-        )
+        yield TableFault(key="detection.weak_score_threshold", got=repr(weak), expected=expected)
 
 
-def _class_faults(detection: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _class_faults(detection: Mapping[str, Any]) -> Iterator[TableFault]:
     """Compare the classes that were measured with those that there are."""
     names = [row["name"] for row in detection.get("measured", {}).get("classes", [])]
     if len(set(names)) != len(names) or not set(names) <= set(detection["classes"]):
         expected = f"each once, of {detection['classes']}"
-        yield RobotFileFault(key="detection.measured.classes", got=repr(names), expected=expected)
+        yield TableFault(key="detection.measured.classes", got=repr(names), expected=expected)
 
 
-def _image_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
+def _image_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
     """Compare the image with the input it is for."""
     image, shape = document["detection"]["image"], document["inputs"][0]["shape"]
     width, height = image["width_px"], image["height_px"]
@@ -328,20 +313,18 @@ def _image_faults(document: Mapping[str, Any]) -> Iterator[RobotFileFault]:
     )
     if len(document["inputs"]) != 1 or not fits:
         got = [record["shape"] for record in document["inputs"]]
-        yield RobotFileFault(key="inputs", got=f"shapes {got}", expected=f"one of shape {wanted}")
+        yield TableFault(key="inputs", got=f"shapes {got}", expected=f"one of shape {wanted}")
     yield from _pixel_faults(image, document["inputs"][0]["dtype"])
 
 
-def _pixel_faults(image: Mapping[str, Any], dtype: str) -> Iterator[RobotFileFault]:
+def _pixel_faults(image: Mapping[str, Any], dtype: str) -> Iterator[TableFault]:
     """Hold the normalisation against the input's type: integers would cut shares of 255 to 0."""
     if dtype not in PIXEL_DTYPES:
         expected = f"one of {', '.join(PIXEL_DTYPES)}, which hold pixels"
-        yield RobotFileFault(key="inputs[0].dtype", got=repr(dtype), expected=expected)
+        yield TableFault(key="inputs[0].dtype", got=repr(dtype), expected=expected)
     if dtype.startswith("float"):
         return
     for key, plain in (("scale", 1), ("mean", [0, 0, 0]), ("std", [1, 1, 1])):
         if image[key] != plain:
             expected = f"{plain}, as its input is of {dtype}: pixels as they are"
-            yield RobotFileFault(
-                key=f"detection.image.{key}", got=repr(image[key]), expected=expected
-            )
+            yield TableFault(key=f"detection.image.{key}", got=repr(image[key]), expected=expected)

@@ -5,13 +5,13 @@ RobotFileError    the robot file, or a file it names, cannot be used: fix every 
 
 from pathlib import Path
 
-from vla_deploy.robots.schema import RobotFileFault
+from vla_deploy.runtime.table_schema import TableFault
 
 
 class RobotFileError(ValueError):
     """Report every fault of one robot file at once."""
 
-    def __init__(self, file: Path, faults: tuple[RobotFileFault, ...]) -> None:
+    def __init__(self, file: Path, faults: tuple[TableFault, ...]) -> None:
         self.file = file
         self.faults = faults
         if len(faults) == 1:

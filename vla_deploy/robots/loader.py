@@ -40,7 +40,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.ros_settings import ROS, ros_settings
-from vla_deploy.robots.schema import RobotFileFault, Shape, check_record
+from vla_deploy.runtime.table_schema import Shape, TableFault, check_record
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
@@ -117,9 +117,7 @@ def robot_file(name_or_path: str | Path) -> Path:
         if candidate.is_file():
             return candidate
     expected = f"a robot file, its folder, or one of {', '.join(robot_names())}"
-    raise RobotFileError(
-        given, (RobotFileFault(key="(file)", got="no such file", expected=expected),)
-    )
+    raise RobotFileError(given, (TableFault(key="(file)", got="no such file", expected=expected),))
 
 
 def robot_names() -> tuple[str, ...]:
@@ -131,11 +129,11 @@ def _parse(file: Path) -> Document:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
+        fault = TableFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def read_overrides(directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
+def read_overrides(directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
     """Return the overrides of a robot's folder, empty where it has none, and the file's faults."""
     try:
         text = (directory / OVERRIDES_FILE).read_text(encoding="utf-8")
@@ -144,11 +142,11 @@ def read_overrides(directory: Path) -> tuple[Document, tuple[RobotFileFault, ...
         return {}, ()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         return {}, (
-            RobotFileFault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),
+            TableFault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),
         )
 
 
-def _traced(fault: RobotFileFault, overrides: Document, own: Document) -> RobotFileFault:
+def _traced(fault: TableFault, overrides: Document, own: Document) -> TableFault:
     """Return the fault of a merged document, with the name of the overrides where they made it.
 
     A value that lacks in a table is theirs where the robot file itself has no such table.
@@ -167,7 +165,7 @@ def _traced(fault: RobotFileFault, overrides: Document, own: Document) -> RobotF
     return replace(fault, key=f"{OVERRIDES_FILE}: {fault.key}")
 
 
-def _faults(document: Document, directory: Path) -> Iterator[RobotFileFault]:
+def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     for record, key, shape in _records(document):
         yield from check_record(record, key, shape)
     yield from missing_files(document, directory)
@@ -176,14 +174,14 @@ def _faults(document: Document, directory: Path) -> Iterator[RobotFileFault]:
     yield from _faults_against_mjcf(document, directory)
 
 
-def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[RobotFileFault]:
+def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableFault]:
     name = document.get("mjcf")
     if not isinstance(name, str) or not (directory / name).is_file():
         return
     try:
         mjcf = read_mjcf_names(directory / name)
     except ElementTree.ParseError as error:
-        yield RobotFileFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
+        yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
 

@@ -198,7 +198,7 @@ def test_what_is_written_is_read_as_the_same(read, tmp_path, text):
                 "files.fp32.path: got '../mine.onnx', expected a file in the model's folder",
                 "files.fp32.sha256: got 'zz00",
                 "detection.classes: got ['cup', 'cup'], expected a list of names, none twice",
-                "detection.iou_threshold: got 45, expected a number from 0 to 1",
+                "detection.iou_threshold: got 45, expected a number in 0..1",
                 "detection.image.fill: got nothing, expected an integer in 0..255",
                 "detection.image.std: got [1, 0, 1], expected three numbers above 0",
             ),
@@ -207,8 +207,8 @@ def test_what_is_written_is_read_as_the_same(read, tmp_path, text):
             MEASURED,
             {"precision = 0.8": "precision = 80", "recall = 0.7": ""},
             (
-                "detection.measured.recall: got nothing, expected a number from 0 to 1",
-                "detection.measured.precision: got 80, expected a number from 0 to 1",
+                "detection.measured.recall: got nothing, expected a number in 0..1",
+                "detection.measured.precision: got 80, expected a number in 0..1",
             ),
         ),
         (
@@ -225,7 +225,7 @@ def test_what_is_written_is_read_as_the_same(read, tmp_path, text):
             LANGUAGE,
             {"most_tokens = 160": "most_tokens = 0", "mean = 3.2\n": ""},
             (
-                "language.most_tokens: got 0, expected an integer above 0",
+                "language.most_tokens: got 0, expected an integer of 1 or more",
                 "language.certainty.mean: got nothing, expected a number",
             ),
         ),

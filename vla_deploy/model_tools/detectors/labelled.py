@@ -19,7 +19,7 @@ import numpy as np
 from vla_deploy.inference.errors import ImagesInvalid
 from vla_deploy.perception.detectors.boxes import Floats, Indices
 from vla_deploy.perception.detectors.image_input import Image
-from vla_deploy.robots.schema import TEXT, Shape, ValueCheck, is_number
+from vla_deploy.runtime.table_schema import TEXT, Shape, ValueCheck, is_number
 
 SUFFIXES: Final = (".bmp", ".jpeg", ".jpg", ".png", ".ppm", ".tif", ".tiff", ".webp")
 _NAMES: Final = "classes.txt"

@@ -15,7 +15,8 @@ from typing import Any
 
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.schema import SERVO, TABLE, TEXT, RobotFileFault, Shape, check_record
+from vla_deploy.robots.schema import SERVO
+from vla_deploy.runtime.table_schema import TABLE, TEXT, Shape, TableFault, check_record
 
 CALIBRATION_FILE = "calibration.toml"
 CALIBRATION: Shape = {"joints": TABLE}
@@ -83,11 +84,11 @@ def replace_text(file: Path, text: str) -> None:
     except OSError as error:
         fresh.unlink(missing_ok=True)
         expected = "a file that can be written; choose one with --output"
-        fault = RobotFileFault(key="(file)", got=error.strerror or str(error), expected=expected)
+        fault = TableFault(key="(file)", got=error.strerror or str(error), expected=expected)
         raise RobotFileError(file, (fault,)) from error
 
 
-def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
+def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
     """Return a robot document with the calibration of its directory, and that file's faults."""
     file = directory / CALIBRATION_FILE
     try:
@@ -111,7 +112,7 @@ def _laid_over(row: Document, calibrations: Mapping[str, JointCalibration]) -> D
 
 def _mismatches(
     servos: list[Document], calibrations: Mapping[str, JointCalibration]
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     ids = {row.get("joint"): row.get("id") for row in servos}
     names = sorted(name for name in ids if isinstance(name, str))
     for joint, measured in calibrations.items():
@@ -120,13 +121,11 @@ def _mismatches(
             yield unknown_name(key, joint, "a servo's joint", names)
         elif ids[joint] != measured.servo_id:
             expected = f"{ids[joint]}, the id in the robot file: calibrate the joint again"
-            yield RobotFileFault(
-                key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected
-            )
+            yield TableFault(key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected)
 
 
-def _with_file_name(fault: RobotFileFault) -> RobotFileFault:
-    return RobotFileFault(
+def _with_file_name(fault: TableFault) -> TableFault:
+    return TableFault(
         key=f"{CALIBRATION_FILE}: {fault.key}", got=fault.got, expected=fault.expected
     )
 
@@ -137,11 +136,11 @@ def _parse(file: Path) -> Document:
     except FileNotFoundError:
         return {"joints": {}}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
+        fault = TableFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def _faults(document: Document) -> Iterator[RobotFileFault]:
+def _faults(document: Document) -> Iterator[TableFault]:
     yield from check_record(document, "", CALIBRATION)
     for name, record in table(document, "joints").items():
         row = record if isinstance(record, dict) else {}

@@ -15,7 +15,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.kinematic_tree import Vector
 from vla_deploy.robots.kinematics.mjcf_document import BodyElement, Element, MjcfDocument
 from vla_deploy.robots.kinematics.orientation import Attributes, matrix, numbers
-from vla_deploy.robots.schema import RobotFileFault
+from vla_deploy.runtime.table_schema import TableFault
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def _refuse_compiler_options(document: MjcfDocument) -> None:
 
 
 def _refuse(document: MjcfDocument, key: str, got: str, expected: str) -> None:
-    fault = RobotFileFault(key=key, got=got, expected=expected)
+    fault = TableFault(key=key, got=got, expected=expected)
     raise RobotFileError(document.path, (fault,))
 
 
