@@ -4,15 +4,14 @@ import json
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, is_dataclass
-from enum import StrEnum
+from dataclasses import asdict
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Final, get_args, get_origin, get_type_hints
+from typing import Any, Final
 
 from vla_deploy.inference.errors import ManifestInvalid
 from vla_deploy.inference.manifest import Manifest
 from vla_deploy.inference.manifest_schema import manifest_faults
+from vla_deploy.runtime.table_schema import build
 
 MANIFEST: Final = "model.toml"
 Document = Mapping[str, Any]
@@ -34,8 +33,7 @@ def read_manifest(folder: Path) -> Manifest:
     faults = tuple(str(fault) for fault in manifest_faults(document, folder.name))
     if faults:
         raise ManifestInvalid(file, faults)
-    manifest: Manifest = _build(Manifest, document)
-    return manifest
+    return build(Manifest, document)
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -46,22 +44,6 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     """
     text = "\n".join(_lines("", document_of(manifest))).lstrip("\n")
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
-
-
-def _build(kind: Any, value: Any) -> Any:
-    """Return a checked value of a document as a manifest's types say; absent keys keep defaults."""
-    choices = [one for one in get_args(kind) if one is not NoneType]
-    origin = get_origin(kind)
-    if origin is UnionType:
-        return _build(choices[0], value) if len(choices) == 1 else value
-    if origin is tuple:
-        return tuple(_build(choices[0], one) for one in value)
-    if origin is Mapping:
-        return {_build(choices[0], key): _build(choices[1], one) for key, one in value.items()}
-    if isinstance(kind, type) and is_dataclass(kind):
-        types = get_type_hints(kind)
-        return kind(**{key: _build(types[key], one) for key, one in value.items() if key in types})
-    return kind(value) if issubclass(kind, StrEnum) else value
 
 
 def document_of(manifest: Manifest) -> dict[str, Any]:

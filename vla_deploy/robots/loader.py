@@ -15,32 +15,28 @@ from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
     BaseGeometry,
-    FloorPose,
     Hand,
     Home,
     JointLimits,
     KeepOutZone,
     Place,
     RobotDescription,
-    StopCategory,
     StopGroup,
 )
 from vla_deploy.robots.devices import (
     Audio,
     CanBus,
-    Drive,
     EstopButtonDescription,
     SerialSensor,
-    Servo,
     ServoBus,
     ServoModel,
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
-from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
-from vla_deploy.robots.ros_settings import ROS, ros_settings
-from vla_deploy.runtime.table_schema import Shape, TableFault, check_record
+from vla_deploy.robots.plan_bounds import PlanBounds
+from vla_deploy.robots.ros_settings import ROS, RosSettings
+from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
@@ -208,13 +204,10 @@ def _as_table(value: Any) -> Document:
 
 
 def _build(document: Document, directory: Path, camera: CameraDescription) -> RobotDescription:
-    servo_bus = document["servo_bus"]
     return RobotDescription(
         name=document["name"],
         mjcf_path=directory / document["mjcf"],
-        servo_bus=ServoBus(
-            **{**servo_bus, "servos": tuple(Servo(**row) for row in servo_bus["servos"])}
-        ),
+        servo_bus=build(ServoBus, document["servo_bus"]),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
         can_bus=_can_bus(document["can_bus"], directory),
         base=BaseGeometry(**document["base"]),
@@ -225,37 +218,29 @@ def _build(document: Document, directory: Path, camera: CameraDescription) -> Ro
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
-        ros=ros_settings(document.get("ros", {})),
+        ros=build(RosSettings, document.get("ros", {})),
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
-        groups={name: _group(name, row) for name, row in document["groups"].items()},
+        groups={
+            name: build(StopGroup, {"name": name, **row})
+            for name, row in document["groups"].items()
+        },
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},
         poses=subtables(document, "poses"),
         home=_home(document["home"], directory),
         protection=protection_schema.build_protection(document),
-        planning=_plan_bounds(document.get("planning", {})),
-    )
-
-
-def _group(name: str, row: Document) -> StopGroup:
-    return StopGroup(
-        name=name,
-        joints=tuple(row["joints"]),
-        stop_category=StopCategory(row["stop_category"]),
-        drop_payload=row.get("drop_payload", False),
+        planning=build(PlanBounds, document.get("planning", {})),
     )
 
 
 def _can_bus(record: Document, directory: Path) -> CanBus:
-    plain = {key: value for key, value in record.items() if key not in ("eds", "endpoints")}
-    drives = tuple(Drive(**row) for row in record["drives"])
-    return CanBus(
-        **{**plain, "drives": drives},
-        eds_path=_beside(record, "eds", directory),
-        endpoints_path=_beside(record, "endpoints", directory),
+    return replace(
+        build(CanBus, record),
+        eds_path=_sibling(record, "eds", directory),
+        endpoints_path=_sibling(record, "endpoints", directory),
     )
 
 
-def _beside(record: Document, key: str, directory: Path) -> Path | None:
+def _sibling(record: Document, key: str, directory: Path) -> Path | None:
     """Return a file that the record names relative to the robot file."""
     return directory / record[key] if key in record else None
 
@@ -264,26 +249,9 @@ def _home(row: Document, directory: Path) -> Home:
     return Home(
         map_path=directory / row["map"],
         start=row["start"],
-        places={name: _place(name, place) for name, place in row["places"].items()},
-        zones=tuple(_zone(zone) for zone in row["zones"]),
+        places={
+            name: build(Place, {"name": name, "pose": place, **place})
+            for name, place in row["places"].items()
+        },
+        zones=tuple(build(KeepOutZone, zone) for zone in row["zones"]),
     )
-
-
-def _place(name: str, row: Document) -> Place:
-    return Place(
-        name=name,
-        pose=FloorPose(x_m=row["x_m"], y_m=row["y_m"], yaw_rad=row["yaw_rad"]),
-        aliases=tuple(row["aliases"]),
-        viewpoints=tuple(FloorPose(**view) for view in row["viewpoints"]),
-    )
-
-
-def _plan_bounds(row: Document) -> PlanBounds:
-    if "require_confirmation" in row:
-        row = {**row, "require_confirmation": Confirm(row["require_confirmation"])}
-    return PlanBounds(**row)
-
-
-def _zone(row: Document) -> KeepOutZone:
-    polygon = tuple((float(x), float(y)) for x, y in row["polygon_m"])
-    return KeepOutZone(name=row["name"], reason=row["reason"], polygon_m=polygon)

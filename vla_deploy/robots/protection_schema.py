@@ -23,6 +23,7 @@ from vla_deploy.runtime.table_schema import (
     Shape,
     TableFault,
     ValueCheck,
+    build,
     integer,
     is_number,
     number,
@@ -171,45 +172,17 @@ def build_protection(document: Document) -> Protection:
             _zone(name, row, document["base"]) for name, row in subtables(document, "zones").items()
         ),
         workspaces={
-            name: Workspace(min_m=tuple(row["min_m"]), max_m=tuple(row["max_m"]))
-            for name, row in subtables(document, "workspace").items()
+            name: build(Workspace, row) for name, row in subtables(document, "workspace").items()
         },
-        clearance=_clearance(table(document, "clearance")),
-        tip_over=_tip_over(document["tip_over"]) if "tip_over" in document else None,
-        contact=_contact(document["contact"]) if "contact" in document else None,
+        clearance=build(ClearanceLimits, table(document, "clearance")),
+        tip_over=build(TipOver, document["tip_over"]) if "tip_over" in document else None,
+        contact=build(ContactLimits, document["contact"]) if "contact" in document else None,
     )
 
 
 def _zone(name: str, row: Document, base: Document) -> Zone:
-    shared = {key: row[key] for key in _PLAIN if key in row}
+    """Return a zone; one that bounds speeds bounds them by the least ratio of them."""
     speed_m_s = row.get("speed_m_s", base["max_speed_m_s"])
     turn_rad_s = row.get("turn_rad_s", base["max_turn_rad_s"])
     ratio = min(1.0, speed_m_s / base["max_speed_m_s"], turn_rad_s / base["max_turn_rad_s"])
-    return Zone(
-        name=name,
-        kind=ZoneKind(row["kind"]),
-        sources=tuple(ZoneSource(source) for source in row["sources"]),
-        polygon_m=tuple((float(x), float(y)) for x, y in row.get("polygon_m", ())),
-        **{"speed_ratio": ratio, **shared},
-    )
-
-
-_PLAIN = (
-    *("min_points", "trigger_count", "release_count", "reaction_s"),
-    *("speed_ratio", "time_before_collision_s"),
-)
-
-
-def _clearance(row: Document) -> ClearanceLimits:
-    pairs = tuple((str(first), str(second)) for first, second in row.get("allow", ()))
-    margins = {key: value for key, value in row.items() if key != "allow"}
-    return ClearanceLimits(**margins, allow=pairs)
-
-
-def _tip_over(row: Document) -> TipOver:
-    corners = tuple((float(x), float(y)) for x, y in row["support_m"])
-    return TipOver(**{**row, "support_m": corners})
-
-
-def _contact(row: Document) -> ContactLimits:
-    return ContactLimits(torque_nm=dict(row["torque_nm"]))
+    return build(Zone, {"name": name, "speed_ratio": ratio, **row})

@@ -1,6 +1,6 @@
 """Declare how a robot takes part in a ROS 2 graph: the `[ros]` table of the robot file."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
@@ -82,9 +82,3 @@ ROS: Final[Shape] = {
     "arms": one_of(_OWN, FOLLOW_JOINT_TRAJECTORY).optional,
     "trajectory_server": TEXT.optional,
 }
-
-
-def ros_settings(row: dict[str, object]) -> RosSettings:
-    """Return the settings of a `[ros]` table that has no faults."""
-    settings = RosSettings(**row)  # type: ignore[arg-type]  # checked by the shape `ROS`
-    return replace(settings, accept=Accepts(settings.accept))

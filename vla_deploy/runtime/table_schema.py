@@ -1,9 +1,14 @@
 """Declare what the tables of a hand-written file hold; collect every fault, stop at none."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, is_dataclass, replace
+from enum import Enum
+from functools import cache
 from math import inf, isfinite
-from typing import Any, TypeGuard
+from types import NoneType, UnionType
+from typing import Any, TypeGuard, TypeVar, cast, get_args, get_origin, get_type_hints
+
+Built = TypeVar("Built")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,3 +112,29 @@ def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Tab
         if name in record and not check.holds(record[name])
     ]
     return (*missing, *unknown, *wrong)
+
+
+def build(kind: type[Built], record: Mapping[str, Any]) -> Built:
+    """Return a table without faults as a dataclass; absent keys keep its defaults, others go."""
+    types = _types_of(cast("Hashable", kind))
+    return kind(**{key: _value(types[key], one) for key, one in record.items() if key in types})
+
+
+@cache
+def _types_of(kind: Hashable) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _value(kind: Any, value: Any) -> Any:
+    """Return a value as its type says: lists as tuples, tables as dataclasses, words as enums."""
+    choices = [one for one in get_args(kind) if one is not NoneType]
+    origin = get_origin(kind)
+    if origin is UnionType:
+        return _value(choices[0], value) if len(choices) == 1 else value
+    if origin is tuple:
+        return tuple(_value(choices[0], one) for one in value)
+    if origin is Mapping:
+        return {_value(choices[0], key): _value(choices[1], one) for key, one in value.items()}
+    if is_dataclass(kind):
+        return build(kind, value)  # type: ignore[arg-type]
+    return kind(value) if kind is float or issubclass(kind, Enum) else value
