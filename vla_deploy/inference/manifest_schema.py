@@ -23,6 +23,7 @@ from vla_deploy.runtime.table_schema import (
     TableFault,
     ValueCheck,
     check_record,
+    check_tables,
     integer,
     is_number,
     number,
@@ -121,7 +122,7 @@ _SHAPES: Final[Mapping[str, Shape]] = {
     "inputs": _TENSOR,
     "outputs": _TENSOR,
     "files": dict.fromkeys(Variant, TABLE.optional),
-    **{f"files.{variant}": _FILE for variant in Variant},
+    "files.*": _FILE,
     "parts": _FILE,
     "detection": {
         "adapter": TEXT,
@@ -201,7 +202,7 @@ _SHAPES: Final[Mapping[str, Shape]] = {
         ("bias", "least", "mean", "strange", "read_back_below", "decline_below"), NUMBER
     ),
 }
-"""What each table holds, by its key; one that is absent where it may be is not looked at."""
+"""What each table holds, by its path."""
 
 
 def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[TableFault]:
@@ -214,21 +215,7 @@ def _key_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
     parts_of = next((name for name in ("whisper", "language") if name in document), None)
     shape = {**_HEAD, "parts": TABLES, parts_of: TABLE} if parts_of else _GRAPH
     yield from check_record(document, "", shape)
-    for path, inner in _SHAPES.items():
-        for key, table in _tables(document, path):
-            yield from check_record(table, key, inner)
-
-
-def _tables(document: Mapping[str, Any], path: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables at a path with their keys: one, or as many as a list has."""
-    value: object = document
-    for name in path.split("."):
-        value = value.get(name) if isinstance(value, dict) else None
-    if isinstance(value, dict):
-        yield path, value
-    for index, row in enumerate(value if isinstance(value, list) else ()):
-        if isinstance(row, dict):
-            yield f"{path}[{index}]", row
+    yield from check_tables(document, _SHAPES)
 
 
 def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[TableFault]:

@@ -12,7 +12,7 @@ from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
 from vla_deploy.robots.camera import CameraDescription
-from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
+from vla_deploy.robots.consistency import CHECKS, missing_files, subtables
 from vla_deploy.robots.description import (
     BaseGeometry,
     Hand,
@@ -36,7 +36,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.ros_settings import ROS, RosSettings
-from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record
+from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
@@ -44,9 +44,12 @@ OVERRIDES_FILE = "overrides.toml"
 """What differs on this one robot, in the folder of its robot file."""
 Document = Mapping[str, Any]
 
-SINGLE: Mapping[str, Shape] = {
+SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
+    "servo_bus.servos": schema.SERVO,
+    "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,
+    "can_bus.drives": schema.DRIVE,
     "base": schema.BASE,
     "lidar": schema.LIDAR,
     "imu": schema.IMU,
@@ -56,25 +59,21 @@ SINGLE: Mapping[str, Shape] = {
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
     "ros": ROS,
+    "limits.*": schema.LIMITS,
+    "groups.*": schema.GROUP,
+    "hands.*": schema.HAND,
     "home": schema.HOME,
+    "home.places.*": schema.PLACE,
+    "home.places.*.viewpoints": schema.FLOOR_POSE,
+    "home.zones": schema.ZONE,
     "planning": schema.PLANNING,
+    "zones.*": protection_schema.ZONE,
+    "workspace.*": protection_schema.WORKSPACE,
     "clearance": protection_schema.CLEARANCE,
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
 }
-NAMED: Mapping[str, Shape] = {
-    "servo_models": schema.SERVO_MODEL,
-    "limits": schema.LIMITS,
-    "groups": schema.GROUP,
-    "hands": schema.HAND,
-    "zones": protection_schema.ZONE,
-    "workspace": protection_schema.WORKSPACE,
-}
-LISTED: Mapping[tuple[str, str], Shape] = {
-    ("servo_bus", "servos"): schema.SERVO,
-    ("can_bus", "drives"): schema.DRIVE,
-    ("home", "zones"): schema.ZONE,
-}
+"""What each table of a robot file holds, by its path."""
 
 
 def load_robot(name_or_path: str | Path) -> RobotDescription:
@@ -162,8 +161,8 @@ def _traced(fault: TableFault, overrides: Document, own: Document) -> TableFault
 
 
 def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
-    for record, key, shape in _records(document):
-        yield from check_record(record, key, shape)
+    yield from check_record(document, "", schema.ROBOT)
+    yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
     for check in (*CHECKS, *protection_schema.CHECKS):
         yield from check(document)
@@ -180,27 +179,6 @@ def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableF
         yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
-
-
-def _records(document: Document) -> Iterator[tuple[Document, str, Shape]]:
-    yield document, "", schema.ROBOT
-    for key, shape in SINGLE.items():
-        if isinstance(document.get(key), dict):
-            yield document[key], key, shape
-    for key, shape in NAMED.items():
-        for name, record in table(document, key).items():
-            yield _as_table(record), f"{key}.{name}", shape
-    for (outer, inner), shape in LISTED.items():
-        for i, record in enumerate(rows(table(document, outer), inner)):
-            yield record, f"{outer}.{inner}[{i}]", shape
-    for name, place in table(table(document, "home"), "places").items():
-        yield _as_table(place), f"home.places.{name}", schema.PLACE
-        for i, view in enumerate(rows(_as_table(place), "viewpoints")):
-            yield view, f"home.places.{name}.viewpoints[{i}]", schema.FLOOR_POSE
-
-
-def _as_table(value: Any) -> Document:
-    return value if isinstance(value, dict) else {}
 
 
 def _build(document: Document, directory: Path, camera: CameraDescription) -> RobotDescription:

@@ -1,6 +1,6 @@
 """Declare what the tables of a hand-written file hold; collect every fault, stop at none."""
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from enum import Enum
 from functools import cache
@@ -112,6 +112,33 @@ def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Tab
         if name in record and not check.holds(record[name])
     ]
     return (*missing, *unknown, *wrong)
+
+
+def check_tables(document: Mapping[str, Any], shapes: Mapping[str, Shape]) -> Iterator[TableFault]:
+    """Yield the faults of each table that a document has at a path; `*` stands for any name."""
+    for path, shape in shapes.items():
+        for key, table in _tables_at(document, path):
+            yield from check_record(table, key, shape)
+
+
+def _tables_at(
+    table: Mapping[str, Any], path: str, above: str = ""
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield tables with their keys: one, each of a list, or under `*` all that there are."""
+    name, _, rest = path.partition(".")
+    if name == "*":
+        found = {one: inner if isinstance(inner, dict) else {} for one, inner in table.items()}
+    elif isinstance(inner := table.get(name), list):
+        rows = enumerate(inner)
+        found = {f"{name}[{index}]": row for index, row in rows if isinstance(row, dict)}
+    else:
+        found = {name: inner} if isinstance(inner, dict) else {}
+    for key, inner in found.items():
+        where = f"{above}.{key}" if above else key
+        if rest:
+            yield from _tables_at(inner, rest, where)
+        else:
+            yield where, inner
 
 
 def build(kind: type[Built], record: Mapping[str, Any]) -> Built:

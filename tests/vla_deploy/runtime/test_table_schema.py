@@ -13,6 +13,7 @@ from vla_deploy.runtime.table_schema import (
     ValueCheck,
     build,
     check_record,
+    check_tables,
     integer,
     number,
     numbers,
@@ -44,6 +45,24 @@ def test_every_fault_of_a_table_is_listed() -> None:
         "thing.name: got nothing, expected a text",
         "thing.colour: got an unknown key, expected one of name, count, note",
         "thing.count: got 0, expected an integer of 1 or more",
+    ]
+
+
+def test_tables_are_found_by_their_paths() -> None:
+    shape = {"name": TEXT}
+    document = {
+        "one": {"inner": {}, "rows": [{}, {"name": "a"}, 3]},
+        "named": {"first": {"views": [{}]}, "second": 3},
+    }
+    paths = ("one", "one.inner", "one.rows", "named.*", "named.*.views", "absent", "absent.*.rows")
+    faults = [fault.key for fault in check_tables(document, dict.fromkeys(paths, shape))]
+    assert [key for key in faults if key.endswith(".name")] == [
+        "one.name",
+        "one.inner.name",
+        "one.rows[0].name",
+        "named.first.name",
+        "named.second.name",
+        "named.first.views[0].name",
     ]
 
 
