@@ -18,7 +18,7 @@ from vla_deploy.perception.camera_tools.board_pose import board_pose, placed, rm
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.perception.geometry.rotation import angle_rad
-from vla_deploy.robots.description import CameraDescription, CameraMounting
+from vla_deploy.robots.camera import CameraDescription, CameraMounting
 from vla_deploy.robots.kinematics.orientation import quaternion_of
 
 MIN_VIEWS: Final = 6
