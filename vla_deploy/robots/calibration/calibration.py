@@ -16,7 +16,14 @@ from typing import Any
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.schema import SERVO
-from vla_deploy.runtime.table_schema import TABLE, TEXT, Shape, TableFault, check_record
+from vla_deploy.runtime.table_schema import (
+    TABLE,
+    TEXT,
+    Shape,
+    TableFault,
+    check_record,
+    check_tables,
+)
 
 CALIBRATION_FILE = "calibration.toml"
 CALIBRATION: Shape = {"joints": TABLE}
@@ -142,9 +149,7 @@ def _parse(file: Path) -> Document:
 
 def _faults(document: Document) -> Iterator[TableFault]:
     yield from check_record(document, "", CALIBRATION)
-    for name, record in table(document, "joints").items():
-        row = record if isinstance(record, dict) else {}
-        yield from check_record(row, f"joints.{name}", JOINT)
+    yield from check_tables(document, {"joints.*": JOINT})
 
 
 def _as_toml(calibrations: Mapping[str, JointCalibration]) -> str:

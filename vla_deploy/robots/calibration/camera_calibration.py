@@ -23,7 +23,15 @@ from vla_deploy.robots.calibration.lens_schema import lens_faults
 from vla_deploy.robots.camera import CameraDescription, CameraMounting, LensCalibration
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.runtime.one_line import one_line
-from vla_deploy.runtime.table_schema import NUMBER, TEXT, Shape, TableFault, check_record, numbers
+from vla_deploy.runtime.table_schema import (
+    NUMBER,
+    TEXT,
+    Shape,
+    TableFault,
+    build,
+    check_record,
+    numbers,
+)
 
 LENS_FILE: Final = "camera.yaml"
 MOUNTING_FILE: Final = "camera_mounting.toml"
@@ -137,8 +145,7 @@ def read_mounting(file: Path, camera: CameraDescription) -> CameraMounting | Non
     faults = tuple(check_record(document, "", MOUNTING)) or tuple(_wrong(document, camera))
     if faults:
         raise RobotFileError(file, faults)
-    lists = {key: tuple(document[key]) for key in ("translation_m", "quaternion_xyzw")}
-    return CameraMounting(**{**document, **lists})
+    return build(CameraMounting, document)
 
 
 def require_plausible(file: Path, mounting: CameraMounting, camera: CameraDescription) -> None:
