@@ -20,8 +20,8 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
 from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
+from vla_deploy.inference.memory_claims import resident_mb
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.stats import resident_mb
 from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.model_selection import SelectedRecogniser, select_recogniser
 from vla_deploy.speech.recording import StreamClock, frames_of, open_hearing

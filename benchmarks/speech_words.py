@@ -14,8 +14,8 @@ from benchmarks.command import parser, show
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.speech.judging import other_sounds, speed, sureness, word_errors
+from vla_deploy.inference.manifest_schema import SPEECH_TO_TEXT
 from vla_deploy.inference.roles import ModelShelf, choice_for
-from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
 from vla_deploy.runtime.state_dir import user_base
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 

@@ -8,7 +8,7 @@ from drivers.odrive import EMULATED_ENDPOINTS
 from sim_twin.can.cia402.drive import WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive, MotorMounting
 from sim_twin.can.odrive.axis import ODriveAxis
-from vla_deploy.robots.description import CanBus, Drive
+from vla_deploy.robots.devices import CanBus, Drive
 
 DRIVES: Final[Mapping[str, Callable[..., EmulatedDrive]]] = {
     "cia402": WheelDrive,

@@ -18,7 +18,7 @@ from sim_twin.errors import TwinModelMismatch
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.pictures.renderer import Renderer, fixed_camera
 from sim_twin.sensors.camera import CameraDevice
-from vla_deploy.robots.description import CameraDescription
+from vla_deploy.robots.camera import CameraDescription
 
 _FOVY_TOLERANCE_RAD = 1e-3
 

@@ -10,12 +10,12 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.inference.manifest_schema import manifest_faults
-from vla_deploy.model_servers.servers_file import read_servers
+from vla_deploy.model_servers.settings import read_servers
 from vla_deploy.robots import load_robot, schema
-from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE
-from vla_deploy.robots.loader import NAMED, ROBOTS_DIR, SINGLE
+from vla_deploy.robots.loader import OVERRIDES_FILE, ROBOTS_DIR, SHAPES
 from vla_deploy.robots.ros_settings import ROS
 from vla_deploy.runtime.net import faults_of
+from vla_deploy.runtime.table_schema import check_tables
 from vla_deploy.telemetry.recording.settings import TelemetrySettings
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -69,11 +69,8 @@ def test_tables_of_robot_toml(page: str) -> None:
     files = shown(page)
     assert files
     for _, document in files:
-        for key, table in document.items():
-            records = [table] if key in SINGLE else table.values()
-            for record in records:
-                shape = SINGLE.get(key) or NAMED[key]
-                assert schema.check_record(record, key, shape) == ()
+        assert document.keys() <= schema.ROBOT.keys()
+        assert [*check_tables(document, SHAPES)] == []
 
 
 def test_overrides_toml_and_every_key_of_ros(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ import pytest
 
 from platforms import ModelChoice
 from tests.vla_deploy.hub import Hub, served
-from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     DetectionOutputs,
     EncoderContext,
@@ -32,6 +31,7 @@ from vla_deploy.inference.manifest import (
     Whisper,
 )
 from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.store import sha256_of
 
 CLASSES = ("red", "green", "blue")
 WIDTH_PX, HEIGHT_PX, CELL_PX, BOX_PX = 96, 64, 8, 20

@@ -14,7 +14,7 @@ from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, NEAR_LONG_PX, 
 from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.settings import DetectorSettings
 from training.detector.targets import STRIDE_PX
-from vla_deploy.inference.file_check import sha256_of
+from vla_deploy.inference.store import sha256_of
 
 AIM_MAP50, AIM_RECALL = 0.90, 0.93
 TEMPLATE = Path(__file__).with_name("card_template.md")

@@ -15,7 +15,7 @@ from training.detector.scenes.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.settings import DetectorSettings
 from training.detector.training import WEIGHTS
 from vla_deploy.inference.manifest import Variant
-from vla_deploy.model_tools.detectors.int8_files import write_int8
+from vla_deploy.model_tools.detectors.quantising import write_int8
 
 OPSET = 17
 _LOG = logging.getLogger(__name__)

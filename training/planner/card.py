@@ -10,9 +10,9 @@ from training.planner.files import CARD, GRAPH, MEAN_OF, METRICS, NAME, PARTS
 from training.planner.sentences.clause import load_groups
 from training.planner.sentences.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from training.planner.settings import PlannerSettings
-from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Certainty, Language, LanguageUse, Manifest, ModelFile
 from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.store import sha256_of
 
 TEMPLATE: Final = Path(__file__).with_name("card_template.md")
 SUMMARY: Final = "Tells what a household command says: steps, and the words for things and places"

@@ -27,7 +27,6 @@ from training.stop_words.network import REACH, StopNet
 from training.stop_words.settings import StopWordSettings
 from training.stop_words.texts import WORDS
 from training.voices import kokoro
-from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     KeyWords,
     Manifest,
@@ -38,6 +37,7 @@ from vla_deploy.inference.manifest import (
 )
 from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.runtime import InferenceSession, SessionOptions
+from vla_deploy.inference.store import sha256_of
 from vla_deploy.speech.sound import RATE_HZ
 from vla_deploy.speech.stop_words.features import BANDS, HOP, NAME
 

@@ -96,8 +96,8 @@ def _pose(topics: RobotTopics) -> Viewpoint | None:
     return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
-def _bystander(told: Mapping[str, Any]) -> FloorPlanBystander:
-    x_m, y_m = (float(value) for value in told["position_m"][:2])
+def _bystander(entry: Mapping[str, Any]) -> FloorPlanBystander:
+    x_m, y_m = (float(value) for value in entry["position_m"][:2])
     return FloorPlanBystander(
-        kind=str(told["class"]), x_m=x_m, y_m=y_m, width_m=float(told["width_m"])
+        kind=str(entry["class"]), x_m=x_m, y_m=y_m, width_m=float(entry["width_m"])
     )

@@ -16,7 +16,7 @@ from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble,
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.description import CameraMounting, LensCalibration
+from vla_deploy.robots.camera import CameraMounting, LensCalibration
 from vla_deploy.runtime.one_line import one_line
 from vla_deploy.runtime.state_dir import engines_dir_of
 from vla_deploy.speech.stop_words.listener import OFF

@@ -12,7 +12,6 @@ from platforms.tree import ValueMissing
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError, ModelUnknown
-from vla_deploy.inference.file_check import check_parts, checked_file
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.runtime.net import (
     SETTINGS_FILE,
@@ -105,8 +104,8 @@ def _fault_of(store: ModelStore, name: str) -> str:
     try:
         model = store.load(name)
         for variant in model.manifest.files:
-            checked_file(model, variant)
-        check_parts(model)
+            model.checked_file(variant)
+        model.check_parts()
     except ModelUnknown:
         return f"no model {name}"
     except InferenceError as error:

@@ -1,4 +1,4 @@
-"""Carry what is believed while the steps to a goal are gone through one by one."""
+"""Hold the state that the steps to a goal lead to, while they are judged one by one."""
 
 import itertools
 import math
@@ -10,6 +10,7 @@ import numpy as np
 
 from vla_deploy.feasibility.abilities import Abilities
 from vla_deploy.feasibility.question import SceneQuestion
+from vla_deploy.feasibility.verdict import Feasible, Task
 from vla_deploy.navigation.errors import NoPath
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.world import Query, Thing, access_to, find
@@ -18,7 +19,8 @@ from vla_deploy.world.memory import still_there, where_to_look
 Point = tuple[float, float]
 
 MOST_ALTERNATIVES: Final = 3
-# The way is planned on the map; people and chairs stand beside it or on it.
+_DIGITS: Final = 3
+# The way is planned on the map, which has no people and chairs: they stand next to it or on it.
 BESIDE_WAY_M: Final = 0.3
 
 
@@ -35,7 +37,7 @@ class Outlook:
     """Hold the state that the steps so far would lead to, and what was found on the way.
 
     `belief` is the probability that all things are as the steps need them; `unseen` are things
-    that nobody has seen yet, of which nothing can be said.
+    that have not been seen yet, of which nothing can be said.
     """
 
     question: SceneQuestion
@@ -50,8 +52,36 @@ class Outlook:
     alternatives: list[str] = field(default_factory=list)
     relied_on: set[str] = field(default_factory=set)
 
+    @classmethod
+    def of(cls, question: SceneQuestion, abilities: Abilities) -> "Outlook":
+        """Return what is known before the first step."""
+        robot = question.world.robot
+        held = next((thing for thing in question.world.things if thing.held_by), None)
+        holding = {name: question.holding.get(name) for name in abilities.body.hands}
+        if held is not None:
+            holding[held.held_by] = holding.get(held.held_by) or held.kind
+        return cls(
+            question=question,
+            abilities=abilities,
+            holding=holding,
+            held=held,
+            at=None if robot is None else (robot.x_m, robot.y_m),
+        )
+
+    def verdict(self, feasible: Feasible, belief: float, reason: str) -> Task:
+        """Return the verdict with what the steps have found."""
+        return Task(
+            goal=self.question.goal,
+            feasible=feasible,
+            confidence=round(belief, _DIGITS),
+            reason=reason,
+            prerequisites=tuple(self.prerequisites),
+            obstacles=tuple(dict.fromkeys(self.obstacles)),
+            alternatives=tuple(dict.fromkeys(self.alternatives))[:MOST_ALTERNATIVES],
+        )
+
     def meant(self, query: Query) -> Thing | None:
-        """Return the thing meant, the nearest of several; note one that nobody has seen."""
+        """Return the thing meant, the nearest of several; note one that has not been seen."""
         world = self.question.world
         found = find(query, world)
         if found:

@@ -25,7 +25,7 @@ class FloorPlanBystander:
 class SceneQuestion:
     """Hold the world as it is known, an image (rows, columns, RGB) or none, and a goal or none.
 
-    `holding` tells which kind of thing each hand holds.
+    `holding` is the kind of thing that each hand holds.
     """
 
     world: Snapshot

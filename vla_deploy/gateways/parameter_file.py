@@ -29,11 +29,15 @@ from vla_deploy.gateways.ros.parameters import (
     SECTIONS,
     handed_over_parameters,
 )
-from vla_deploy.model_servers.servers_file import SERVERS_FILE, read_servers
-from vla_deploy.model_servers.settings import Api, Location, ServerSettings
+from vla_deploy.model_servers.settings import (
+    SERVERS_FILE,
+    Api,
+    Location,
+    ServerSettings,
+    read_servers,
+)
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE, read_overrides
-from vla_deploy.robots.loader import ROBOT_FILE, robot_file
+from vla_deploy.robots.loader import OVERRIDES_FILE, ROBOT_FILE, read_overrides, robot_file
 from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import default_base, free_base

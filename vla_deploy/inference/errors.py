@@ -2,16 +2,16 @@
 
 InferenceError
 ├── ModelUnknown         no model of that name, or a name that is taken: list what there is
-├── ManifestInvalid      model.toml has faults: mend every one that is listed
+├── ManifestInvalid      model.toml has faults: correct every one that is listed
 ├── ModelFileSpoiled     a file is missing, cut off or not what was checked in: add it again
 ├── ModelMismatch        graph, manifest and other files do not fit together: export anew
-├── ProviderUnavailable  nothing here runs it as the profile asks: mend profile or installation
+├── ProviderUnavailable  nothing here runs it as asked: correct the profile or the installation
 ├── MemoryRefused        others hold the memory it needs: take a smaller one, or raise the budget
 ├── AnswerFailed         a language model gives no whole answer: ask another
-├── RunFailed            a run failed, or told what cannot be: a robot goes on without the answer
-├── ImagesInvalid        images or labels to measure with cannot be used: mend the folder
-├── FetchFailed          a published model did not come: mend the network, or add it by hand
-├── ToolMissing          an optional package is not installed: install it
+├── RunFailed            a run failed, or gave what cannot be: a robot goes on without the answer
+├── ImagesInvalid        images or labels to measure with cannot be used: correct the folder
+├── FetchFailed          a published model did not come: repair the network, or add it by hand
+├── PackageMissing       an optional package is not installed: install it
 └── AccuracyLost         quantising costs more accuracy than allowed: nothing was installed
 """
 

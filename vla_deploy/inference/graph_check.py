@@ -26,13 +26,17 @@ def tensors_of(nodes: Any) -> tuple[Tensor, ...]:
     )
 
 
-def graph_faults(session: Any, manifest: Manifest) -> Iterator[str]:
+def graph_faults(
+    inputs: tuple[Tensor, ...],
+    outputs: tuple[Tensor, ...],
+    classes: tuple[str, ...],
+    manifest: Manifest,
+) -> Iterator[str]:
     """Find every difference in inputs, outputs and, where the graph names them, classes."""
-    yield from _tensor_faults("input", tensors_of(session.get_inputs()), manifest.inputs)
-    yield from _tensor_faults("output", tensors_of(session.get_outputs()), manifest.outputs)
-    named = class_names(session)
-    if manifest.detection is not None and named:
-        yield from _class_faults(named, manifest.detection.classes)
+    yield from _tensor_faults("input", inputs, manifest.inputs)
+    yield from _tensor_faults("output", outputs, manifest.outputs)
+    if manifest.detection is not None and classes:
+        yield from _class_faults(classes, manifest.detection.classes)
 
 
 def output_faults(outputs: Mapping[str, NDArray[Any]], manifest: Manifest) -> Iterator[str]:

@@ -85,8 +85,8 @@ class Measured:
     """Declare how good a detector was on images that it had not seen, at its own threshold.
 
     `precision` is the share of its `boxes` that were right, `recall` that of the `things` it found;
-    the counts are None where nobody wrote them down. Where `classes` are told, each class has its
-    own figures, and one that is missing was not measured.
+    the counts are None where they were not written down. Where `classes` are given, each class has
+    its own figures, and one that is missing was not measured.
     """
 
     precision: float
@@ -102,7 +102,7 @@ class DetectionOutputs:
 
     Boxes of one class that overlap by more than `iou_threshold` count as one thing. Boxes below
     `score_threshold`, from `weak_score_threshold` on if there is one, only help to name what other
-    senses show. `measured` is None where nobody has measured it.
+    senses show. `measured` is None where it was not measured.
     """
 
     adapter: str
@@ -135,7 +135,7 @@ class EncoderContext(StrEnum):
 class Calibration:
     """Declare how sure a model's words are: the weights of a logistic function.
 
-    Of the mean log-probability of a token, of the probability that nobody spoke, and of by how much
+    Of the mean log-probability of a token, of the probability of no speech, and of by how much
     the text's compression ratio exceeds 2: such a text repeats itself.
     """
 
@@ -149,8 +149,8 @@ class Calibration:
 class Whisper:
     """Declare a model of the Whisper family in CTranslate2's form.
 
-    `languages` are those that may be understood; `calibration` is None where nobody has measured
-    it.
+    `languages` are those that may be understood; `calibration` is None where it was not
+    measured.
     """
 
     languages: tuple[str, ...]
@@ -185,7 +185,7 @@ class Certainty:
 class Language:
     """Declare a language model in the layout of onnxruntime-genai.
 
-    An answer has `most_tokens` at most. `certainty` is None where nobody has measured it.
+    An answer has `most_tokens` at most. `certainty` is None where it was not measured.
     """
 
     use: LanguageUse
@@ -211,7 +211,8 @@ class KeyWords:
 
     Its output has the score of no word, then of each of `words`, for each moment. The mean score of
     a word over `smoothing_frames` moments is held against one of `thresholds`: a name for each.
-    For `refractory_s` after a word, no other is told. `measured` is None where nobody has measured.
+    For `refractory_s` after a word, no other is reported. `measured` is None where it was not
+    measured.
     """
 
     features: str
@@ -235,7 +236,7 @@ class Manifest:
     role: str
     summary: str
     licence: str
-    card: str
+    card: str = ""
     inputs: tuple[Tensor, ...] = ()
     outputs: tuple[Tensor, ...] = ()
     files: Mapping[Variant, ModelFile] = field(default_factory=dict)

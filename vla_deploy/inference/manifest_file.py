@@ -1,4 +1,4 @@
-"""Read and write `model.toml`, the manifest that lies beside a model's files."""
+"""Read and write `model.toml`, the manifest in the folder of a model's files."""
 
 import json
 import math
@@ -9,27 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.inference.errors import ManifestInvalid
-from vla_deploy.inference.manifest import (
-    Calibration,
-    Certainty,
-    ClassMeasured,
-    DetectionOutputs,
-    EncoderContext,
-    Fit,
-    ImageInput,
-    KeyWords,
-    Language,
-    LanguageUse,
-    Manifest,
-    Measured,
-    ModelFile,
-    SpottingMeasured,
-    Tensor,
-    TensorLayout,
-    Variant,
-    Whisper,
-)
+from vla_deploy.inference.manifest import Manifest
 from vla_deploy.inference.manifest_schema import manifest_faults
+from vla_deploy.runtime.table_schema import build
 
 MANIFEST: Final = "model.toml"
 Document = Mapping[str, Any]
@@ -51,7 +33,7 @@ def read_manifest(folder: Path) -> Manifest:
     faults = tuple(str(fault) for fault in manifest_faults(document, folder.name))
     if faults:
         raise ManifestInvalid(file, faults)
-    return _build(document)
+    return build(Manifest, document)
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -62,87 +44,6 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     """
     text = "\n".join(_lines("", document_of(manifest))).lstrip("\n")
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
-
-
-def _build(document: Document) -> Manifest:
-    detection, whisper = document.get("detection"), document.get("whisper")
-    key_words = document.get("key_words")
-    language = document.get("language")
-    return Manifest(
-        name=document["name"],
-        role=document["role"],
-        summary=document["summary"],
-        licence=document["licence"],
-        card=document.get("card", ""),
-        inputs=_tensors(document.get("inputs", [])),
-        outputs=_tensors(document.get("outputs", [])),
-        files={
-            Variant(name): ModelFile(**file) for name, file in document.get("files", {}).items()
-        },
-        detection=None if detection is None else _detection(detection),
-        key_words=None if key_words is None else _key_words(key_words),
-        parts=tuple(ModelFile(**part) for part in document.get("parts", [])),
-        whisper=None if whisper is None else _whisper(whisper),
-        language=None if language is None else _language(language),
-    )
-
-
-def _tensors(records: list[Document]) -> tuple[Tensor, ...]:
-    return tuple(Tensor(**{**record, "shape": tuple(record["shape"])}) for record in records)
-
-
-def _detection(table: Document) -> DetectionOutputs:
-    image = table["image"]
-    return DetectionOutputs(
-        **{
-            **table,
-            "classes": tuple(table["classes"]),
-            "measured": _measured(table["measured"]) if "measured" in table else None,
-            "image": ImageInput(
-                **{
-                    **image,
-                    "layout": TensorLayout(image["layout"]),
-                    "fit": Fit(image["fit"]),
-                    "mean": tuple(image["mean"]),
-                    "std": tuple(image["std"]),
-                }
-            ),
-        }
-    )
-
-
-def _measured(table: Document) -> Measured:
-    classes = tuple(ClassMeasured(**row) for row in table.get("classes", []))
-    return Measured(**{**table, "classes": classes})
-
-
-def _key_words(table: Document) -> KeyWords:
-    measured = table.get("measured")
-    return KeyWords(
-        **{
-            **table,
-            "words": tuple(table["words"]),
-            "measured": None if measured is None else SpottingMeasured(**measured),
-        }
-    )
-
-
-def _whisper(table: Document) -> Whisper:
-    calibration = table.get("calibration")
-    return Whisper(
-        languages=tuple(table["languages"]),
-        context=EncoderContext(table["context"]),
-        calibration=None if calibration is None else Calibration(**calibration),
-    )
-
-
-def _language(table: Document) -> Language:
-    certainty = table.get("certainty")
-    return Language(
-        use=LanguageUse(table["use"]),
-        most_tokens=table["most_tokens"],
-        certainty=None if certainty is None else Certainty(**certainty),
-    )
 
 
 def document_of(manifest: Manifest) -> dict[str, Any]:

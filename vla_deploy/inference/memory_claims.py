@@ -15,7 +15,6 @@ from platforms import ModelChoice
 from vla_deploy.inference.errors import MemoryRefused
 from vla_deploy.inference.providers import CPU
 from vla_deploy.inference.runtime import available_providers
-from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.ipc import ClaimBook, ClaimRefused, IpcError, SharedSpace
 
@@ -23,6 +22,7 @@ RAM: Final = "ram_mb"
 GPU_MEMORY: Final = "gpu_memory_mb"
 _MB: Final = 1_000_000
 _BYTES_PER_RESIDENT_MB: Final = 2**20
+_PAGE_BYTES: Final = os.sysconf("SC_PAGE_SIZE")
 _numbers = itertools.count(1)
 _log = logging.getLogger(__name__)
 
@@ -122,6 +122,12 @@ class RunMemory:
             yield ClaimBook(space, self._clock)
         finally:
             space.close()
+
+
+def resident_mb() -> float:
+    """Return how much memory this process holds."""
+    resident_pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return resident_pages * _PAGE_BYTES / _BYTES_PER_RESIDENT_MB
 
 
 def _needs(model: StoredModel, choice: ModelChoice) -> dict[str, int]:

@@ -5,19 +5,24 @@ lists a provider that then computes nothing. Both are found here.
 """
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from numpy.typing import NDArray
+
 from platforms import ModelChoice
-from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ProviderUnavailable
-from vla_deploy.inference.file_check import checked_file
+from vla_deploy.inference.errors import (
+    ModelFileSpoiled,
+    ModelMismatch,
+    ProviderUnavailable,
+    RunFailed,
+)
 from vla_deploy.inference.graph_check import class_names, graph_faults, tensors_of
-from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.providers import (
     CPU,
     TENSORRT,
+    Options,
     candidates,
     provider_list,
     variant_for,
@@ -27,11 +32,12 @@ from vla_deploy.inference.runtime import (
     VERSION,
     InferenceSession,
     SessionOptions,
+    available_providers,
 )
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.one_line import one_line
 
-_FATAL_ONLY: Final = 4  # what goes wrong is raised, and told once
+_FATAL_ONLY: Final = 4  # what goes wrong is raised, and reported once
 _HASH_DIGITS: Final = 12
 _ENTRIES: Final[Mapping[str, str]] = {
     # Threads that spin between runs would take the cores that control needs.
@@ -51,63 +57,84 @@ PLAIN_CHOICE: Final = ModelChoice(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Opened:
-    """Hold a session of onnxruntime, what runs it, and where that is not what was asked."""
+class GraphSession:
+    """Hold an open graph, its tensors and what runs it; free dimensions may differ between runs.
 
-    session: Any
-    variant: Variant
-    provider: str
-    notices: tuple[str, ...]
+    `classes` are those that the file itself names, `notices` say where it is not as was asked.
+    """
 
+    def __init__(
+        self, path: Path, session: Any, provider: str, notices: tuple[str, ...] = ()
+    ) -> None:
+        self.path = path
+        self.provider = provider
+        self.notices = notices
+        self.inputs = tensors_of(session.get_inputs())
+        self.outputs = tensors_of(session.get_outputs())
+        self.classes = class_names(session)
+        self._session = session
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Graph:
-    """Hold what an ONNX file itself tells: inputs, outputs, and classes where it names them."""
+    def run(
+        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
+    ) -> dict[str, NDArray[Any]]:
+        """Return the named outputs.
 
-    inputs: tuple[Tensor, ...]
-    outputs: tuple[Tensor, ...]
-    classes: tuple[str, ...]
+        Raises:
+            RunFailed: inputs do not fit, the provider failed, or the session is closed.
+        """
+        if self._session is None:
+            raise RunFailed(f"{self.path}: its session is closed")
+        try:
+            outputs = self._session.run(list(names), dict(inputs))
+        except SESSION_ERRORS as error:
+            shapes = {name: f"{one.dtype}{list(one.shape)}" for name, one in inputs.items()}
+            raise RunFailed(
+                f"{self.path} on {self.provider}, given {shapes}: {one_line(error)}"
+            ) from error
+        return dict(zip(names, outputs, strict=True))
+
+    def close(self) -> None:
+        """Release the memory; a run after that fails."""
+        self._session = None
 
 
 class _Refused(Exception):
     """Say why a provider does not run the model; the next one may."""
 
 
-def open_with_choice(
+def open_model_graph(
     model: StoredModel, choice: ModelChoice, engines: Path, available: tuple[str, ...]
-) -> Opened:
-    """Open a session with the first provider of the choice that really runs the model.
+) -> GraphSession:
+    """Open a model's graph with the first provider of the choice that really runs it.
 
     Raises:
         ModelFileSpoiled: the file is not what was checked in, or no ONNX graph.
         ModelMismatch: the graph is not what the manifest says.
         ProviderUnavailable: no provider that the choice allows runs it.
     """
-    refusals: list[str] = []
-    for provider in candidates(choice):
-        try:
-            opened = _open(model, choice, provider, engines, available)
-        except _Refused as refusal:
-            refusals.append(f"{provider}: {refusal}")
-            continue
-        faults = tuple(graph_faults(opened.session, model.manifest))
+
+    def opened(provider: str) -> GraphSession:
+        variant, note = variant_for(model.manifest, choice.precision, provider)
+        path = model.checked_file(variant)
+        notes = [note] if note else []
+        folder = engines
+        if provider == TENSORRT:
+            digest = model.manifest.files[variant].sha256[:_HASH_DIGITS]
+            folder = engines / model.manifest.name / digest
+            notes += _make_folder(folder)
+        asked = provider_list(provider, choice, available, folder)
+        graph = _open(path, provider, asked, choice)
+        faults = tuple(graph_faults(graph.inputs, graph.outputs, graph.classes, model.manifest))
         if faults:
-            file = model.folder / model.manifest.files[opened.variant].path
-            raise ModelMismatch(str(file), faults)
-        return Opened(
-            session=opened.session,
-            variant=opened.variant,
-            provider=provider,
-            notices=(*refusals, *opened.notices),
-        )
-    raise ProviderUnavailable(_no_provider(model.manifest.name, choice, refusals))
+            raise ModelMismatch(str(path), faults)
+        graph.notices = (*notes, *graph.notices)
+        return graph
+
+    return _first_that_runs(model.manifest.name, choice, candidates(choice), available, opened)
 
 
-def open_graph(
-    path: Path, choice: ModelChoice, available: tuple[str, ...]
-) -> tuple[Any, str, tuple[str, ...]]:
-    """Return a session of one file, its provider, and where that is not what was asked.
+def open_graph(path: Path, choice: ModelChoice = PLAIN_CHOICE) -> GraphSession:
+    """Open one file with the first provider of a choice that really runs it.
 
     TensorRT is passed over: it would build an engine for every length of the tensors.
 
@@ -115,58 +142,67 @@ def open_graph(
         ModelFileSpoiled: it is no ONNX graph that a CPU can run.
         ProviderUnavailable: no provider that the choice allows runs it.
     """
+    providers = [one for one in candidates(choice) if one != TENSORRT]
+    return _first_that_runs(
+        path.parent.name,
+        choice,
+        providers,
+        available_providers(),
+        lambda provider: _open(path, provider, [(provider, {})], choice),
+    )
+
+
+def _first_that_runs(
+    name: str,
+    choice: ModelChoice,
+    providers: Sequence[str],
+    available: tuple[str, ...],
+    opened: Callable[[str], GraphSession],
+) -> GraphSession:
     refusals: list[str] = []
-    for provider in candidates(choice):
-        if provider == TENSORRT:
-            continue
+    for provider in providers:
         if provider not in available:
             refusals.append(
                 f"{provider}: this onnxruntime {VERSION} has only {', '.join(available)}"
             )
             continue
         try:
-            session = _create(path, provider, [(provider, {})], session_options(choice))
-            return session, provider, (*refusals, *_verified(session, provider))
+            graph = opened(provider)
         except _Refused as refusal:
             refusals.append(f"{provider}: {refusal}")
-    raise ProviderUnavailable(_no_provider(path.parent.name, choice, refusals))
-
-
-def read_graph(path: Path) -> Graph:
-    """Return what a file tells of its graph.
-
-    Raises:
-        ModelFileSpoiled: it is no ONNX graph that a CPU can run.
-    """
-    session = _create(path, CPU, [(CPU, {})], session_options(PLAIN_CHOICE))
-    return Graph(
-        inputs=tensors_of(session.get_inputs()),
-        outputs=tensors_of(session.get_outputs()),
-        classes=class_names(session),
+            continue
+        graph.notices = (*refusals, *graph.notices)
+        return graph
+    hint = (
+        "correct the installation of onnxruntime"
+        if choice.cpu_fallback or CPU in choice.providers
+        else "install an onnxruntime that has one of them, or set cpu_fallback in the profile"
     )
+    raise ProviderUnavailable(f"{name}: no provider runs it: {'; '.join(refusals)}; {hint}")
 
 
 def _open(
-    model: StoredModel,
-    choice: ModelChoice,
-    provider: str,
-    engines: Path,
-    available: tuple[str, ...],
-) -> Opened:
-    if provider not in available:
-        raise _Refused(f"this onnxruntime {VERSION} has only {', '.join(available)}")
-    variant, note = variant_for(model.manifest, choice.precision, provider)
-    path = checked_file(model, variant)
-    notices = [note] if note else []
-    if provider == TENSORRT:
-        engines = (
-            engines / model.manifest.name / model.manifest.files[variant].sha256[:_HASH_DIGITS]
+    path: Path, provider: str, asked: list[tuple[str, Options]], choice: ModelChoice
+) -> GraphSession:
+    """Open the session, and check what computes it.
+
+    Raises:
+        ModelFileSpoiled: not even the CPU runs the file.
+        _Refused: the provider does not run it.
+    """
+    try:
+        # Without `enable_fallback`, onnxruntime tries again with other providers by itself.
+        session = InferenceSession(
+            str(path), session_options(choice), providers=asked, enable_fallback=0
         )
-        notices += _make_folder(engines)
-    asked = provider_list(provider, choice, available, engines)
-    session = _create(path, provider, asked, session_options(choice))
-    notices += _verified(session, provider)
-    return Opened(session=session, variant=variant, provider=provider, notices=tuple(notices))
+    except SESSION_ERRORS as error:
+        if provider != CPU:
+            raise _Refused(one_line(error)) from error
+        raise ModelFileSpoiled(
+            f"{path}: onnxruntime {VERSION} cannot load it: {one_line(error)}; "
+            "expected one whole ONNX file; export it again, weights included"
+        ) from error
+    return GraphSession(path, session, provider, _left_to_cpu(session, provider))
 
 
 def session_options(choice: ModelChoice) -> Any:
@@ -182,29 +218,8 @@ def session_options(choice: ModelChoice) -> Any:
     return options
 
 
-def _create(
-    path: Path, provider: str, asked: list[tuple[str, dict[str, str]]], options: Any
-) -> Any:
-    """Create the session.
-
-    Raises:
-        ModelFileSpoiled: not even the CPU runs the file.
-        _Refused: the provider does not run it.
-    """
-    try:
-        # Without this, onnxruntime tries again with other providers by itself.
-        return InferenceSession(str(path), options, providers=asked, enable_fallback=0)
-    except SESSION_ERRORS as error:
-        if provider != CPU:
-            raise _Refused(one_line(error)) from error
-        raise ModelFileSpoiled(
-            f"{path}: onnxruntime {VERSION} cannot load it: {one_line(error)}; "
-            "expected one whole ONNX file; export it again, weights included"
-        ) from error
-
-
-def _verified(session: Any, provider: str) -> list[str]:
-    """Return what the provider leaves to the CPU.
+def _left_to_cpu(session: Any, provider: str) -> tuple[str, ...]:
+    """Return what the provider leaves to the CPU, as a notice.
 
     Raises:
         _Refused: it is not in the session, or computes nothing.
@@ -212,20 +227,20 @@ def _verified(session: Any, provider: str) -> list[str]:
     got = session.get_providers()
     if provider not in got:
         raise _Refused(f"onnxruntime silently took {', '.join(got)} instead")
-    nodes = assigned_nodes(session)
+    nodes = _assigned_nodes(session)
     if provider == CPU or not nodes:
-        return []
+        return ()
     if not nodes[provider]:
         raise _Refused(f"it is listed but computes none of the {nodes.total()} nodes")
     on_cpu = nodes[CPU]
-    return [f"{provider} leaves {on_cpu} of {nodes.total()} nodes to the CPU"] if on_cpu else []
+    return (f"{provider} leaves {on_cpu} of {nodes.total()} nodes to the CPU",) if on_cpu else ()
 
 
-def assigned_nodes(session: Any) -> Counter[str]:
-    """Return how many nodes each provider computes; empty where onnxruntime cannot tell."""
-    if not hasattr(session, "get_provider_graph_assignment_info"):  # since 1.24
-        return Counter()
+def _assigned_nodes(session: Any) -> Counter[str]:
+    """Return how many nodes each provider computes; empty where onnxruntime cannot say."""
     counts: Counter[str] = Counter()
+    if not hasattr(session, "get_provider_graph_assignment_info"):  # since 1.24; boards have older
+        return counts
     for part in session.get_provider_graph_assignment_info():
         counts[part.ep_name] += len(part.get_nodes())
     return counts
@@ -237,12 +252,3 @@ def _make_folder(engines: Path) -> list[str]:
     except OSError as error:
         return [f"engines are built anew at each start, {engines} cannot be made: {error.strerror}"]
     return []
-
-
-def _no_provider(name: str, choice: ModelChoice, refusals: list[str]) -> str:
-    hint = (
-        "correct the installation of onnxruntime"
-        if choice.cpu_fallback or CPU in choice.providers
-        else "install an onnxruntime that has one of them, or set cpu_fallback in the profile"
-    )
-    return f"{name}: no provider runs it: {'; '.join(refusals)}; {hint}"

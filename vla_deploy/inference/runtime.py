@@ -1,6 +1,6 @@
 """Import onnxruntime, here and nowhere else, with its telemetry off.
 
-Its official wheels tell their maker about each session unless this variable is set before the
+Its official wheels report each session to their maker unless this variable is set before the
 library is loaded.
 """
 

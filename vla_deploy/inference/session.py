@@ -1,6 +1,7 @@
 """Run a model: a verified session that is warm, and counts what it costs."""
 
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,30 +13,59 @@ from drivers.latency import LatencyHistogram
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.graph_check import output_faults
-from vla_deploy.inference.manifest import Manifest, Tensor, TensorLayout
-from vla_deploy.inference.memory_claims import MemoryClaim
-from vla_deploy.inference.opening import Opened, open_with_choice
-from vla_deploy.inference.runtime import SESSION_ERRORS, available_providers
-from vla_deploy.inference.stats import SessionStats, resident_mb
+from vla_deploy.inference.manifest import Manifest, Tensor, TensorLayout, Variant
+from vla_deploy.inference.memory_claims import MemoryClaim, resident_mb
+from vla_deploy.inference.opening import GraphSession, open_model_graph
+from vla_deploy.inference.providers import variant_for
+from vla_deploy.inference.runtime import available_providers
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.runtime.one_line import one_line
 
 Arrays = Mapping[str, NDArray[Any]]
 WARM_UP_RUNS: Final = 2  # the first one lays out the memory that the next ones use
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionStats:
+    """Hold what one session is and what it has cost so far.
+
+    `memory_mb` is by how much the process grew while the session was opened and warmed up; other
+    threads of the process may have a share in it. `busy_s` is the time of all runs. `notices`
+    say where it is not as was asked.
+    """
+
+    model: str
+    role: str
+    variant: Variant
+    provider: str
+    threads: int
+    runs: int
+    busy_s: float
+    failures: int
+    p50_s: float
+    p95_s: float
+    max_s: float
+    load_s: float
+    memory_mb: float
+    notices: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the values for a status topic, as JSON takes them."""
+        return {**asdict(self), "notices": list(self.notices)}
 
 
 class ModelSession:
     """Run one model in this thread or another one; one run at a time."""
 
     def __init__(
-        self, model: StoredModel, choice: ModelChoice, opened: Opened, clock: Clock
+        self, model: StoredModel, choice: ModelChoice, graph: GraphSession, clock: Clock
     ) -> None:
         self.model = model
-        self.provider = opened.provider
-        self.variant = opened.variant
-        self.notices = opened.notices
+        self.provider = graph.provider
+        self.variant, _ = variant_for(model.manifest, choice.precision, graph.provider)
+        self.notices = graph.notices
         self._threads = choice.threads
-        self._session: Any = opened.session
+        self._graph = graph
+        self._outputs = [tensor.name for tensor in model.manifest.outputs]
         self._clock = clock
         self._latency = LatencyHistogram()
         self._failures = 0
@@ -51,7 +81,7 @@ class ModelSession:
         """
         started_ns = self._clock.now_ns()
         try:
-            outputs = self._run(inputs)
+            outputs = self._graph.run(self._outputs, inputs)
         except RunFailed:
             self._failures += 1
             raise
@@ -71,7 +101,7 @@ class ModelSession:
             for tensor in manifest.inputs
         }
         for _ in range(runs):
-            faults = tuple(output_faults(self._run(zeros), manifest))
+            faults = tuple(output_faults(self._graph.run(self._outputs, zeros), manifest))
             if faults:
                 raise ModelMismatch(manifest.name, faults)
 
@@ -97,21 +127,8 @@ class ModelSession:
 
     def close(self) -> None:
         """Release the memory; a run after that fails."""
-        self._session = None
+        self._graph.close()
         self.claim.release()
-
-    def _run(self, inputs: Arrays) -> dict[str, NDArray[Any]]:
-        name, session = self.model.manifest.name, self._session
-        if session is None:
-            raise RunFailed(f"{name}: its session is closed")
-        names = [tensor.name for tensor in self.model.manifest.outputs]
-        try:
-            return dict(zip(names, session.run(names, dict(inputs)), strict=True))
-        except SESSION_ERRORS as error:
-            shapes = {key: f"{value.dtype}{list(value.shape)}" for key, value in inputs.items()}
-            raise RunFailed(
-                f"{name} on {self.provider}, given {shapes}: {one_line(error)}"
-            ) from error
 
 
 def open_session(
@@ -125,7 +142,7 @@ def open_session(
     """Open a model as a profile's choice asks, verify what runs it, and warm it up.
 
     `engines` is the folder where providers keep what they build; `available` replaces the
-    providers that this build of onnxruntime tells.
+    providers that this build of onnxruntime has.
 
     Raises:
         ModelFileSpoiled: the file is not what was checked in, or no ONNX graph.
@@ -135,9 +152,8 @@ def open_session(
     """
     before_mb, started_ns = resident_mb(), clock.now_ns()
     providers = available_providers() if available is None else available
-    session = ModelSession(
-        model, choice, open_with_choice(model, choice, engines, providers), clock
-    )
+    graph = open_model_graph(model, choice, engines, providers)
+    session = ModelSession(model, choice, graph, clock)
     session.warm_up()
     session.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     session.memory_mb = max(0.0, resident_mb() - before_mb)

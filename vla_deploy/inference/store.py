@@ -1,14 +1,15 @@
-"""Find models: those that come with the software, and those that a person has added."""
+"""Find models, those of the software and those that a person has added, and check their files."""
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.inference.errors import ModelUnknown
-from vla_deploy.inference.manifest import Manifest
+from vla_deploy.inference.errors import ModelFileSpoiled, ModelUnknown
+from vla_deploy.inference.manifest import Manifest, ModelFile, Variant
 from vla_deploy.inference.manifest_file import MANIFEST, read_manifest
 from vla_deploy.inference.manifest_schema import is_name
 
@@ -21,7 +22,52 @@ class StoredModel:
 
     manifest: Manifest
     folder: Path
-    is_embedded: bool
+    is_embedded: bool = False
+
+    def checked_file(self, variant: Variant) -> Path:
+        """Return the path of a file, whose content is what the manifest says.
+
+        Raises:
+            ModelFileSpoiled: it is missing, cannot be read, or its SHA-256 is another one.
+        """
+        return self._checked(self.manifest.files[variant])
+
+    def check_parts(self) -> None:
+        """Check every part of a model that has several files.
+
+        Raises:
+            ModelFileSpoiled: one is missing, cannot be read, or its SHA-256 is another one.
+        """
+        for part in self.manifest.parts:
+            self._checked(part)
+
+    def only(self, variant: Variant) -> "StoredModel":
+        """Return the model with no file but one, so that every precision takes that."""
+        files = {variant: self.manifest.files[variant]}
+        return replace(self, manifest=replace(self.manifest, files=files))
+
+    def _checked(self, entry: ModelFile) -> Path:
+        path = self.folder / entry.path
+        got = sha256_of(path)
+        if got != entry.sha256:
+            raise ModelFileSpoiled(
+                f"{path}: expected SHA-256 {entry.sha256}, got {got} over {path.stat().st_size} "
+                "bytes; it was cut off or replaced: add the model again"
+            )
+        return path
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises:
+        ModelFileSpoiled: it is missing or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ModelFileSpoiled(f"{path}: {error.strerror or error}") from error
 
 
 class ModelStore:

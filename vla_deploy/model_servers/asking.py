@@ -20,8 +20,8 @@ from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.runtime.deadline import Deadline
 
 Shape = TypeVar("Shape", bound=BaseModel)
-# How servers say that they know no schema; one fails with 500 instead.
-_NO_SUCH_RUNG: Final = frozenset({400, 404, 415, 422, 500, 501})
+# How servers say that they do not know a mode; one fails with 500 instead.
+_MODE_UNKNOWN: Final = frozenset({400, 404, 415, 422, 500, 501})
 _MOST_FAULTS: Final = 8
 # What is wrong with a long answer is seen from its beginning.
 _ECHOED_CHARACTERS: Final = 8_000
@@ -31,18 +31,16 @@ _REPAIRABLE: Final = (AnswerMalformed, AnswerInvalid)
 class StructuredAsker(Generic[Shape]):
     """Ask one server for one shape; it remembers which way of asking the server understands."""
 
-    def __init__(self, server: ModelServer, shape: type[Shape], repairs: int = 1) -> None:
+    def __init__(self, server: ModelServer, shape: type[Shape]) -> None:
         self._server = server
         self._shape = shape
         self._schema = shape.model_json_schema()
-        self._repairs = repairs
-        self._rung = 0
-        self._is_proven = False
+        self._mode: str | None = None
 
     @property
-    def rung(self) -> str:
+    def schema_mode(self) -> str:
         """Return how the server is asked now."""
-        return self._server.format.rungs[self._rung]
+        return self._mode or self._server.format.schema_modes[0]
 
     @property
     def schema_characters(self) -> int:
@@ -50,42 +48,39 @@ class StructuredAsker(Generic[Shape]):
         return len(_in_words(self._schema))
 
     def ask(self, chat: Chat, deadline: Deadline | None = None) -> Shape:
-        """Return the model's answer; one that has the wrong shape is sent back with its faults.
+        """Return the model's answer; one of the wrong shape is sent back once, with its faults.
 
         Raises:
             PrivacyRefused: that may not leave the robot.
-            RequestRefused: the server will not answer this.
+            ServerRefused: the server will not answer this.
             Unavailable: there is no answer now.
             AnswerUnusable: also after the repair, it has the wrong shape.
         """
         ends = deadline or self._server.deadline()
         asked = replace(chat, schema=self._schema, system=_with_schema(chat.system, self._schema))
-        for repairs_left in range(self._repairs, -1, -1):
-            text = self._descend(asked, ends).text
-            try:
-                return self._read(text)
-            except _REPAIRABLE as error:
-                if repairs_left == 0:
-                    raise
-                asked = _repair(asked, text, error)
-        raise AssertionError("the last round returns or raises")
+        text = self._complete(asked, ends).text
+        try:
+            return self._read(text)
+        except _REPAIRABLE as error:
+            asked = _repair(asked, text, error)
+        return self._read(self._complete(asked, ends).text)
 
-    def _descend(self, chat: Chat, ends: Deadline) -> Completion:
-        """Ask on the strictest rung that the server takes; where it takes none, begin anew."""
-        if self._is_proven:
-            return self._server.complete(chat, self.rung, ends)
-        rungs = self._server.format.rungs
-        for number, rung in enumerate(rungs):
-            final = frozenset[int]() if rung == rungs[-1] else _NO_SUCH_RUNG
+    def _complete(self, chat: Chat, ends: Deadline) -> Completion:
+        """Ask in the strictest mode that the server takes, and remember it."""
+        if self._mode is not None:
+            return self._server.complete(chat, self._mode, ends)
+        modes = self._server.format.schema_modes
+        for mode in modes:
+            final = frozenset[int]() if mode == modes[-1] else _MODE_UNKNOWN
             try:
-                completion = self._server.complete(chat, rung, ends, final)
+                completion = self._server.complete(chat, mode, ends, final)
             except (ServerRefused, ServerFailed) as error:
                 if error.status not in final:
                     raise
                 continue
-            self._rung, self._is_proven = number, True
+            self._mode = mode
             return completion
-        raise AssertionError("the last rung returns or raises")
+        raise AssertionError("the last mode returns or raises")
 
     def _read(self, text: str) -> Shape:
         """Take the last object that has the shape: models correct themselves towards the end."""

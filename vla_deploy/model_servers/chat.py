@@ -1,4 +1,4 @@
-"""Hold what is asked of a model, and what it answers, whoever serves it."""
+"""Hold what is asked of a model, and what it answers, in the form common to all servers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +33,6 @@ class Chat:
     system: str = ""
     schema: Mapping[str, Any] | None = None
     schema_name: str = "answer"
-    max_tokens: int | None = None
 
     @property
     def has_images(self) -> bool:
@@ -43,7 +42,7 @@ class Chat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Completion:
-    """Hold a model's answer; counts of tokens are None where the server tells none."""
+    """Hold a model's answer; counts of tokens are None where the server gives none."""
 
     text: str
     tokens_in: int | None

@@ -4,12 +4,12 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from drivers.clock import NS_PER_S
 from vla_deploy.model_servers.asking import StructuredAsker
+from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.server import ModelServer
@@ -56,7 +56,7 @@ class ServerCheck:
 
 
 def check_server(server: ModelServer, ask: bool) -> ServerCheck:
-    """Look at a server; with `ask`, let its model answer a question, about a picture if it may."""
+    """Check a server; with `ask`, ask its model a question too, about a picture if it sees."""
     began_ns = server.clock.now_ns()
     try:
         facts = server.models()
@@ -91,7 +91,7 @@ def _asked(server: ModelServer, found: ServerCheck) -> ServerCheck:
         answers=True,
         sees=colour == "red" if images else None,
         answer_s=_since_s(server, began_ns),
-        asked_by=asker.rung,
+        asked_by=asker.schema_mode,
         detail="" if colour == "red" else f'it says "{colour}" where red is right',
     )
 
@@ -101,7 +101,4 @@ def _since_s(server: ModelServer, began_ns: int) -> float:
 
 
 def _red_card() -> bytes:
-    card = np.empty((_CARD_PX, _CARD_PX, 3), np.uint8)
-    card[:] = _RED_RGB[::-1]
-    _, jpeg = cv2.imencode(".jpg", card)
-    return jpeg.tobytes()
+    return small_jpeg(np.full((_CARD_PX, _CARD_PX, 3), _RED_RGB, np.uint8))

@@ -1,15 +1,15 @@
 """Group the errors of model servers by what the caller can do about them.
 
 ModelServerError
-├── ServersFileInvalid     servers.toml has faults: mend every one that is listed
+├── ServersFileInvalid     servers.toml has faults: correct every one that is listed
 ├── ServerUnknown          no server of that name is declared: name another one
 ├── CredentialMissing      the key is not there, or is no key: provide it
 ├── PrivacyRefused         may not leave the robot: allow it in servers.toml, or ask a local one
-├── RequestRefused         the server will not answer this: mend model, key, address or request
+├── ServerRefused          the server will not answer this: correct model, key, address or request
 ├── Unavailable            there is no answer now: do without it, or ask another server
 │   ├── Busy               too many calls wait already
 │   ├── CircuitOpen        it has failed too often: it is left alone for a while
-│   ├── Unreachable        no connection, or it broke
+│   ├── ServerUnreachable  no connection, or it broke
 │   ├── TimedOut           the answer would come too late
 │   └── ServerFailed       it says that it cannot now, also after all retries
 └── AnswerUnusable         an answer came that is none: do without it

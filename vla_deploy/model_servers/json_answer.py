@@ -56,7 +56,7 @@ def _decode(text: str, start: int) -> tuple[dict[str, Any] | None, int]:
     try:
         value, end = _DECODER.raw_decode(text, start)
     except json.JSONDecodeError as error:
-        # A string that never ends holds all that follows; the error tells where it begins.
+        # A string that never ends holds all that follows; the error says where it begins.
         is_endless = error.msg.startswith("Unterminated string")
         return None, len(text) if is_endless else max(error.pos, start + 1)
     except (ValueError, RecursionError):  # a number too long, NaN, or nested too deeply

@@ -5,13 +5,17 @@ from collections.abc import Callable
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.model_servers.calls.admission import Admission
-from vla_deploy.model_servers.calls.backoff import Backoff, may_pass
-from vla_deploy.model_servers.calls.breaker import BreakerState, CircuitBreaker
-from vla_deploy.model_servers.calls.exchange import Exchange
+from vla_deploy.model_servers.calls.exchange import Exchange, document_of
+from vla_deploy.model_servers.calls.limits import (
+    Admission,
+    Backoff,
+    BreakerState,
+    CallRate,
+    CircuitBreaker,
+    bounded_s,
+    may_pass,
+)
 from vla_deploy.model_servers.calls.privacy import check_privacy
-from vla_deploy.model_servers.calls.rate import CallRate
-from vla_deploy.model_servers.calls.replies import document_of
 from vla_deploy.model_servers.chat import Chat, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import (
@@ -19,11 +23,10 @@ from vla_deploy.model_servers.errors import (
     ModelServerError,
     ServerFailed,
     ServerRefused,
-    TimedOut,
     Unavailable,
 )
+from vla_deploy.model_servers.formats import FORMATS
 from vla_deploy.model_servers.formats.base import Format, Json, ModelFacts, WireRequest
-from vla_deploy.model_servers.formats.table import FORMATS
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.runtime.deadline import Deadline
@@ -32,7 +35,7 @@ from vla_deploy.runtime.deadline import Deadline
 class ModelServer:
     """Hold one declared server and how it has been doing; threads may share it.
 
-    Calls block: ask from beside a process' steps, as `vla_deploy.runtime.executors` runs work.
+    Calls block: make them from an executor of `vla_deploy.runtime.executors`, not from a step.
     """
 
     def __init__(
@@ -66,20 +69,20 @@ class ModelServer:
     def complete(
         self,
         chat: Chat,
-        rung: str | None = None,
+        mode: str | None = None,
         deadline: Deadline | None = None,
         final: frozenset[int] = frozenset(),
     ) -> Completion:
         """Ask the model once, and again while that may help and time is left.
 
-        `rung` is one of `format.rungs`, the strictest by default. `final` are statuses of HTTP that
-        are taken for an answer to this rung, and not tried again.
+        `mode` is one of `format.schema_modes`, the strictest by default. `final` are statuses of
+        HTTP that are taken for an answer to this mode, and not tried again.
 
         Raises:
             PrivacyRefused: that may not leave the robot, or the server is not where it should be.
-            RequestRefused: the server will not answer this.
+            ServerRefused: the server will not answer this.
             Unavailable: there is no answer now.
-            AnswerUnusable: there is one that is none.
+            AnswerUnusable: the answer cannot be used.
         """
         ends = deadline or self.deadline()
         began_ns = self.clock.now_ns()
@@ -87,7 +90,7 @@ class ModelServer:
             check_privacy(self.name, self.settings, chat)
             if chat.has_images and not self.settings.vision:
                 raise ServerRefused(f"server {self.name} takes no images; it has no vision = true")
-            request = self.format.request(self.settings, chat, rung or self.format.rungs[0])
+            request = self.format.request(self.settings, chat, mode or self.format.schema_modes[0])
             self._rate.take()
             with self._admission.place(ends):
                 reply = self._send_patiently(request, ends, final)
@@ -99,16 +102,16 @@ class ModelServer:
         return completion
 
     def models(self) -> ModelFacts:
-        """Ask what the server tells of its models; no text or image of the robot is in it.
+        """Ask what the server says of its models; no text or image of the robot is in it.
 
         Raises:
-            RequestRefused: the server does not tell.
+            ServerRefused: the server does not say.
             Unavailable: there is no answer now.
-            AnswerUnusable: there is one that is none.
+            AnswerUnusable: the answer cannot be used.
         """
         ends = self.deadline()
         first, *others = self.format.listing(self.settings)
-        replies = [self._told(first, ends), *(self._told(one, ends) for one in others)]
+        replies = [self._known(first, ends), *(self._known(one, ends) for one in others)]
         return self.format.facts(self.settings, tuple(replies))
 
     def document(self) -> dict[str, Any]:
@@ -124,7 +127,7 @@ class ModelServer:
             **self._metrics.document(),
         }
 
-    def _told(self, request: WireRequest, ends: Deadline) -> Json | None:
+    def _known(self, request: WireRequest, ends: Deadline) -> Json | None:
         """Return a reply about models; None where the server knows nothing of what is asked."""
         try:
             return self._send(request, ends)
@@ -152,9 +155,7 @@ class ModelServer:
         return closed and may_pass(error) and failures < self.settings.max_attempts
 
     def _send_if_admitted(self, request: WireRequest, ends: Deadline) -> Json:
-        self._check_time(
-            ends
-        )  # before it is admitted: what is not sent tells nothing of the server
+        bounded_s(ends)  # before it is admitted: what is not sent says nothing about the server
         self._breaker.admit()
         try:
             reply = self._send(request, ends)
@@ -173,11 +174,6 @@ class ModelServer:
         self._breaker.succeeded()
         return reply
 
-    def _check_time(self, ends: Deadline) -> None:
-        if ends.left_s <= 0.0:
-            raise TimedOut(f"no time left of {ends.given_s:g} s")
-
     def _send(self, request: WireRequest, ends: Deadline) -> Json:
-        self._check_time(ends)
         reply = self._exchange.send(request, self.format.headers(self._key), ends)
         return document_of(reply, self.settings, self._key)

@@ -1,12 +1,19 @@
-"""Describe one model server as `servers.toml` declares it."""
+"""Declare model servers as a person does in `servers.toml`, and read that file."""
 
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Final, Self
+from typing import Annotated, Any, Final, Self
 from urllib.parse import SplitResult, urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from vla_deploy.model_servers.errors import ServersFileInvalid
+
+SERVERS_FILE: Final = "servers.toml"
+_TABLE: Final = "servers"
 NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
 _CREDENTIAL_PATTERN: Final = r"^[a-z][a-z0-9_]{0,63}$"
 
@@ -104,3 +111,50 @@ def _split(url: str) -> SplitResult | None:
         return parts if parts.port != 0 else None
     except ValueError:  # a port that is no number, brackets that do not close
         return None
+
+
+def read_servers(file: Path) -> dict[str, ServerSettings]:
+    """Return the declared servers by name; none where the file is missing.
+
+    Raises:
+        ServersFileInvalid: it is no TOML, or has faults; all of them are listed.
+    """
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ServersFileInvalid((f"{file}: expected a TOML document: {error}",)) from error
+    servers: dict[str, ServerSettings] = {}
+    faults = [f"{file}: {key}: unknown, expected {_TABLE}" for key in document if key != _TABLE]
+    tables = document.get(_TABLE, {})
+    if not isinstance(tables, Mapping):
+        faults.append(f"{file}: {_TABLE}: expected tables [{_TABLE}.NAME], got {tables!r:.60}")
+        tables = {}
+    for name, table in tables.items():
+        where = f"{file}: {_TABLE}.{name}"
+        try:
+            servers[name] = ServerSettings.model_validate(table)
+        except ValidationError as error:
+            faults += _faults(where, error)
+        if not re.fullmatch(NAME_PATTERN, name):
+            faults.append(f"{where}: expected a name of small letters, digits, _ and -")
+    if faults:
+        raise ServersFileInvalid(tuple(faults))
+    return servers
+
+
+def _faults(where: str, error: ValidationError) -> Iterator[str]:
+    """Say each fault; what was given is shown unless it may hold a key."""
+    for fault in error.errors(include_url=False):
+        place = ".".join([where, *map(str, fault["loc"])])
+        text = fault["msg"].removeprefix("Value error, ")
+        yield f"{place}: {text}{_given(fault)}"
+
+
+def _given(fault: Any) -> str:
+    given = fault["input"]
+    may_hold_a_key = fault["loc"] and fault["loc"][0] in ("url", "credential")
+    if fault["type"] in ("missing", "extra_forbidden") or may_hold_a_key:
+        return ""
+    return "" if isinstance(given, Mapping) else f", got {given!r:.60}"

@@ -11,8 +11,7 @@ from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import ServerUnknown
 from vla_deploy.model_servers.server import ModelServer
-from vla_deploy.model_servers.servers_file import SERVERS_FILE, read_servers
-from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.model_servers.settings import SERVERS_FILE, ServerSettings, read_servers
 from vla_deploy.runtime.state_dir import config_dir_of
 
 

@@ -1,7 +1,7 @@
 """Fetch files of a published model from the Hugging Face hub: only ever when a person asks for it.
 
-The hub tells the commit, and the hash of each file in it; every file is fetched at that commit, and
-what does not have its hash is refused. Nothing about this robot is sent but the request.
+The hub states the commit, and the hash of each file in it; every file is fetched at that commit,
+and one that does not have its hash is refused. Nothing about this robot is sent but the request.
 """
 
 import hashlib
@@ -9,13 +9,12 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelFileSpoiled, PackageMissing
-from vla_deploy.inference.file_check import sha256_of
+from vla_deploy.inference.store import sha256_of
 from vla_deploy.runtime.one_line import one_line
 
 TIMEOUT_S: Final = 20.0
@@ -24,35 +23,28 @@ _BYTES_PER_GB: Final = 1e9
 _COPIES: Final = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HubPlace:
-    """Name a repository of the hub, a branch, tag or commit of it, and who serves it.
-
-    `by_hand` is the command that adds the files without the hub.
-    """
-
-    repository: str
-    by_hand: str
-    revision: str = "main"
-    endpoint: str | None = None
-
-
 class HubCommit:
-    """Hold what the hub tells of one commit of a repository, and fetch files of it."""
+    """Hold what the hub says of one commit of a repository, and fetch files of it."""
 
-    def __init__(self, place: HubPlace) -> None:
-        """Ask the hub.
+    def __init__(
+        self, repository: str, *, revision: str, endpoint: str | None, by_hand: str
+    ) -> None:
+        """Ask the hub, or the server at `endpoint`, for a branch, tag or commit of a repository.
+
+        `by_hand` is the command that adds the files without the hub.
 
         Raises:
             FetchFailed: it cannot be reached, or does not have the repository.
-            ToolMissing: its client is not installed.
+            PackageMissing: its client is not installed.
         """
-        self._place = place
+        self._repository = repository
+        self._endpoint = endpoint
+        self._by_hand = by_hand
         self._hub = _client()
         with self._translated():
-            self._info = self._hub.HfApi(endpoint=place.endpoint, token=False).model_info(
-                place.repository,
-                revision=place.revision,
+            self._info = self._hub.HfApi(endpoint=endpoint, token=False).model_info(
+                repository,
+                revision=revision,
                 files_metadata=True,
                 timeout=TIMEOUT_S,
             )
@@ -69,8 +61,8 @@ class HubCommit:
         card = self._info.card_data
         return str(card.get("license") or "") if card is not None else ""
 
-    def fetch(self, paths: Sequence[str], folder: Path, tell: Callable[[str], None]) -> None:
-        """Fetch files into a folder, at their paths, and check them; `tell` gets a line for each.
+    def fetch(self, paths: Sequence[str], folder: Path, report: Callable[[str], None]) -> None:
+        """Fetch files into a folder, at their paths, and check them; `report` gets a line for each.
 
         Raises:
             FetchFailed: one does not come, or the disk has no room for them.
@@ -79,14 +71,14 @@ class HubCommit:
         self._check_room(sum(self._files[path].size or 0 for path in paths), folder)
         for path in paths:
             file = self._files[path]
-            tell(f"fetching {path}, {(file.size or 0) / _BYTES_PER_GB:.3f} GB")
+            report(f"fetching {path}, {(file.size or 0) / _BYTES_PER_GB:.3f} GB")
             with self._translated():
                 self._hub.hf_hub_download(
-                    self._place.repository,
+                    self._repository,
                     path,
                     revision=self._info.sha,
                     local_dir=folder,
-                    endpoint=self._place.endpoint,
+                    endpoint=self._endpoint,
                     token=False,
                 )
             _check(folder / path, file)
@@ -95,7 +87,7 @@ class HubCommit:
         needed_bytes, free_bytes = _COPIES * size_bytes, shutil.disk_usage(folder).free
         if needed_bytes > free_bytes:
             raise FetchFailed(
-                f"{self._place.repository}: its files need {needed_bytes / _BYTES_PER_GB:.1f} GB "
+                f"{self._repository}: its files need {needed_bytes / _BYTES_PER_GB:.1f} GB "
                 f"of {folder} while they are tried out, {free_bytes / _BYTES_PER_GB:.1f} GB are "
                 "free; make room, or choose a smaller model"
             )
@@ -106,9 +98,9 @@ class HubCommit:
             yield
         except (self._hub.errors.HTTPError, OSError, ValueError) as error:
             raise FetchFailed(
-                f"{self._place.repository}: the hub was not reached or does not have it: "
+                f"{self._repository}: the hub was not reached or does not have it: "
                 f"{one_line(error)[:300]}; this computer needs a way to huggingface.co for this "
-                f"once; or copy the files here by hand, then: {self._place.by_hand}"
+                f"once; or copy the files here by hand, then: {self._by_hand}"
             ) from error
 
 

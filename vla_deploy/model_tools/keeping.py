@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from vla_deploy.inference.errors import ModelUnknown
-from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Whisper
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
-from vla_deploy.inference.store import ModelStore, StoredModel
+from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
 
 CARD: Final = "card.md"
 T = TypeVar("T")
@@ -96,8 +95,8 @@ def keep_tried(
             shutil.copyfile(card, draft / CARD)
         write_manifest(draft, manifest)
         read_manifest(draft)
-        told = try_out(StoredModel(manifest=manifest, folder=draft, is_embedded=False))
+        trial = try_out(StoredModel(manifest=manifest, folder=draft))
         folder = store.install(draft)
     finally:
         store.abandon(draft)
-    return StoredModel(manifest=manifest, folder=folder, is_embedded=False), told
+    return StoredModel(manifest=manifest, folder=folder), trial

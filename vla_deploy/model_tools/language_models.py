@@ -16,10 +16,10 @@ from vla_deploy.inference.language_model import (
     open_language_model,
 )
 from vla_deploy.inference.language_model.model_folder import CONFIG, TEMPLATE, read_genai_config
-from vla_deploy.inference.language_schema import GENAI_CONFIG, PLANNER, TOKENIZER
 from vla_deploy.inference.manifest import Language, LanguageUse, Manifest
+from vla_deploy.inference.manifest_schema import GENAI_CONFIG, PLANNER, TOKENIZER
+from vla_deploy.inference.memory_claims import resident_mb
 from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import ModelStore, StoredModel
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
 from vla_deploy.runtime.deadline import Deadline

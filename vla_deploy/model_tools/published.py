@@ -9,10 +9,9 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelUnknown
-from vla_deploy.inference.language_schema import GENAI_CONFIG
+from vla_deploy.inference.manifest_schema import GENAI_CONFIG, WHISPER_PARTS
 from vla_deploy.inference.store import ModelStore
-from vla_deploy.inference.whisper_schema import NEEDED_PARTS
-from vla_deploy.model_tools.hub import HubCommit, HubPlace
+from vla_deploy.model_tools.hub import HubCommit
 from vla_deploy.model_tools.language_models import is_part
 from vla_deploy.model_tools.whispers import PARTS
 
@@ -37,7 +36,7 @@ class ModelFormat:
 WHISPER: Final = ModelFormat(
     name="CTranslate2",
     option="--whisper",
-    landmark=NEEDED_PARTS[0],
+    landmark=WHISPER_PARTS[0],
     is_part=PARTS.__contains__,
 )
 LANGUAGE: Final = ModelFormat(
@@ -151,38 +150,23 @@ def fetched(
     report: Callable[[str], None],
     endpoint: str | None = None,
 ) -> Iterator[tuple[Path, str]]:
-    """Fetch a model for a `with` block, as `fetch` does, into a folder that goes afterwards.
+    """Fetch a model's files for a `with` block, and check them; `report` gets a line for each.
 
-    The folder is next to the added models: a folder in memory has no room for gigabytes.
-    """
-    store.user.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=store.user) as directory:
-        yield fetch(published, Path(directory), report, endpoint)
-
-
-def fetch(
-    published: PublishedModel,
-    folder: Path,
-    tell: Callable[[str], None],
-    endpoint: str | None = None,
-) -> tuple[Path, str]:
-    """Fetch a model's files into an empty folder, and check them; `tell` gets a line for each.
-
-    Returns the folder that they lie in, and the licence as the table or the hub states it.
+    Yields the folder that they lie in, and the licence as the table or the hub states it. The
+    folder goes afterwards; it is next to the added models, as one in memory has no room for
+    gigabytes.
 
     Raises:
         FetchFailed: the hub cannot be reached, or has no such model there, or the disk is full.
         ModelFileSpoiled: a file is not what the hub says it is.
-        ToolMissing: the hub's client is not installed.
+        PackageMissing: the hub's client is not installed.
     """
     form = published.format
     commit = HubCommit(
-        HubPlace(
-            repository=published.repository,
-            by_hand=f"vla-deploy models add NAME {form.option} FOLDER",
-            revision=published.revision,
-            endpoint=endpoint,
-        )
+        published.repository,
+        revision=published.revision,
+        endpoint=endpoint,
+        by_hand=f"vla-deploy models add NAME {form.option} FOLDER",
     )
     there = PurePosixPath(published.folder)
     files = [PurePosixPath(path) for path in commit.paths]
@@ -193,5 +177,8 @@ def fetch(
             f"{published}: no {form.landmark} lies there; expected the layout of {form.name}, "
             f"which is in: {models or 'no folder of it'}"
         )
-    commit.fetch(wanted, folder, tell)
-    return folder / published.folder, published.licence or commit.licence or "not stated"
+    store.user.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=store.user) as directory:
+        folder = Path(directory)
+        commit.fetch(wanted, folder, report)
+        yield folder / published.folder, published.licence or commit.licence or "not stated"

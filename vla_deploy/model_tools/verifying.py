@@ -6,15 +6,13 @@ from functools import partial
 
 from platforms import ModelChoice, Profile
 from vla_deploy.inference.errors import InferenceError
-from vla_deploy.inference.file_check import check_parts, checked_file
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.model_tools import language_models, whispers
-from vla_deploy.model_tools.detectors.trial import only, try_out
-from vla_deploy.perception.detectors.detector import Detector
+from vla_deploy.model_tools.detectors.adding import try_out
 from vla_deploy.speech.errors import SpeechError
 
 
@@ -58,18 +56,18 @@ def _finding(model: str, check: str, act: Callable[[], str]) -> ModelFinding:
 
 
 def _all_parts(model: StoredModel) -> str:
-    check_parts(model)
+    model.check_parts()
     return f"{len(model.manifest.parts)} files, SHA-256 as in the manifest"
 
 
 def _whole(model: StoredModel, variant: Variant) -> str:
-    return f"{checked_file(model, variant).name}, SHA-256 as in the manifest"
+    return f"{model.checked_file(variant).name}, SHA-256 as in the manifest"
 
 
 def _trial(shelf: ModelShelf, model: StoredModel, variant: Variant) -> str:
     """Run one file on the CPU, whatever it is made for."""
     session = open_session(
-        only(model, variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
+        model.only(variant), PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock
     )
     return _tried(session)
 
@@ -79,8 +77,8 @@ def _as_profile(shelf: ModelShelf, model: StoredModel, profile: Profile) -> str:
     if model.manifest.parts:
         return _parts_tried(shelf, model, choice)
     session = open_session(model, choice, engines=shelf.engines, clock=shelf.clock)
-    told = "; ".join((f"{session.variant} on {session.provider}", *session.notices))
-    return f"{told}; {_tried(session)}"
+    opened = f"{session.variant} on {session.provider}"
+    return "; ".join((opened, *session.notices, _tried(session)))
 
 
 def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | None) -> str:
@@ -95,9 +93,7 @@ def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | No
 
 
 def _tried(session: ModelSession) -> str:
-    try:
-        if session.model.manifest.detection is None:
-            return f"warm in {session.load_s:.2g} s"
-        return str(try_out(Detector(session)))
-    finally:
-        session.close()
+    if session.model.manifest.detection is not None:
+        return str(try_out(session))
+    session.close()
+    return f"warm in {session.load_s:.2g} s"

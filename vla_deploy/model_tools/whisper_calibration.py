@@ -1,8 +1,9 @@
 """Learn how sure a Whisper's words are, from recordings whose words are known.
 
-A logistic function is fitted to what the model tells of each reading and to whether its words were
-right; other talk, of which nothing should be understood, counts as wrong. A weak pull towards the
-weights of an unmeasured model keeps a few recordings from making it sure of everything.
+A logistic function is fitted to the figures that the model gives for each reading and to whether
+its words were right; other talk, of which nothing should be understood, counts as wrong. A weak
+pull towards the weights of an unmeasured model keeps a few recordings from making it sure of
+everything.
 """
 
 import dataclasses
@@ -46,7 +47,7 @@ class Calibrated:
 
 
 def known_recordings(folder: Path) -> list[KnownSound]:
-    """Return the WAV files of a folder, each with the words of the text file beside it.
+    """Return the WAV files of a folder, each with the words of the text file of its name.
 
     Raises:
         RecordingsInvalid: there are too few, or one has no text file.

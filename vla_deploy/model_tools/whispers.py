@@ -13,15 +13,15 @@ from platforms import ModelChoice
 from vla_deploy.inference import opening
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.manifest import Manifest, Whisper
+from vla_deploy.inference.manifest_schema import SPEECH_TO_TEXT, VOCABULARIES, WHISPER_PARTS
 from vla_deploy.inference.store import ModelStore, StoredModel
-from vla_deploy.inference.whisper_schema import NEEDED_PARTS, SPEECH_TO_TEXT, VOCABULARIES
 from vla_deploy.model_tools.keeping import FolderSource, keep_folder, require_free
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 from vla_deploy.speech.recording import sound_of
 from vla_deploy.speech.sound import RATE_HZ, Sound
 from vla_deploy.speech.transcript import Transcript
 
-PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, "preprocessor_config.json")
+PARTS: Final = (*WHISPER_PARTS, *VOCABULARIES, "preprocessor_config.json")
 PLAIN_CHOICE: Final = dataclasses.replace(opening.PLAIN_CHOICE, precision="int8")
 """To look at a model by itself, as no profile is needed for."""
 _LENGTHS_S: Final = (1.0, 3.0, 6.0)
@@ -60,7 +60,7 @@ def describe(source: WhisperSource) -> Manifest:
         ModelFileSpoiled: one of those that are needed is missing, or cannot be read.
     """
     there = [name for name in PARTS if (source.folder / name).is_file()]
-    missing = [name for name in NEEDED_PARTS if name not in there]
+    missing = [name for name in WHISPER_PARTS if name not in there]
     missing += [] if any(name in there for name in VOCABULARIES) else [VOCABULARIES[0]]
     if missing:
         raise ModelFileSpoiled(

@@ -9,7 +9,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.robots.schema import RobotFileFault, is_number
+from vla_deploy.runtime.table_schema import TableFault, is_number
 
 Document = Mapping[str, Any]
 DEVICES = (
@@ -43,10 +43,10 @@ def texts(record: Document, key: str) -> list[str]:
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
 
 
-def unknown_name(key: str, name: str, kind: str, known: Collection[str]) -> RobotFileFault:
+def unknown_name(key: str, name: str, kind: str, known: Collection[str]) -> TableFault:
     """Return the fault of a name that nothing bears, with the names there are."""
     listed = ", ".join(sorted(known)) or "there is none"
-    return RobotFileFault(key=key, got=repr(name), expected=f"{kind}: {listed}")
+    return TableFault(key=key, got=repr(name), expected=f"{kind}: {listed}")
 
 
 def _servos(document: Document) -> list[Document]:
@@ -63,19 +63,19 @@ def _joints(records: list[Document]) -> set[str]:
 
 def _repeats(
     values: Iterator[tuple[str, object]] | list[tuple[str, object]],
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     first: dict[object, str] = {}
     for key, value in values:
         if not isinstance(value, str | int):
             continue
         if value in first:
-            yield RobotFileFault(
+            yield TableFault(
                 key=key, got=repr(value), expected=f"a value not used by {first[value]}"
             )
         first.setdefault(value, key)
 
 
-def nothing_used_twice(document: Document) -> Iterator[RobotFileFault]:
+def nothing_used_twice(document: Document) -> Iterator[TableFault]:
     """Servo ids, node ids, driven joints and device names are unique."""
     servos = [(f"servo_bus.servos[{i}]", row) for i, row in enumerate(_servos(document))]
     drives = [(f"can_bus.drives[{i}]", row) for i, row in enumerate(_drives(document))]
@@ -88,7 +88,7 @@ def nothing_used_twice(document: Document) -> Iterator[RobotFileFault]:
 NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
 
 
-def drives_fit_protocol(document: Document) -> Iterator[RobotFileFault]:
+def drives_fit_protocol(document: Document) -> Iterator[TableFault]:
     """Node ids are those of the protocol, and ODrive axes have their list of endpoints."""
     bus = table(document, "can_bus")
     protocol = bus.get("protocol", "cia402")
@@ -98,20 +98,20 @@ def drives_fit_protocol(document: Document) -> Iterator[RobotFileFault]:
     for i, row in enumerate(_drives(document)):
         node_id = row.get("node_id")
         if isinstance(node_id, int) and node_id not in allowed:
-            yield RobotFileFault(
+            yield TableFault(
                 key=f"can_bus.drives[{i}].node_id",
                 got=repr(node_id),
                 expected=f"an integer in {allowed[0]}..{allowed[-1]}, as {protocol} has them",
             )
     if protocol == "odrive" and "endpoints" not in bus:
-        yield RobotFileFault(
+        yield TableFault(
             key="can_bus.endpoints",
             got="nothing",
             expected="the flat_endpoints.json of the axes' firmware: it arms their watchdog",
         )
 
 
-def models_are_listed(document: Document) -> Iterator[RobotFileFault]:
+def models_are_listed(document: Document) -> Iterator[TableFault]:
     """Each servo's model has its datasheet figures."""
     models = subtables(document, "servo_models")
     for i, row in enumerate(_servos(document)):
@@ -121,24 +121,20 @@ def models_are_listed(document: Document) -> Iterator[RobotFileFault]:
             yield unknown_name(key, model, "a key of servo_models", models)
 
 
-def limits_match_servos(document: Document) -> Iterator[RobotFileFault]:
+def limits_match_servos(document: Document) -> Iterator[TableFault]:
     """Each servo joint has limits, the lower below the upper."""
     limits, joints = subtables(document, "limits"), _joints(_servos(document))
     for joint in sorted(joints - limits.keys()):
-        yield RobotFileFault(
-            key=f"limits.{joint}", got="nothing", expected="a table: it has a servo"
-        )
+        yield TableFault(key=f"limits.{joint}", got="nothing", expected="a table: it has a servo")
     for joint, row in limits.items():
         low, high = row.get("min"), row.get("max")
         if joint not in joints:
             yield unknown_name(f"limits.{joint}", joint, "a servo's joint", joints)
         elif is_number(low) and is_number(high) and not low < high:
-            yield RobotFileFault(
-                key=f"limits.{joint}.min", got=repr(low), expected=f"below max {high}"
-            )
+            yield TableFault(key=f"limits.{joint}.min", got=repr(low), expected=f"below max {high}")
 
 
-def servos_reach(document: Document) -> Iterator[RobotFileFault]:
+def servos_reach(document: Document) -> Iterator[TableFault]:
     """A servo's one turn covers its joint's limits, its no-load speed the velocity limit."""
     limits, models = table(document, "limits"), table(document, "servo_models")
     for row in _servos(document):
@@ -150,19 +146,15 @@ def servos_reach(document: Document) -> Iterator[RobotFileFault]:
             value = bounds.get(end)
             if is_number(value) and abs(value - offset) > pi * travel:
                 expected = f"within {pi * travel:.4g} of the servo's offset {offset}"
-                yield RobotFileFault(
-                    key=f"limits.{joint}.{end}", got=repr(value), expected=expected
-                )
+                yield TableFault(key=f"limits.{joint}.{end}", got=repr(value), expected=expected)
         velocity, speed = bounds.get("velocity"), table(models, row.get("model"))
         no_load = speed.get("no_load_speed_rad_s")
         if is_number(velocity) and is_number(no_load) and velocity > no_load * travel:
             expected = f"at most the servo's no-load speed {no_load * travel:.4g}"
-            yield RobotFileFault(
-                key=f"limits.{joint}.velocity", got=repr(velocity), expected=expected
-            )
+            yield TableFault(key=f"limits.{joint}.velocity", got=repr(velocity), expected=expected)
 
 
-def groups_cover_joints(document: Document) -> Iterator[RobotFileFault]:
+def groups_cover_joints(document: Document) -> Iterator[TableFault]:
     """Each driven joint is in exactly one group."""
     driven = _joints(_servos(document)) | _joints(_drives(document))
     placed: list[tuple[str, object]] = [
@@ -175,12 +167,12 @@ def groups_cover_joints(document: Document) -> Iterator[RobotFileFault]:
         if joint not in driven:
             yield unknown_name(key, str(joint), "a driven joint", driven)
     for joint in sorted(driven - {joint for _, joint in placed}):
-        yield RobotFileFault(
+        yield TableFault(
             key="groups", got=f"no group with {joint}", expected="each joint in a group"
         )
 
 
-def hands_name_groups(document: Document) -> Iterator[RobotFileFault]:
+def hands_name_groups(document: Document) -> Iterator[TableFault]:
     """A hand names two groups; that of the gripper has one joint."""
     groups = subtables(document, "groups")
     for name, row in subtables(document, "hands").items():
@@ -191,18 +183,16 @@ def hands_name_groups(document: Document) -> Iterator[RobotFileFault]:
         joints = texts(table(groups, row.get("gripper")), "joints")
         if len(joints) > 1:
             got = f"a group of {len(joints)} joints"
-            yield RobotFileFault(
-                key=f"hands.{name}.gripper", got=got, expected="a group of one joint"
-            )
+            yield TableFault(key=f"hands.{name}.gripper", got=got, expected="a group of one joint")
 
 
-def poses_are_reachable(document: Document) -> Iterator[RobotFileFault]:
+def poses_are_reachable(document: Document) -> Iterator[TableFault]:
     """A pose names servo joints and stays inside their limits."""
     limits, joints = table(document, "limits"), _joints(_servos(document))
     for name, targets in table(document, "poses").items():
         if not isinstance(targets, dict):
             key = f"poses.{name}"
-            yield RobotFileFault(key=key, got=repr(targets), expected="a table of joint = position")
+            yield TableFault(key=key, got=repr(targets), expected="a table of joint = position")
             continue
         for joint, value in targets.items():
             yield from _pose_target(f"poses.{name}.{joint}", joint, value, joints, limits)
@@ -210,18 +200,18 @@ def poses_are_reachable(document: Document) -> Iterator[RobotFileFault]:
 
 def _pose_target(
     key: str, joint: str, value: object, joints: set[str], limits: Document
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     bounds = table(limits, joint)
     low, high = bounds.get("min"), bounds.get("max")
     if joint not in joints:
         yield unknown_name(key, joint, "a servo's joint", joints)
     elif not is_number(value):
-        yield RobotFileFault(key=key, got=repr(value), expected="a number")
+        yield TableFault(key=key, got=repr(value), expected="a number")
     elif is_number(low) and is_number(high) and not low <= value <= high:
-        yield RobotFileFault(key=key, got=repr(value), expected=f"inside the limits {low}..{high}")
+        yield TableFault(key=key, got=repr(value), expected=f"inside the limits {low}..{high}")
 
 
-def places_are_distinct(document: Document) -> Iterator[RobotFileFault]:
+def places_are_distinct(document: Document) -> Iterator[TableFault]:
     """The start is a place; no two places share a name or an alias."""
     home = table(document, "home")
     places = subtables(home, "places")
@@ -234,18 +224,18 @@ def places_are_distinct(document: Document) -> Iterator[RobotFileFault]:
     yield from _repeats(words)
 
 
-def ros_is_on_where_needed(document: Document) -> Iterator[RobotFileFault]:
+def ros_is_on_where_needed(document: Document) -> Iterator[TableFault]:
     """Yield a fault for each part that is moved over ROS by a robot that is in no ROS graph."""
     ros = table(document, "ros")
     for key in ("navigation", "arms"):
         if ros.get(key, "own") != "own" and ros.get("enabled") is not True:
             expected = 'enabled = true in [ros], or "own"'
-            yield RobotFileFault(
+            yield TableFault(
                 key=f"ros.{key}", got=f"{ros[key]!r} while ROS is off", expected=expected
             )
 
 
-CHECKS: tuple[Callable[[Document], Iterator[RobotFileFault]], ...] = (
+CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     nothing_used_twice,
     drives_fit_protocol,
     models_are_listed,
@@ -259,7 +249,7 @@ CHECKS: tuple[Callable[[Document], Iterator[RobotFileFault]], ...] = (
 )
 
 
-def missing_files(document: Document, directory: Path) -> Iterator[RobotFileFault]:
+def missing_files(document: Document, directory: Path) -> Iterator[TableFault]:
     """Yield a fault for each file that the robot file names and that is not there."""
     can_bus = table(document, "can_bus")
     named = (
@@ -270,4 +260,4 @@ def missing_files(document: Document, directory: Path) -> Iterator[RobotFileFaul
     )
     for key, name in named:
         if isinstance(name, str) and not (directory / name).is_file():
-            yield RobotFileFault(key=key, got=repr(name), expected=f"a file under {directory}")
+            yield TableFault(key=key, got=repr(name), expected=f"a file under {directory}")

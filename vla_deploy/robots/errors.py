@@ -7,7 +7,7 @@ RobotError
 
 from pathlib import Path
 
-from vla_deploy.robots.schema import RobotFileFault
+from vla_deploy.runtime.table_schema import TableFault
 
 
 class RobotError(Exception):
@@ -17,7 +17,7 @@ class RobotError(Exception):
 class RobotFileError(RobotError, ValueError):
     """Report every fault of one robot file at once."""
 
-    def __init__(self, file: Path, faults: tuple[RobotFileFault, ...]) -> None:
+    def __init__(self, file: Path, faults: tuple[TableFault, ...]) -> None:
         self.file = file
         self.faults = faults
         if len(faults) == 1:

@@ -1,4 +1,4 @@
-"""Tell where a robot's devices are reached: as its file says, or all of them in one folder."""
+"""Say where a robot's devices are reached: as its file says, or all of them in one folder."""
 
 from pathlib import Path
 

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,43 +11,45 @@ from platforms.profile_source import merged
 from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
-from vla_deploy.robots.calibration.overrides import read_overrides, traced
-from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
+from vla_deploy.robots.camera import CameraDescription
+from vla_deploy.robots.consistency import CHECKS, missing_files, subtables
 from vla_deploy.robots.description import (
-    Audio,
     BaseGeometry,
-    CameraDescription,
-    CanBus,
-    Drive,
-    EstopButtonDescription,
     Hand,
     Home,
     JointLimits,
     KeepOutZone,
     Place,
     RobotDescription,
+    StopGroup,
+)
+from vla_deploy.robots.devices import (
+    Audio,
+    CanBus,
+    EstopButtonDescription,
     SerialSensor,
-    Servo,
     ServoBus,
     ServoModel,
-    StopCategory,
-    StopGroup,
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
-from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
-from vla_deploy.robots.ros_settings import ROS, ros_settings
-from vla_deploy.robots.schema import RobotFileFault, Shape, check_record
+from vla_deploy.robots.plan_bounds import PlanBounds
+from vla_deploy.robots.ros_settings import ROS, RosSettings
+from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
+OVERRIDES_FILE = "overrides.toml"
+"""What differs on this one robot, in the folder of its robot file."""
 Document = Mapping[str, Any]
 
-SINGLE: Mapping[str, Shape] = {
+SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
+    "servo_bus.servos": schema.SERVO,
+    "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,
+    "can_bus.drives": schema.DRIVE,
     "base": schema.BASE,
     "lidar": schema.LIDAR,
     "imu": schema.IMU,
@@ -56,25 +59,21 @@ SINGLE: Mapping[str, Shape] = {
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
     "ros": ROS,
+    "limits.*": schema.LIMITS,
+    "groups.*": schema.GROUP,
+    "hands.*": schema.HAND,
     "home": schema.HOME,
+    "home.places.*": schema.PLACE,
+    "home.places.*.viewpoints": schema.FLOOR_POSE,
+    "home.zones": schema.ZONE,
     "planning": schema.PLANNING,
+    "zones.*": protection_schema.ZONE,
+    "workspace.*": protection_schema.WORKSPACE,
     "clearance": protection_schema.CLEARANCE,
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
 }
-NAMED: Mapping[str, Shape] = {
-    "servo_models": schema.SERVO_MODEL,
-    "limits": schema.LIMITS,
-    "groups": schema.GROUP,
-    "hands": schema.HAND,
-    "zones": protection_schema.ZONE,
-    "workspace": protection_schema.WORKSPACE,
-}
-LISTED: Mapping[tuple[str, str], Shape] = {
-    ("servo_bus", "servos"): schema.SERVO,
-    ("can_bus", "drives"): schema.DRIVE,
-    ("home", "zones"): schema.ZONE,
-}
+"""What each table of a robot file holds, by its path."""
 
 
 def load_robot(name_or_path: str | Path) -> RobotDescription:
@@ -91,7 +90,7 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     own = _parse(file)
     overrides, override_faults = read_overrides(file.parent)
     document, calibration_faults = calibrated(merged(own, overrides), file.parent)
-    found = (traced(fault, overrides, own) for fault in _faults(document, file.parent))
+    found = (_traced(fault, overrides, own) for fault in _faults(document, file.parent))
     faults = (*override_faults, *calibration_faults, *found)
     if faults:
         raise RobotFileError(file, faults)
@@ -113,9 +112,7 @@ def robot_file(name_or_path: str | Path) -> Path:
         if candidate.is_file():
             return candidate
     expected = f"a robot file, its folder, or one of {', '.join(robot_names())}"
-    raise RobotFileError(
-        given, (RobotFileFault(key="(file)", got="no such file", expected=expected),)
-    )
+    raise RobotFileError(given, (TableFault(key="(file)", got="no such file", expected=expected),))
 
 
 def robot_names() -> tuple[str, ...]:
@@ -127,60 +124,68 @@ def _parse(file: Path) -> Document:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
+        fault = TableFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def _faults(document: Document, directory: Path) -> Iterator[RobotFileFault]:
-    for record, key, shape in _records(document):
-        yield from check_record(record, key, shape)
+def read_overrides(directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
+    """Return the overrides of a robot's folder, empty where it has none, and the file's faults."""
+    try:
+        text = (directory / OVERRIDES_FILE).read_text(encoding="utf-8")
+        return tomllib.loads(text), ()
+    except FileNotFoundError:
+        return {}, ()
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return {}, (
+            TableFault(key=f"{OVERRIDES_FILE}: (file)", got=str(error), expected="a TOML file"),
+        )
+
+
+def _traced(fault: TableFault, overrides: Document, own: Document) -> TableFault:
+    """Return the fault of a merged document, with the name of the overrides where they made it.
+
+    A value that lacks in a table is theirs where the robot file itself has no such table.
+    """
+    above: Any = overrides
+    below: Any = own
+    for part in fault.key.partition("[")[0].split("."):
+        if not isinstance(above, dict):
+            break  # a value of theirs, in which something is wrong
+        if part not in above:
+            if above is not overrides and not isinstance(below, dict):
+                break
+            return fault
+        above = above[part]
+        below = below.get(part) if isinstance(below, dict) else None
+    return replace(fault, key=f"{OVERRIDES_FILE}: {fault.key}")
+
+
+def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
+    yield from check_record(document, "", schema.ROBOT)
+    yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
     for check in (*CHECKS, *protection_schema.CHECKS):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
 
-def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[RobotFileFault]:
+def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableFault]:
     name = document.get("mjcf")
     if not isinstance(name, str) or not (directory / name).is_file():
         return
     try:
         mjcf = read_mjcf_names(directory / name)
     except ElementTree.ParseError as error:
-        yield RobotFileFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
+        yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
 
 
-def _records(document: Document) -> Iterator[tuple[Document, str, Shape]]:
-    yield document, "", schema.ROBOT
-    for key, shape in SINGLE.items():
-        if isinstance(document.get(key), dict):
-            yield document[key], key, shape
-    for key, shape in NAMED.items():
-        for name, record in table(document, key).items():
-            yield _as_table(record), f"{key}.{name}", shape
-    for (outer, inner), shape in LISTED.items():
-        for i, record in enumerate(rows(table(document, outer), inner)):
-            yield record, f"{outer}.{inner}[{i}]", shape
-    for name, place in table(table(document, "home"), "places").items():
-        yield _as_table(place), f"home.places.{name}", schema.PLACE
-        for i, view in enumerate(rows(_as_table(place), "viewpoints")):
-            yield view, f"home.places.{name}.viewpoints[{i}]", schema.FLOOR_POSE
-
-
-def _as_table(value: Any) -> Document:
-    return value if isinstance(value, dict) else {}
-
-
 def _build(document: Document, directory: Path, camera: CameraDescription) -> RobotDescription:
-    servo_bus = document["servo_bus"]
     return RobotDescription(
         name=document["name"],
         mjcf_path=directory / document["mjcf"],
-        servo_bus=ServoBus(
-            **{**servo_bus, "servos": tuple(Servo(**row) for row in servo_bus["servos"])}
-        ),
+        servo_bus=build(ServoBus, document["servo_bus"]),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
         can_bus=_can_bus(document["can_bus"], directory),
         base=BaseGeometry(**document["base"]),
@@ -191,37 +196,29 @@ def _build(document: Document, directory: Path, camera: CameraDescription) -> Ro
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
-        ros=ros_settings(document.get("ros", {})),
+        ros=build(RosSettings, document.get("ros", {})),
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
-        groups={name: _group(name, row) for name, row in document["groups"].items()},
+        groups={
+            name: build(StopGroup, {"name": name, **row})
+            for name, row in document["groups"].items()
+        },
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},
         poses=subtables(document, "poses"),
         home=_home(document["home"], directory),
         protection=protection_schema.build_protection(document),
-        planning=_plan_bounds(document.get("planning", {})),
-    )
-
-
-def _group(name: str, row: Document) -> StopGroup:
-    return StopGroup(
-        name=name,
-        joints=tuple(row["joints"]),
-        stop_category=StopCategory(row["stop_category"]),
-        drop_payload=row.get("drop_payload", False),
+        planning=build(PlanBounds, document.get("planning", {})),
     )
 
 
 def _can_bus(record: Document, directory: Path) -> CanBus:
-    plain = {key: value for key, value in record.items() if key not in ("eds", "endpoints")}
-    drives = tuple(Drive(**row) for row in record["drives"])
-    return CanBus(
-        **{**plain, "drives": drives},
-        eds_path=_beside(record, "eds", directory),
-        endpoints_path=_beside(record, "endpoints", directory),
+    return replace(
+        build(CanBus, record),
+        eds_path=_sibling(record, "eds", directory),
+        endpoints_path=_sibling(record, "endpoints", directory),
     )
 
 
-def _beside(record: Document, key: str, directory: Path) -> Path | None:
+def _sibling(record: Document, key: str, directory: Path) -> Path | None:
     """Return a file that the record names relative to the robot file."""
     return directory / record[key] if key in record else None
 
@@ -230,26 +227,9 @@ def _home(row: Document, directory: Path) -> Home:
     return Home(
         map_path=directory / row["map"],
         start=row["start"],
-        places={name: _place(name, place) for name, place in row["places"].items()},
-        zones=tuple(_zone(zone) for zone in row["zones"]),
+        places={
+            name: build(Place, {"name": name, "pose": place, **place})
+            for name, place in row["places"].items()
+        },
+        zones=tuple(build(KeepOutZone, zone) for zone in row["zones"]),
     )
-
-
-def _place(name: str, row: Document) -> Place:
-    return Place(
-        name=name,
-        pose=Pose2D(x_m=row["x_m"], y_m=row["y_m"], yaw_rad=row["yaw_rad"]),
-        aliases=tuple(row["aliases"]),
-        viewpoints=tuple(Pose2D(**view) for view in row["viewpoints"]),
-    )
-
-
-def _plan_bounds(row: Document) -> PlanBounds:
-    if "require_confirmation" in row:
-        row = {**row, "require_confirmation": Confirm(row["require_confirmation"])}
-    return PlanBounds(**row)
-
-
-def _zone(row: Document) -> KeepOutZone:
-    polygon = tuple((float(x), float(y)) for x, y in row["polygon_m"])
-    return KeepOutZone(name=row["name"], reason=row["reason"], polygon_m=polygon)

@@ -1,6 +1,7 @@
 """Declare what a robot file may say of zones and margins; find its faults, and build the values."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
@@ -14,41 +15,34 @@ from vla_deploy.robots.protection import (
     ZoneKind,
     ZoneSource,
 )
-from vla_deploy.robots.schema import (
-    OPTIONAL_POSITIVE,
-    POLYGON,
+from vla_deploy.robots.schema import POLYGON
+from vla_deploy.runtime.table_schema import (
+    POSITIVE,
     TABLE,
-    RobotFileFault,
+    TEXTS,
     Shape,
+    TableFault,
     ValueCheck,
+    build,
+    integer,
     is_number,
+    number,
+    numbers,
     one_of,
 )
 
 Document = Mapping[str, Any]
 
 
-def _is_list_of(value: Any, size: int, holds: Callable[[Any], bool]) -> bool:
-    return isinstance(value, list) and len(value) == size and all(map(holds, value))
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1000
-
-
-COUNT = ValueCheck(expected="an integer in 1..1000", holds=_is_count, is_optional=True)
+COUNT = integer(1, 1000).optional
 NOT_NEGATIVE = ValueCheck(
-    expected="a number, 0 or above", holds=lambda v: is_number(v) and v >= 0, is_optional=True
-)
+    expected="a number, 0 or above", holds=lambda v: is_number(v) and v >= 0
+).optional
 RATIO = ValueCheck(
-    expected="a number above 0 and below 1",
-    holds=lambda v: is_number(v) and 0 < v < 1,
-    is_optional=True,
-)
-LEAN = ValueCheck(
-    expected="an angle in 0.01..0.8 rad", holds=lambda v: is_number(v) and 0.01 <= v <= 0.8
-)
-POINT_3 = ValueCheck(expected="[x, y, z]", holds=lambda v: _is_list_of(v, 3, is_number))
+    expected="a number above 0 and below 1", holds=lambda v: is_number(v) and 0 < v < 1
+).optional
+LEAN = number(0.01, 0.8, "rad", kind="an angle")
+POINT_3 = replace(numbers(3), expected="[x, y, z]")
 SOURCES = ValueCheck(
     expected=f"a list with one or more of {', '.join(ZoneSource)}",
     holds=lambda v: (
@@ -57,25 +51,21 @@ SOURCES = ValueCheck(
 )
 PAIRS = ValueCheck(
     expected="a list of pairs of geom names",
-    holds=lambda v: (
-        isinstance(v, list)
-        and all(_is_list_of(pair, 2, lambda n: isinstance(n, str)) for pair in v)
-    ),
-    is_optional=True,
-)
+    holds=lambda v: isinstance(v, list) and all(TEXTS.holds(pair) and len(pair) == 2 for pair in v),
+).optional
 
 ZONE: Shape = {
     "kind": one_of(*ZoneKind),
     "sources": SOURCES,
-    "polygon_m": ValueCheck(expected=POLYGON.expected, holds=POLYGON.holds, is_optional=True),
+    "polygon_m": POLYGON.optional,
     "min_points": COUNT,
     "trigger_count": COUNT,
     "release_count": COUNT,
     "reaction_s": NOT_NEGATIVE,
     "speed_ratio": RATIO,
-    "speed_m_s": OPTIONAL_POSITIVE,
-    "turn_rad_s": OPTIONAL_POSITIVE,
-    "time_before_collision_s": OPTIONAL_POSITIVE,
+    "speed_m_s": POSITIVE.optional,
+    "turn_rad_s": POSITIVE.optional,
+    "time_before_collision_s": POSITIVE.optional,
 }
 WORKSPACE: Shape = {"min_m": POINT_3, "max_m": POINT_3}
 CLEARANCE: Shape = {"self_m": NOT_NEGATIVE, "floor_m": NOT_NEGATIVE, "allow": PAIRS}
@@ -100,14 +90,14 @@ _NEEDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 
 
-def zones_fit_their_kind(document: Document) -> Iterator[RobotFileFault]:
+def zones_fit_their_kind(document: Document) -> Iterator[TableFault]:
     """Each zone has what its kind needs and nothing that its kind does not use."""
     for name, row in subtables(document, "zones").items():
         kind = row.get("kind")
         needed, unused = _NEEDS.get(kind, ((), ())) if isinstance(kind, str) else ((), ())
         for key in needed:
             if key not in row:
-                yield RobotFileFault(
+                yield TableFault(
                     key=f"zones.{name}.{key}",
                     got="nothing",
                     expected=f"a value: it is a {kind} zone",
@@ -115,15 +105,13 @@ def zones_fit_their_kind(document: Document) -> Iterator[RobotFileFault]:
         for key in unused:
             if key in row:
                 expected = f"no such key: a {kind} zone has no use for it"
-                yield RobotFileFault(
-                    key=f"zones.{name}.{key}", got=repr(row[key]), expected=expected
-                )
+                yield TableFault(key=f"zones.{name}.{key}", got=repr(row[key]), expected=expected)
         if kind == ZoneKind.LIMIT and not {"speed_m_s", "turn_rad_s"} & row.keys():
             expected = "speed_m_s, turn_rad_s or both: it is a limit zone"
-            yield RobotFileFault(key=f"zones.{name}", got="neither", expected=expected)
+            yield TableFault(key=f"zones.{name}", got="neither", expected=expected)
 
 
-def workspaces_bound_hands(document: Document) -> Iterator[RobotFileFault]:
+def workspaces_bound_hands(document: Document) -> Iterator[TableFault]:
     """A workspace is that of a hand, and its lower corner lies below the upper one."""
     hands = subtables(document, "hands")
     for name, row in subtables(document, "workspace").items():
@@ -135,12 +123,12 @@ def workspaces_bound_hands(document: Document) -> Iterator[RobotFileFault]:
             assert isinstance(high, list)
             if not all(a < b for a, b in zip(low, high, strict=True)):
                 key = f"workspace.{name}.min_m"
-                yield RobotFileFault(
+                yield TableFault(
                     key=key, got=repr(low), expected=f"below max_m {high} on every axis"
                 )
 
 
-def contact_torques_fit_servos(document: Document) -> Iterator[RobotFileFault]:
+def contact_torques_fit_servos(document: Document) -> Iterator[TableFault]:
     """A contact threshold is that of a servo joint, and below what the servo can give."""
     models = subtables(document, "servo_models")
     servos = {row.get("joint"): row for row in rows(table(document, "servo_bus"), "servos")}
@@ -154,10 +142,10 @@ def contact_torques_fit_servos(document: Document) -> Iterator[RobotFileFault]:
         limit = stall if is_number(stall) else float("inf")
         if not (is_number(value) and 0 < value < limit):
             below = f"a number above 0 and below the stall torque {stall}"
-            yield RobotFileFault(key=key, got=repr(value), expected=below)
+            yield TableFault(key=key, got=repr(value), expected=below)
 
 
-def support_holds_centre(document: Document) -> Iterator[RobotFileFault]:
+def support_holds_centre(document: Document) -> Iterator[TableFault]:
     """The support polygon is convex, counter-clockwise, and the base's centre is inside."""
     corners = table(document, "tip_over").get("support_m")
     if not POLYGON.holds(corners):
@@ -166,10 +154,10 @@ def support_holds_centre(document: Document) -> Iterator[RobotFileFault]:
     pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
     if not all(a[0] * b[1] - a[1] * b[0] > 0 for a, b in pairs):
         expected = "corners counter-clockwise around the base's centre [0, 0]"
-        yield RobotFileFault(key="tip_over.support_m", got=repr(corners), expected=expected)
+        yield TableFault(key="tip_over.support_m", got=repr(corners), expected=expected)
 
 
-CHECKS: tuple[Callable[[Document], Iterator[RobotFileFault]], ...] = (
+CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     zones_fit_their_kind,
     workspaces_bound_hands,
     contact_torques_fit_servos,
@@ -184,45 +172,17 @@ def build_protection(document: Document) -> Protection:
             _zone(name, row, document["base"]) for name, row in subtables(document, "zones").items()
         ),
         workspaces={
-            name: Workspace(min_m=tuple(row["min_m"]), max_m=tuple(row["max_m"]))
-            for name, row in subtables(document, "workspace").items()
+            name: build(Workspace, row) for name, row in subtables(document, "workspace").items()
         },
-        clearance=_clearance(table(document, "clearance")),
-        tip_over=_tip_over(document["tip_over"]) if "tip_over" in document else None,
-        contact=_contact(document["contact"]) if "contact" in document else None,
+        clearance=build(ClearanceLimits, table(document, "clearance")),
+        tip_over=build(TipOver, document["tip_over"]) if "tip_over" in document else None,
+        contact=build(ContactLimits, document["contact"]) if "contact" in document else None,
     )
 
 
 def _zone(name: str, row: Document, base: Document) -> Zone:
-    shared = {key: row[key] for key in _PLAIN if key in row}
+    """Return a zone; one that bounds speeds bounds them by the least ratio of them."""
     speed_m_s = row.get("speed_m_s", base["max_speed_m_s"])
     turn_rad_s = row.get("turn_rad_s", base["max_turn_rad_s"])
     ratio = min(1.0, speed_m_s / base["max_speed_m_s"], turn_rad_s / base["max_turn_rad_s"])
-    return Zone(
-        name=name,
-        kind=ZoneKind(row["kind"]),
-        sources=tuple(ZoneSource(source) for source in row["sources"]),
-        polygon_m=tuple((float(x), float(y)) for x, y in row.get("polygon_m", ())),
-        **{"speed_ratio": ratio, **shared},
-    )
-
-
-_PLAIN = (
-    *("min_points", "trigger_count", "release_count", "reaction_s"),
-    *("speed_ratio", "time_before_collision_s"),
-)
-
-
-def _clearance(row: Document) -> ClearanceLimits:
-    pairs = tuple((str(first), str(second)) for first, second in row.get("allow", ()))
-    margins = {key: value for key, value in row.items() if key != "allow"}
-    return ClearanceLimits(**margins, allow=pairs)
-
-
-def _tip_over(row: Document) -> TipOver:
-    corners = tuple((float(x), float(y)) for x, y in row["support_m"])
-    return TipOver(**{**row, "support_m": corners})
-
-
-def _contact(row: Document) -> ContactLimits:
-    return ContactLimits(torque_nm=dict(row["torque_nm"]))
+    return build(Zone, {"name": name, "speed_ratio": ratio, **row})

@@ -1,10 +1,10 @@
 """Declare how a robot takes part in a ROS 2 graph: the `[ros]` table of the robot file."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.robots.schema import NUMBER, OPTIONAL_TEXT, Shape, ValueCheck, is_number, one_of
+from vla_deploy.runtime.table_schema import TEXT, Shape, integer, number, one_of
 
 
 class Accepts(StrEnum):
@@ -65,40 +65,20 @@ UNUSED: Final = RosSettings()
 _OWN: Final = "own"
 NAV2: Final = "nav2"
 FOLLOW_JOINT_TRAJECTORY: Final = "follow_joint_trajectory"
-_FLAG: Final = one_of(False, True, is_optional=True)
-
-
-def _number(low: float, high: float, unit: str) -> ValueCheck:
-    return ValueCheck(
-        expected=f"a number in {low:g}..{high:g} {unit}",
-        holds=lambda value: is_number(value) and low <= value <= high,
-        is_optional=True,
-    )
-
-
+_FLAG: Final = one_of(False, True).optional
 ROS: Final[Shape] = {
     "enabled": _FLAG,
-    "accept": one_of(*(one.value for one in Accepts), is_optional=True),
+    "accept": one_of(*(one.value for one in Accepts)).optional,
     # Domains above 101 meet the ports that Linux hands out by itself.
-    "domain_id": ValueCheck(
-        expected="an integer in 0..101",
-        holds=lambda value: isinstance(value, int) and NUMBER.holds(value) and 0 <= value <= 101,
-        is_optional=True,
-    ),
-    "discovery": one_of("localhost", "subnet", "off", "system_default", is_optional=True),
-    "python": OPTIONAL_TEXT,
-    "workspace": OPTIONAL_TEXT,
+    "domain_id": integer(0, 101).optional,
+    "discovery": one_of("localhost", "subnet", "off", "system_default").optional,
+    "python": TEXT.optional,
+    "workspace": TEXT.optional,
     "cmd_vel_stamped": _FLAG,
-    "joint_state_rate_hz": _number(1, 250, "Hz"),
-    "odometry_rate_hz": _number(1, 100, "Hz"),
-    "image_rate_hz": _number(0, 30, "Hz"),
-    "navigation": one_of(_OWN, NAV2, is_optional=True),
-    "arms": one_of(_OWN, FOLLOW_JOINT_TRAJECTORY, is_optional=True),
-    "trajectory_server": OPTIONAL_TEXT,
+    "joint_state_rate_hz": number(1, 250, "Hz").optional,
+    "odometry_rate_hz": number(1, 100, "Hz").optional,
+    "image_rate_hz": number(0, 30, "Hz").optional,
+    "navigation": one_of(_OWN, NAV2).optional,
+    "arms": one_of(_OWN, FOLLOW_JOINT_TRAJECTORY).optional,
+    "trajectory_server": TEXT.optional,
 }
-
-
-def ros_settings(row: dict[str, object]) -> RosSettings:
-    """Return the settings of a `[ros]` table that has no faults."""
-    settings = RosSettings(**row)  # type: ignore[arg-type]  # checked by the shape `ROS`
-    return replace(settings, accept=Accepts(settings.accept))

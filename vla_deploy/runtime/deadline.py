@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S, Clock
 class Deadline:
     """Hold when a call must have ended, and how long it was given.
 
-    It has ended at once when its owner sets `recall`: nobody waits for the answer any more.
+    Setting `recall` ends it at once: the answer is not wanted any more.
     """
 
     clock: Clock
@@ -37,13 +37,13 @@ class Deadline:
         )
 
     def call_in(self) -> None:
-        """Let nobody wait for the answer any more, where that can still be said."""
+        """Set `recall`, where there is one: the answer is not wanted any more."""
         if self.recall is not None:
             self.recall.set()
 
     @property
     def is_recalled(self) -> bool:
-        """Return whether nobody waits for the answer any more."""
+        """Return whether the answer is not wanted any more."""
         return self.recall is not None and self.recall.is_set()
 
     @property

@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.errors import DriverError
 from drivers.opener import DeviceLink
 from drivers.reopening import Reopening
-from vla_deploy.robots.description import Audio
+from vla_deploy.robots.devices import Audio
 from vla_deploy.speech.errors import SpeechMissing, import_extra
 from vla_deploy.speech.sound import RATE_HZ, Framer, Sound, SoundBlock
 

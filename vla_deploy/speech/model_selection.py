@@ -5,8 +5,8 @@ from functools import partial
 
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError, ModelUnknown
+from vla_deploy.inference.manifest_schema import SPEECH_TO_TEXT
 from vla_deploy.inference.roles import ModelShelf, choice_for
-from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
 from vla_deploy.runtime.one_line import one_line
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser

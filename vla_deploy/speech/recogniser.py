@@ -9,11 +9,9 @@ import numpy as np
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
-from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import EncoderContext, Whisper
-from vla_deploy.inference.memory_claims import MemoryClaim
+from vla_deploy.inference.memory_claims import MemoryClaim, resident_mb
 from vla_deploy.inference.providers import CPU, CUDA
-from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.executors import low_priority_thread
 from vla_deploy.runtime.one_line import one_line
@@ -104,7 +102,7 @@ def open_recogniser(
     # Hashing half a gigabyte gives way to the steps. The model itself is made by this thread, since
     # the threads that it starts inherit the priority, and phrases are to be read without delay.
     with low_priority_thread(MonotonicClock()) as thread:
-        thread.submit(check_parts, model).result()
+        thread.submit(model.check_parts).result()
     provider, declared = _provider(choice, runtime), model.manifest.whisper
     assert declared is not None, "only manifests of a Whisper come here"
     try:

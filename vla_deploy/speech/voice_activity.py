@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.inference.graph_session import GraphSession
-from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.opening import GraphSession, open_graph
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.sound import Sound
 
@@ -64,4 +63,4 @@ def open_voice_activity() -> VoiceActivity:
         raise SpeechMissing(
             "hearing needs faster-whisper: pip install 'vla-deploy[speech]'; typed commands go on"
         )
-    return VoiceActivity(GraphSession(Path(found.origin).parent / _FILE, PLAIN_CHOICE))
+    return VoiceActivity(open_graph(Path(found.origin).parent / _FILE))

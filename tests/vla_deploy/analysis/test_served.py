@@ -9,8 +9,7 @@ import pytest
 from drivers.clock import MonotonicClock
 from vla_deploy.analysis.claims import SceneClaims
 from vla_deploy.analysis.document import EvidenceSource
-from vla_deploy.analysis.prompt import TEMPLATE, chat_about
-from vla_deploy.analysis.served import ServedAnalyser
+from vla_deploy.analysis.served import TEMPLATE, ServedAnalyser, chat_about
 from vla_deploy.feasibility.verdict import Feasible
 from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer

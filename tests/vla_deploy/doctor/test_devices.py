@@ -19,7 +19,7 @@ from vla_deploy.doctor.devices import (
 )
 from vla_deploy.inference.store import EMBEDDED, ModelStore
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.description import CameraMounting, LensCalibration
+from vla_deploy.robots.camera import CameraMounting, LensCalibration
 
 SERVOS = load_robot("butler").servo_bus.path
 TIMER = "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer"

@@ -22,7 +22,7 @@ from vla_deploy.gateways.ros.parameters import (
     PARAMS_FILE_VARIABLE,
     handed_over_parameters,
 )
-from vla_deploy.model_servers.servers_file import read_servers
+from vla_deploy.model_servers.settings import read_servers
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.supervisor.errors import AlreadyRunning

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ProviderUnavailable
 from vla_deploy.inference.manifest import Tensor, Variant
-from vla_deploy.inference.opening import read_graph, session_options
+from vla_deploy.inference.opening import open_graph, session_options
 from vla_deploy.inference.runtime import available_providers
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import ModelStore
@@ -169,6 +169,6 @@ def test_a_spoiled_graph_is_read_or_refused_and_never_ends_the_process(
     path = tmp_path_factory.getbasetemp() / "spoiled.onnx"
     path.write_bytes(whole[: data.draw(st.integers(0, len(whole)))])
     try:
-        read_graph(path)
+        open_graph(path)
     except ModelFileSpoiled as error:
         assert str(path) in str(error)

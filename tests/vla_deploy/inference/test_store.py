@@ -2,9 +2,9 @@ import dataclasses
 
 import pytest
 
-from vla_deploy.inference.errors import ModelUnknown
-from vla_deploy.inference.manifest import Variant
-from vla_deploy.inference.store import ModelStore
+from vla_deploy.inference.errors import ModelFileSpoiled, ModelUnknown
+from vla_deploy.inference.manifest import ModelFile, Variant
+from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
 
 
 @pytest.fixture
@@ -67,3 +67,18 @@ def test_only_what_was_added_is_removed(store):
     assert store.names() == ("ours",)
     with pytest.raises(ModelUnknown, match="no model 'ours' was added"):
         store.remove("ours")
+
+
+def test_a_half_written_part_is_found(tmp_path, blob_manifest):
+    part = tmp_path / "model.bin"
+    part.write_text("model")
+    parts = (ModelFile(path=part.name, sha256=sha256_of(part)),)
+    manifest = dataclasses.replace(blob_manifest, parts=parts)
+    model = StoredModel(manifest=manifest, folder=tmp_path)
+    model.check_parts()
+    part.write_text("mod")
+    with pytest.raises(ModelFileSpoiled, match=r"model\.bin.*add the model again"):
+        model.check_parts()
+    part.unlink()
+    with pytest.raises(ModelFileSpoiled, match=r"model\.bin: No such file"):
+        model.check_parts()

@@ -53,7 +53,7 @@ def test_a_server_that_knows_no_schema_is_asked_otherwise_from_then_on(
     assert asker.ask(CHAT).colour == "red"
     asked = len(loopback.heard)
     assert asker.ask(CHAT).colour == "red"
-    assert (asker.rung, len(loopback.heard) - asked) == ("json_object", 1)
+    assert (asker.schema_mode, len(loopback.heard) - asked) == ("json_object", 1)
     assert clock.waits_s == []
 
 
@@ -61,7 +61,7 @@ def test_the_last_way_is_to_ask_in_words(loopback, asker):
     refuse = loopback.sends(400, b"")
     loopback.then(refuse, refuse, loopback.says(RED))
     assert asker.ask(CHAT).colour == "red"
-    assert asker.rung == "words"
+    assert asker.schema_mode == "words"
     assert "response_format" not in loopback.heard[-1].body
 
 
@@ -69,7 +69,7 @@ def test_a_server_that_refuses_every_way_is_told(loopback, asker):
     loopback.then(loopback.sends(400, {"error": "no"}))
     with pytest.raises(ServerRefused, match="no"):
         asker.ask(CHAT)
-    assert (len(loopback.heard), asker.rung) == (3, "json_schema")
+    assert (len(loopback.heard), asker.schema_mode) == (3, "json_schema")
 
 
 def test_a_failure_after_a_way_has_proven_right_changes_nothing(loopback, asker):
@@ -77,14 +77,14 @@ def test_a_failure_after_a_way_has_proven_right_changes_nothing(loopback, asker)
     asker.ask(CHAT)
     with pytest.raises(ServerFailed):
         asker.ask(CHAT)
-    assert asker.rung == "json_schema"
+    assert asker.schema_mode == "json_schema"
 
 
 def test_a_wrong_key_is_no_reason_to_ask_otherwise(loopback, asker):
     loopback.then(loopback.sends(401, b""))
     with pytest.raises(ServerRefused, match="key"):
         asker.ask(CHAT)
-    assert (asker.rung, len(loopback.heard)) == ("json_schema", 1)
+    assert (asker.schema_mode, len(loopback.heard)) == ("json_schema", 1)
 
 
 def test_a_wrong_shape_is_sent_back_once_with_its_faults_and_without_images(loopback, open_server):

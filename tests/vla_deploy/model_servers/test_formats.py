@@ -4,11 +4,11 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
-from vla_deploy.model_servers.formats.table import FORMATS
+from vla_deploy.model_servers.formats import FORMATS
+from vla_deploy.model_servers.formats.base import is_closed, wire_schema
 from vla_deploy.model_servers.settings import Api
 
 JPEG = b"\xff\xd8 an image"
@@ -42,10 +42,10 @@ CHAT = Chat(
 def body(settings):
     """Return the body of a request in one of the languages."""
 
-    def body(api: Api, rung: int = 0, chat: Chat = CHAT, **changes):
+    def body(api: Api, mode: int = 0, chat: Chat = CHAT, **changes):
         format_ = FORMATS[api]
         declared = settings("http://127.0.0.1:9", api=api, **changes)
-        return format_.request(declared, chat, format_.rungs[rung]).body
+        return format_.request(declared, chat, format_.schema_modes[mode]).body
 
     return body
 
@@ -70,7 +70,7 @@ def test_compatible_servers_get_the_older_name_of_the_token_bound(body):
     assert "max_completion_tokens" not in sent
 
 
-def test_the_second_rung_is_the_form_that_llama_cpp_python_takes(body):
+def test_the_second_mode_is_the_form_that_llama_cpp_python_takes(body):
     assert body(Api.OPENAI_COMPATIBLE, 1)["response_format"] == {
         "type": "json_object",
         "schema": wire_schema(SCHEMA),
@@ -103,7 +103,7 @@ def test_anthropic_gets_image_blocks_and_the_schema_as_output_format(body):
 
 
 @pytest.mark.parametrize("api", Api)
-def test_the_last_rung_asks_in_words_alone(body, api):
+def test_the_last_mode_asks_in_words_alone(body, api):
     assert not {"response_format", "format", "output_config", "tools"} & body(api, -1).keys()
 
 

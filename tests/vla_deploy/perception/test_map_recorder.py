@@ -18,7 +18,7 @@ from vla_deploy.navigation.follower import Twist
 from vla_deploy.perception.geometry.lens import ray_table
 from vla_deploy.perception.map_recorder import MapRecorder
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.description import LensCalibration
+from vla_deploy.robots.camera import LensCalibration
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.maps.map_file import LOW_SHADE, read_map_file
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.robots.description import Servo
+from vla_deploy.robots.devices import Servo
 
 SITES = '<site name="lidar"/><site name="imu"/><site name="head_camera"/>'
 

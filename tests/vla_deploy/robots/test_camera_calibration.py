@@ -18,7 +18,7 @@ from vla_deploy.robots.calibration.camera_calibration import (
     write_lens,
     write_mounting,
 )
-from vla_deploy.robots.description import CameraMounting, LensCalibration
+from vla_deploy.robots.camera import CameraMounting, LensCalibration
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
 from vla_deploy.robots.loader import ROBOTS_DIR
 

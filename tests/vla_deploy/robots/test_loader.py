@@ -121,6 +121,14 @@ def test_each_fault_alone_is_reported_too(
         ((r"^max_actions = 60", "max_actions = 500"), "planning.max_actions", "in 1..100"),
         ((r'^require_confirmation = "risky"', 'require_confirmation = "no"'),
          "planning.require_confirmation", "never, risky, always"),
+        ((r"node_id = 1,", "node_id = 0,"), "can_bus.drives[0].node_id",
+         "got 0, expected an integer in 1..126, as cia402 has them"),
+        ((r"node_id = 1,", 'node_id = 1, mode = "torque",'), "can_bus.drives[0].mode",
+         "got 'torque'"),
+        ((r"^bitrate = .*$", 'bitrate = 1000000\neds = "gone.eds"'), "can_bus.eds",
+         "got 'gone.eds'"),
+        ((r"^bitrate = .*$", 'bitrate = 1000000\nprotocol = "can"'), "can_bus.protocol",
+         "got 'can', expected one of cia402, odrive"),
     ],
 )  # fmt: skip
 def test_contradictions_inside_the_file_are_found(
@@ -200,3 +208,34 @@ def test_a_sensor_without_a_driver_is_told_with_those_there_are(butler_copy: Pat
     edit(butler_copy, (r'^model = "LD19"', 'model = "LD06"'))
 
     assert "one of LD19" in faults_of(butler_copy)["lidar.model"]
+
+
+def test_cia402_in_profile_velocity_needs_no_word() -> None:
+    bus = load_robot("butler").can_bus
+    assert (bus.protocol, bus.eds_path, bus.endpoints_path) == ("cia402", None, None)
+    assert {drive.mode for drive in bus.drives} == {"profile_velocity"}
+
+
+def test_mode_counts_and_eds_file_are_taken_over(butler_copy: Path) -> None:
+    (butler_copy.parent / "mine.eds").write_text("[FileInfo]\n")
+    mode = 'mode = "cyclic_synchronous_velocity", counts_per_rev = 4096,'
+    edit(
+        butler_copy,
+        (r"^bitrate = .*$", 'bitrate = 500000\neds = "mine.eds"'),
+        (r"node_id = 1,", f"node_id = 1, {mode}"),
+    )
+    bus = load_robot(butler_copy).can_bus
+    assert bus.eds_path == butler_copy.parent / "mine.eds"
+    drive = bus.drives[0]
+    assert (drive.mode, drive.counts_per_rev) == ("cyclic_synchronous_velocity", 4096)
+
+
+def test_odrive_needs_its_endpoints_and_its_own_node_ids(butler_copy: Path) -> None:
+    edit(
+        butler_copy,
+        (r"^bitrate = .*$", 'bitrate = 1000000\nprotocol = "odrive"'),
+        (r"node_id = 1,", "node_id = 63,"),
+    )
+    faults = faults_of(butler_copy)
+    assert "got nothing, expected the flat_endpoints.json" in faults["can_bus.endpoints"]
+    assert "got 63, expected an integer in 0..62" in faults["can_bus.drives[0].node_id"]

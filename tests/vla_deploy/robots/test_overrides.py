@@ -11,8 +11,7 @@ from vla_deploy.robots.calibration.calibration import (
     JointCalibration,
     write_calibration,
 )
-from vla_deploy.robots.calibration.overrides import OVERRIDES_FILE
-from vla_deploy.robots.loader import ROBOTS_DIR
+from vla_deploy.robots.loader import OVERRIDES_FILE, ROBOTS_DIR
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.vla_deploy.robots.conftest import small_robot
 from vla_deploy.robots import RobotDescription, RobotFileError, load_robot
-from vla_deploy.robots.description import CameraMounting
+from vla_deploy.robots.camera import CameraMounting
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.robots.kinematics.urdf import roll_pitch_yaw, urdf_of
 

@@ -158,7 +158,7 @@ def test_files_that_are_no_whisper_are_told(scripted_whisper: Any) -> None:
     declared = scripted_whisper.model("other", "turn left")
     text = (declared / "model.toml").read_text().replace('"other"', '"ours"')
     for path in folder.iterdir():
-        from vla_deploy.inference.file_check import sha256_of
+        from vla_deploy.inference.store import sha256_of
 
         text = text.replace(sha256_of(declared / path.name), sha256_of(path))
     (folder / "model.toml").write_text(text)

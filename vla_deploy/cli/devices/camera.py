@@ -12,7 +12,7 @@ from typing import Any, Final
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import attach
-from vla_deploy.model_tools.detectors.images import image_paths, read_image
+from vla_deploy.model_tools.detectors.labelled import image_paths, read_image
 from vla_deploy.perception.camera_tools.board import BoardView, CalibrationBoard, Image, write_board
 from vla_deploy.perception.camera_tools.board_pose import CameraCheck, check_camera
 from vla_deploy.perception.camera_tools.hand_eye import HeadView, fit_hand_eye

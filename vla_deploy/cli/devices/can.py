@@ -25,7 +25,7 @@ from vla_deploy.cli.commands import (
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.robots import load_robot
-from vla_deploy.robots.description import CanBus
+from vla_deploy.robots.devices import CanBus
 
 INTERFACES = ("socketcan", "slcan", "vla_hub")
 BITRATES = (125_000, 250_000, 500_000, 800_000, 1_000_000)

@@ -13,14 +13,11 @@ from vla_deploy.inference.manifest import Fit, Measured, Variant
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.detectors.accuracy import Accuracy
-from vla_deploy.model_tools.detectors.adding import DetectorSource, add_model
+from vla_deploy.model_tools.detectors.accuracy import Accuracy, measure_files, worst
+from vla_deploy.model_tools.detectors.adding import DetectorSource, add_model, empty_images
 from vla_deploy.model_tools.detectors.benching import ModelFigures, bench
-from vla_deploy.model_tools.detectors.images import read_image, spread_paths
-from vla_deploy.model_tools.detectors.labelled import read_labelled
-from vla_deploy.model_tools.detectors.measuring import measure_files, worst
+from vla_deploy.model_tools.detectors.labelled import read_image, read_labelled, spread_paths
 from vla_deploy.model_tools.detectors.quantising import quantise, require_disjoint
-from vla_deploy.model_tools.detectors.trial import empty_images
 
 _BENCH_IMAGES: Final = 32
 

@@ -8,7 +8,7 @@ from typing import Any
 from platforms import Profile
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.models.arguments import Result, choice_of
-from vla_deploy.inference.language_schema import PLANNER
+from vla_deploy.inference.manifest_schema import PLANNER
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import StoredModel

@@ -9,7 +9,7 @@ from drivers.clock import Clock
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.wheel_drives.bus import DriveBus
 from platforms import Profile
-from vla_deploy.robots.description import CanBus
+from vla_deploy.robots.devices import CanBus
 
 
 def _cia402(wiring: CanBus, profile: Profile, bus: can.BusABC, clock: Clock) -> DriveBus:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.inference.errors import AnswerFailed, ModelMismatch, RunFailed
-from vla_deploy.inference.graph_session import GraphSession
 from vla_deploy.inference.language_model.model_folder import GenaiConfig
+from vla_deploy.inference.opening import GraphSession
 
 # A weak model would else go on with tabs and blanks for ever.
 _GUIDANCE: Final = {"whitespace_flexible": False}

@@ -10,8 +10,6 @@ import numpy as np
 
 from platforms import ModelChoice
 from vla_deploy.inference.errors import AnswerFailed, ModelMismatch
-from vla_deploy.inference.file_check import check_parts
-from vla_deploy.inference.graph_session import GraphSession
 from vla_deploy.inference.language_model.decoding import Constraint, Decoder, JsonSchema, Scores
 from vla_deploy.inference.language_model.model_folder import (
     ChatTemplate,
@@ -20,6 +18,7 @@ from vla_deploy.inference.language_model.model_folder import (
     read_tokenizers,
 )
 from vla_deploy.inference.manifest import Language
+from vla_deploy.inference.opening import open_graph
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.deadline import Deadline
 
@@ -39,7 +38,7 @@ class AnswerBounds:
         """Accept an answer that has so many tokens and is not whole yet.
 
         Raises:
-            AnswerFailed: the deadline passed, nobody waits, or it may not be longer.
+            AnswerFailed: the deadline passed, it was recalled, or it may not be longer.
         """
         if self.deadline.is_recalled:
             why = "nobody waits for it any more"
@@ -82,7 +81,7 @@ class LanguageModel:
         self.config = read_genai_config(folder)
         self.tokenizer, self.guide = read_tokenizers(folder, self.config)
         self.template = ChatTemplate(folder)
-        self._session = GraphSession(folder / self.config.file_name, choice)
+        self._session = open_graph(folder / self.config.file_name, choice)
         self.decoder = Decoder(self._session, self.config)
         self.notices = self._session.notices
         self.provider = self._session.provider
@@ -162,7 +161,7 @@ def open_language_model(model: StoredModel, choice: ModelChoice) -> LanguageMode
     language = model.manifest.language
     if language is None:
         raise ModelMismatch(model.manifest.name, ("expected a [language] table, there is none",))
-    check_parts(model)
+    model.check_parts()
     return LanguageModel(model.folder, language, choice)
 
 

@@ -15,7 +15,7 @@ from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field, V
 from tokenizers import Tokenizer
 
 from vla_deploy.inference.errors import ModelMismatch
-from vla_deploy.inference.language_schema import GENAI_CONFIG, TOKENIZER
+from vla_deploy.inference.manifest_schema import GENAI_CONFIG, TOKENIZER
 
 CONFIG: Final = "tokenizer_config.json"
 # Newer exports keep it in a file of its own.

@@ -1,4 +1,4 @@
-"""Connect to addresses that were checked, and let no single wait outlast the call's deadline.
+"""Connect to addresses that were checked, and bound each wait by the call's deadline.
 
 The one module that imports the HTTP client, which takes a moment; import it late.
 """
@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import httpcore2
 
-from vla_deploy.model_servers.calls.addresses import Resolve, check_address
+from vla_deploy.model_servers.calls.limits import bounded_s
+from vla_deploy.model_servers.calls.privacy import Resolve, check_address
 from vla_deploy.model_servers.errors import ServerUnreachable, TimedOut
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.runtime.deadline import Deadline
@@ -42,7 +43,7 @@ class GuardedBackend(httpcore2.NetworkBackend):
 
         Raises:
             PrivacyRefused: one of the addresses is none that the server may have.
-            Unreachable: none of them answers.
+            ServerUnreachable: none of them answers.
             TimedOut: no time is left.
         """
         addresses = self._resolve(host, port, bounded_s(self._deadline, timeout))
@@ -111,20 +112,6 @@ class _DeadlineStream(httpcore2.NetworkStream):
 
     def get_extra_info(self, info: str) -> Any:
         return self._stream.get_extra_info(info)
-
-
-def bounded_s(deadline: Deadline, wanted_s: float | None = None) -> float:
-    """Return the time that one wait may take: what is wanted, at most what is left.
-
-    Raises:
-        TimedOut: nothing is left, or nobody waits any more.
-    """
-    left_s = deadline.left_s
-    if deadline.is_recalled:
-        raise TimedOut("nobody waits for the answer any more")
-    if left_s <= 0.0:
-        raise TimedOut(f"no whole answer within {deadline.given_s:g} s")
-    return left_s if wanted_s is None else min(wanted_s, left_s)
 
 
 @contextlib.contextmanager

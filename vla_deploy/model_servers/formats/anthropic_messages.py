@@ -1,16 +1,23 @@
 """Speak Anthropic's Messages API."""
 
-import base64
 import json
 from collections.abc import Mapping
 from typing import Any, Final
 from urllib.parse import quote
 
-from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
-from vla_deploy.model_servers.formats.base import Json, ModelFacts, WireRequest, count, part
+from vla_deploy.model_servers.formats.base import (
+    Json,
+    ModelFacts,
+    WireRequest,
+    base64_text,
+    count,
+    is_closed,
+    part,
+    wire_schema,
+)
 from vla_deploy.model_servers.settings import ServerSettings
 
 OUTPUT_FORMAT: Final = "output_format"
@@ -23,18 +30,18 @@ VERSION: Final = "2023-06-01"
 class AnthropicMessages:
     """Speak the language of `/v1/messages`; the server's URL is without `/v1`."""
 
-    rungs: tuple[str, ...] = (OUTPUT_FORMAT, TOOL, WORDS)
+    schema_modes: tuple[str, ...] = (OUTPUT_FORMAT, TOOL, WORDS)
 
     def headers(self, key: Secret | None) -> dict[str, str]:
         """Return the version's header and the key's."""
         versioned = {"anthropic-version": VERSION}
         return versioned if key is None else {**versioned, "x-api-key": key.reveal()}
 
-    def request(self, settings: ServerSettings, chat: Chat, rung: str) -> WireRequest:
+    def request(self, settings: ServerSettings, chat: Chat, mode: str) -> WireRequest:
         """Return the request for a question."""
         body: Json = {
             "model": settings.model,
-            "max_tokens": chat.max_tokens or settings.max_answer_tokens,
+            "max_tokens": settings.max_answer_tokens,
             "messages": list(map(_turn, chat.messages)),
         }
         if chat.system:
@@ -42,7 +49,7 @@ class AnthropicMessages:
         if settings.temperature is not None:
             body["temperature"] = settings.temperature
         if chat.schema is not None:
-            body |= _constraint(chat, chat.schema, rung)
+            body |= _constraint(chat, chat.schema, mode)
         return WireRequest(path="/v1/messages", body=body)
 
     def completion(self, reply: Json) -> Completion:
@@ -84,7 +91,7 @@ def _turn(message: ChatMessage) -> Json:
             "source": {
                 "type": "base64",
                 "media_type": "image/jpeg",
-                "data": base64.b64encode(image).decode("ascii"),
+                "data": base64_text(image),
             },
         }
         for image in message.images
@@ -92,11 +99,11 @@ def _turn(message: ChatMessage) -> Json:
     return {"role": message.role, "content": [*images, {"type": "text", "text": message.text}]}
 
 
-def _constraint(chat: Chat, schema: Mapping[str, Any], rung: str) -> Json:
+def _constraint(chat: Chat, schema: Mapping[str, Any], mode: str) -> Json:
     reduced = wire_schema(schema)
-    if rung == OUTPUT_FORMAT and is_closed(reduced):
+    if mode == OUTPUT_FORMAT and is_closed(reduced):
         return {"output_config": {"format": {"type": "json_schema", "schema": reduced}}}
-    if rung == WORDS:
+    if mode == WORDS:
         return {}
     tool = {
         "name": chat.schema_name,

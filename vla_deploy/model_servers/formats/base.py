@@ -1,14 +1,18 @@
-"""Say what a server's language must be able to do; nothing here touches a network."""
+"""Define what a server's language must be able to do; nothing here touches a network."""
 
+import base64
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
 
 from vla_deploy.model_servers.chat import Chat, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed
 from vla_deploy.model_servers.settings import ServerSettings
 
+_KEPT: Final = frozenset({"type", "enum", "const", "description", "$ref", "required"})
+_LISTS: Final = ("anyOf",)
+_NAMED: Final = ("properties", "$defs")
 Json = dict[str, Any]
 
 
@@ -18,12 +22,11 @@ class WireRequest:
 
     path: str
     body: Json | None = None
-    headers: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelFacts:
-    """Hold what a server tells of its models; `has_vision` is None where it does not say."""
+    """Hold what a server says of its models; `has_vision` is None where it does not say."""
 
     is_present: bool
     known: tuple[str, ...]
@@ -33,17 +36,17 @@ class ModelFacts:
 class Format(Protocol):
     """Turn questions into requests, and replies into answers.
 
-    `rungs` names the ways to ask for JSON of a schema, the strictest first; the last one merely
-    asks in words, which every server understands.
+    `schema_modes` names the ways to ask for JSON of a schema, the strictest first; the last one
+    only asks in words, which every server understands.
     """
 
-    rungs: tuple[str, ...]
+    schema_modes: tuple[str, ...]
 
     def headers(self, key: Secret | None) -> dict[str, str]:
         """Return the headers that every request carries."""
         ...
 
-    def request(self, settings: ServerSettings, chat: Chat, rung: str) -> WireRequest:
+    def request(self, settings: ServerSettings, chat: Chat, mode: str) -> WireRequest:
         """Return the request for a question."""
         ...
 
@@ -58,7 +61,7 @@ class Format(Protocol):
         ...
 
     def listing(self, settings: ServerSettings) -> tuple[WireRequest, ...]:
-        """Return the requests that tell about models; `facts` reads the replies."""
+        """Return the requests for facts about models; `facts` reads the replies."""
         ...
 
     def facts(self, settings: ServerSettings, replies: tuple[Json | None, ...]) -> ModelFacts:
@@ -68,6 +71,16 @@ class Format(Protocol):
             AnswerMalformed: they are not of this language.
         """
         ...
+
+
+def bearer(key: Secret | None) -> dict[str, str]:
+    """Return a key's header, none where the server wants no key."""
+    return {} if key is None else {"Authorization": f"Bearer {key.reveal()}"}
+
+
+def base64_text(image: bytes) -> str:
+    """Return a file as a JSON body carries it."""
+    return base64.b64encode(image).decode("ascii")
 
 
 def part(reply: Any, *path: str | int) -> Any:
@@ -87,7 +100,7 @@ def part(reply: Any, *path: str | int) -> Any:
 
 
 def count(reply: Json, group: str, name: str) -> int | None:
-    """Return a count of tokens, or None where the server tells none."""
+    """Return a count of tokens, or None where the server gives none."""
     usage = reply.get(group) if group else reply
     found = usage.get(name) if isinstance(usage, dict) else None
     return found if isinstance(found, int) and not isinstance(found, bool) else None
@@ -102,3 +115,31 @@ def known_names(rows: Any, key: str) -> tuple[str, ...]:
     if not isinstance(rows, list):
         raise AnswerMalformed(f"expected a list of models in the reply, got {rows!r:.120}")
     return tuple(str(row[key]) for row in rows if isinstance(row, dict) and key in row)
+
+
+def wire_schema(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a schema whose objects are closed and have all their properties."""
+    reduced = {key: value for key, value in schema.items() if key in _KEPT}
+    for key in _NAMED:
+        if key in schema:
+            reduced[key] = {name: wire_schema(inner) for name, inner in schema[key].items()}
+    for key in _LISTS:
+        if key in schema:
+            reduced[key] = [wire_schema(inner) for inner in schema[key]]
+    items = schema.get("items")
+    if isinstance(items, Mapping):
+        reduced["items"] = wire_schema(items)
+    if "properties" in schema:
+        reduced["required"] = list(schema["properties"])
+        reduced["additionalProperties"] = False
+    return reduced
+
+
+def is_closed(schema: Mapping[str, Any]) -> bool:
+    """Return whether every object of a reduced schema names its properties, for strict modes."""
+    if schema.get("type") == "object" and "properties" not in schema:
+        return False
+    inner = [one for key in _NAMED for one in schema.get(key, {}).values()]
+    inner += [one for key in _LISTS for one in schema.get(key, ())]
+    inner += [schema["items"]] if "items" in schema else []
+    return all(map(is_closed, inner))

@@ -1,9 +1,7 @@
 """Speak Ollama's own `/api/chat`, whose `format` takes a schema."""
 
-import base64
 from typing import Final
 
-from vla_deploy.model_servers.calls.wire_schema import wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerTruncated
@@ -11,9 +9,12 @@ from vla_deploy.model_servers.formats.base import (
     Json,
     ModelFacts,
     WireRequest,
+    base64_text,
+    bearer,
     count,
     known_names,
     part,
+    wire_schema,
 )
 from vla_deploy.model_servers.settings import ServerSettings
 
@@ -25,16 +26,16 @@ WORDS: Final = "words"
 class OllamaChat:
     """Speak the language of `/api/chat`."""
 
-    rungs: tuple[str, ...] = (SCHEMA, ANY_JSON, WORDS)
+    schema_modes: tuple[str, ...] = (SCHEMA, ANY_JSON, WORDS)
 
     def headers(self, key: Secret | None) -> dict[str, str]:
         """Return the key's header, for servers behind a proxy that wants one."""
-        return {} if key is None else {"Authorization": f"Bearer {key.reveal()}"}
+        return bearer(key)
 
-    def request(self, settings: ServerSettings, chat: Chat, rung: str) -> WireRequest:
+    def request(self, settings: ServerSettings, chat: Chat, mode: str) -> WireRequest:
         """Return the request for a question."""
         system = [{"role": "system", "content": chat.system}] if chat.system else []
-        options: Json = {"num_predict": chat.max_tokens or settings.max_answer_tokens}
+        options: Json = {"num_predict": settings.max_answer_tokens}
         if settings.temperature is not None:
             options["temperature"] = settings.temperature
         body: Json = {
@@ -43,8 +44,8 @@ class OllamaChat:
             "stream": False,
             "options": options,
         }
-        if chat.schema is not None and rung != WORDS:
-            body["format"] = wire_schema(chat.schema) if rung == SCHEMA else "json"
+        if chat.schema is not None and mode != WORDS:
+            body["format"] = wire_schema(chat.schema) if mode == SCHEMA else "json"
         return WireRequest(path="/api/chat", body=body)
 
     def completion(self, reply: Json) -> Completion:
@@ -71,16 +72,16 @@ class OllamaChat:
         """Read the list and the description; a name without a tag means `latest`."""
         known = known_names(part(replies[0] or {}, "models"), "name")
         wanted = settings.model if ":" in settings.model else f"{settings.model}:latest"
-        told = replies[1].get("capabilities") if replies[1] else None
+        listed = replies[1].get("capabilities") if replies[1] else None
         return ModelFacts(
             is_present=wanted in known,
             known=known,
-            has_vision="vision" in told if isinstance(told, list) else None,
+            has_vision="vision" in listed if isinstance(listed, list) else None,
         )
 
 
 def _turn(message: ChatMessage) -> Json:
     turn: Json = {"role": message.role, "content": message.text}
     if message.images:
-        turn["images"] = [base64.b64encode(image).decode("ascii") for image in message.images]
+        turn["images"] = [base64_text(image) for image in message.images]
     return turn

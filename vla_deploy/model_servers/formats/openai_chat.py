@@ -1,10 +1,8 @@
 """Speak OpenAI's chat completions, as OpenAI does and as llama-server, vLLM and Ollama do."""
 
-import base64
 from collections.abc import Mapping
 from typing import Any, Final
 
-from vla_deploy.model_servers.calls.wire_schema import is_closed, wire_schema
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
 from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
@@ -12,9 +10,13 @@ from vla_deploy.model_servers.formats.base import (
     Json,
     ModelFacts,
     WireRequest,
+    base64_text,
+    bearer,
     count,
+    is_closed,
     known_names,
     part,
+    wire_schema,
 )
 from vla_deploy.model_servers.settings import ServerSettings
 
@@ -31,27 +33,27 @@ class OpenAiChat:
     compatible servers know.
     """
 
-    rungs: tuple[str, ...] = (JSON_SCHEMA, JSON_OBJECT, WORDS)
+    schema_modes: tuple[str, ...] = (JSON_SCHEMA, JSON_OBJECT, WORDS)
 
     def __init__(self, tokens_key: str) -> None:
         self._tokens_key = tokens_key
 
     def headers(self, key: Secret | None) -> dict[str, str]:
         """Return the key's header, none where the server wants no key."""
-        return {} if key is None else {"Authorization": f"Bearer {key.reveal()}"}
+        return bearer(key)
 
-    def request(self, settings: ServerSettings, chat: Chat, rung: str) -> WireRequest:
+    def request(self, settings: ServerSettings, chat: Chat, mode: str) -> WireRequest:
         """Return the request for a question."""
         system = [{"role": "system", "content": chat.system}] if chat.system else []
         body: Json = {
             "model": settings.model,
             "messages": [*system, *map(_turn, chat.messages)],
-            self._tokens_key: chat.max_tokens or settings.max_answer_tokens,
+            self._tokens_key: settings.max_answer_tokens,
         }
         if settings.temperature is not None:
             body["temperature"] = settings.temperature
-        if chat.schema is not None and rung != WORDS:
-            body["response_format"] = _response_format(chat, chat.schema, rung)
+        if chat.schema is not None and mode != WORDS:
+            body["response_format"] = _response_format(chat, chat.schema, mode)
         return WireRequest(path="/chat/completions", body=body)
 
     def completion(self, reply: Json) -> Completion:
@@ -90,15 +92,15 @@ def _turn(message: ChatMessage) -> Json:
     if not message.images:
         return {"role": message.role, "content": message.text}
     images = [
-        {"type": "image_url", "image_url": {"url": f"data:image/jpeg;base64,{_base64(image)}"}}
+        {"type": "image_url", "image_url": {"url": f"data:image/jpeg;base64,{base64_text(image)}"}}
         for image in message.images
     ]
     return {"role": message.role, "content": [*images, {"type": "text", "text": message.text}]}
 
 
-def _response_format(chat: Chat, schema: Mapping[str, Any], rung: str) -> Json:
+def _response_format(chat: Chat, schema: Mapping[str, Any], mode: str) -> Json:
     reduced = wire_schema(schema)
-    if rung == JSON_OBJECT:
+    if mode == JSON_OBJECT:
         return {"type": "json_object", "schema": reduced}
     named = {"name": chat.schema_name, "schema": reduced, "strict": is_closed(reduced)}
     return {"type": "json_schema", "json_schema": named}
@@ -108,10 +110,6 @@ def _vision(reply: Json, settings: ServerSettings) -> bool | None:
     rows = reply.get("models")
     for row in rows if isinstance(rows, list) else ():
         if isinstance(row, dict) and settings.model in (row.get("name"), row.get("model")):
-            told = row.get("capabilities")
-            return "multimodal" in told if isinstance(told, list) else None
+            listed = row.get("capabilities")
+            return "multimodal" in listed if isinstance(listed, list) else None
     return None
-
-
-def _base64(image: bytes) -> str:
-    return base64.b64encode(image).decode("ascii")

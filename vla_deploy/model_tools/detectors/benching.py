@@ -1,19 +1,24 @@
-"""Measure a model's files beside each other: one run of each in turn, so that load hits all."""
+"""Measure a model's files in turn, one run of each, so that load on the computer hits all alike."""
 
 import dataclasses
+import json
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import ModelChoice
+from vla_deploy.inference.errors import RunFailed
 from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.detectors.memory import memory_mb
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import Image
 
@@ -128,3 +133,46 @@ def _speedup(rows: tuple[FileFigures, ...]) -> float | None:
     medians = {row.variant: row.run_median_s for row in rows}
     int8 = next((medians[variant] for variant in _INT8 if variant in medians), None)
     return medians[Variant.FP32] / int8 if int8 and Variant.FP32 in medians else None
+
+
+def memory_mb(session: ModelSession, choice: ModelChoice, shelf: ModelShelf) -> float:
+    """Return by how much a fresh process grows that opens the same file in the same way.
+
+    Here, a second session would use again what the first one has given back.
+
+    Raises:
+        RunFailed: that process failed.
+    """
+    described = {
+        "folder": str(session.model.folder),
+        "variant": session.variant,
+        "engines": str(shelf.engines),
+        "choice": dataclasses.asdict(choice),
+    }
+    command = [sys.executable, "-m", __name__, json.dumps(described)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last = done.stderr.strip().rpartition("\n")[2]
+        raise RunFailed(f"{session.model.manifest.name}: no memory was measured: {last}")
+    return float(done.stdout)
+
+
+def main() -> None:
+    """Open the model that the argument describes, and print by how much this process grew."""
+    described = json.loads(sys.argv[1])
+    folder = Path(described["folder"])
+    values: dict[str, Any] = described["choice"]
+    lists = {key: tuple(values[key]) for key in ("tiers", "providers")}
+    choice = ModelChoice(**{**values, **lists})
+    model = StoredModel(manifest=read_manifest(folder), folder=folder)
+    session = open_session(
+        model.only(Variant(described["variant"])),
+        choice,
+        engines=Path(described["engines"]),
+        clock=MonotonicClock(),
+    )
+    sys.stdout.write(f"{session.stats().memory_mb:.3f}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,9 +1,9 @@
 """Read labelled images: YOLO's text files, or a COCO JSON file.
 
-YOLO: for each image `NAME.txt`, beside it or with `labels` for `images` in its path; in each line a
-class number and middle, width and height as shares of the image. `classes.txt`, where there is one,
-names the classes. COCO: a JSON file with `images`, `annotations` and `categories`, `bbox` in
-pixels; the images lie beside it or in `images`.
+YOLO: for each image `NAME.txt`, next to it or with `labels` for `images` in its path; in each line
+a class number and middle, width and height as shares of the image. `classes.txt`, where there is
+one, names the classes. COCO: a JSON file with `images`, `annotations` and `categories`, `bbox` in
+pixels; the images lie next to it or in `images`.
 """
 
 import json
@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import cv2
 import numpy as np
 
 from vla_deploy.inference.errors import ImagesInvalid
-from vla_deploy.model_tools.detectors.images import image_paths, read_image
 from vla_deploy.perception.detectors.boxes import Floats, Indices
 from vla_deploy.perception.detectors.image_input import Image
-from vla_deploy.robots.schema import TEXT, Shape, ValueCheck, is_number
+from vla_deploy.runtime.table_schema import TEXT, Shape, ValueCheck, is_number
 
+SUFFIXES: Final = (".bmp", ".jpeg", ".jpg", ".png", ".ppm", ".tif", ".tiff", ".webp")
 _NAMES: Final = "classes.txt"
 _ID: Final = ValueCheck(
     expected="a number or a text", holds=lambda value: is_number(value) or isinstance(value, str)
@@ -40,6 +41,43 @@ _COCO: Final[Mapping[str, Shape]] = {
     "categories": {"id": _ID, "name": TEXT},
 }
 _VALUES: Final = 5
+
+
+def image_paths(folder: Path) -> list[Path]:
+    """Return the images of a folder and of those below it.
+
+    Raises:
+        ImagesInvalid: it is no folder, or holds none.
+    """
+    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
+    if not paths:
+        what = "holds no image" if folder.is_dir() else "no such folder"
+        raise ImagesInvalid(f"{folder}: {what}; expected files ending in {', '.join(SUFFIXES)}")
+    return paths
+
+
+def read_image(path: Path) -> Image:
+    """Return an image as RGB (h, w, 3).
+
+    Raises:
+        ImagesInvalid: it cannot be read.
+    """
+    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if bgr is None:
+        raise ImagesInvalid(f"{path}: no image that can be read; remove it or save it anew")
+    rgb: Image = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    return rgb
+
+
+def spread_paths(folder: Path, most: int) -> list[Path]:
+    """Return at most so many images, spread over the folder.
+
+    Raises:
+        ImagesInvalid: there is none.
+    """
+    paths = image_paths(folder)
+    step = max(1.0, len(paths) / most)
+    return [paths[int(number * step)] for number in range(min(most, len(paths)))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,10 +147,19 @@ def _yolo(folder: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
         )
 
 
+def read_names(file: Path) -> tuple[str, ...]:
+    """Return the classes that a file names, one in each line.
+
+    Raises:
+        ImagesInvalid: it cannot be read as text.
+    """
+    return tuple(line.strip() for line in _lines(file) if line.strip())
+
+
 def _check_names(file: Path, classes: tuple[str, ...]) -> None:
     if not file.is_file():
         return
-    names = tuple(line.strip() for line in _lines(file) if line.strip())
+    names = read_names(file)
     if names != classes:
         raise ImagesInvalid(
             f"{file}: expected the model's classes {list(classes)}, got {list(names)}"
@@ -120,11 +167,11 @@ def _check_names(file: Path, classes: tuple[str, ...]) -> None:
 
 
 def _label_file(image: Path) -> Path:
-    """Return where an image's labels are: beside it, or in `labels` for the last `images`."""
-    beside = image.with_suffix(".txt")
+    """Return where an image's labels are: next to it, or in `labels` for the last `images`."""
+    sibling = image.with_suffix(".txt")
     parts = list(image.parts)
-    if beside.is_file() or "images" not in parts:
-        return beside
+    if sibling.is_file() or "images" not in parts:
+        return sibling
     last = len(parts) - 1 - parts[::-1].index("images")
     parts[last] = "labels"
     return Path(*parts).with_suffix(".txt")

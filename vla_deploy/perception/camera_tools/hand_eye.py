@@ -17,7 +17,7 @@ from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.board_pose import board_pose, placed, rms
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.geometry.lens import project
-from vla_deploy.robots.description import CameraDescription, CameraMounting
+from vla_deploy.robots.camera import CameraDescription, CameraMounting
 from vla_deploy.robots.kinematics.orientation import angle_rad, quaternion_of
 
 MIN_VIEWS: Final = 6

@@ -16,9 +16,9 @@ from vla_deploy.perception.camera_tools.board import Image
 from vla_deploy.perception.camera_tools.errors import BadImages
 from vla_deploy.perception.objects.body_state import JointHistory
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.description import CameraDescription
+from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.kinematics.model import full_positions
-from vla_deploy.robots.schema import is_number
+from vla_deploy.runtime.table_schema import is_number
 
 Array = NDArray[np.float64]
 JOINTS_FILE: Final = "joints.json"

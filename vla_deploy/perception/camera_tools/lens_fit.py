@@ -12,7 +12,7 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.camera_tools.board import Array, BoardView
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.selecting import MIN_VIEWS, require_variety
-from vla_deploy.robots.description import LensCalibration
+from vla_deploy.robots.camera import LensCalibration
 from vla_deploy.runtime.one_line import one_line
 
 MODELS: Final = {"plumb_bob": 5, "rational_polynomial": 8}

@@ -9,8 +9,7 @@ from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.graph_check import output_faults
 from vla_deploy.inference.manifest import DetectionOutputs
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.session import ModelSession
-from vla_deploy.inference.stats import SessionStats
+from vla_deploy.inference.session import ModelSession, SessionStats
 from vla_deploy.perception.detectors.adapters import ADAPTERS, Outputs
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.image_input import Image, fit_image

@@ -1,20 +1,29 @@
-"""Keep what calibration has measured in a file beside the robot file, and lay it over that file.
+"""Keep what calibration has measured in a file next to the robot file, and lay it over that file.
 
 `calibration.toml` has a table per calibrated joint; sign and offset replace those of `robot.toml`.
 It names the servo too: when another one is mounted, the old measurement is refused.
 """
 
 import json
+import os
+import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.robots.calibration.replacing import replace_text
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.schema import SERVO, TABLE, TEXT, RobotFileFault, Shape, check_record
+from vla_deploy.robots.schema import SERVO
+from vla_deploy.runtime.table_schema import (
+    TABLE,
+    TEXT,
+    Shape,
+    TableFault,
+    check_record,
+    check_tables,
+)
 
 CALIBRATION_FILE = "calibration.toml"
 CALIBRATION: Shape = {"joints": TABLE}
@@ -64,18 +73,40 @@ def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) 
     replace_text(file, _as_toml(calibrations))
 
 
-def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[RobotFileFault, ...]]:
+def replace_text(file: Path, text: str) -> None:
+    """Write a file under another name, then put it in place; `<file>.bak` is the one before.
+
+    Raises:
+        RobotFileError: it cannot be written; the old file stays.
+    """
+    fresh = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        with fresh.open("w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if file.exists():
+            shutil.copy2(file, file.with_name(file.name + ".bak"))
+        fresh.replace(file)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        expected = "a file that can be written; choose one with --output"
+        fault = TableFault(key="(file)", got=error.strerror or str(error), expected=expected)
+        raise RobotFileError(file, (fault,)) from error
+
+
+def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
     """Return a robot document with the calibration of its directory, and that file's faults."""
     file = directory / CALIBRATION_FILE
     try:
         calibrations = read_calibration(file)
     except RobotFileError as error:
-        return document, tuple(_told(fault) for fault in error.faults)
+        return document, tuple(_with_file_name(fault) for fault in error.faults)
     if not calibrations:
         return document, ()
     bus = table(document, "servo_bus")
     servos = rows(bus, "servos")
-    faults = tuple(_told(fault) for fault in _mismatches(servos, calibrations))
+    faults = tuple(_with_file_name(fault) for fault in _mismatches(servos, calibrations))
     laid_over = [_laid_over(row, calibrations) for row in servos]
     return {**document, "servo_bus": {**bus, "servos": laid_over}}, faults
 
@@ -88,7 +119,7 @@ def _laid_over(row: Document, calibrations: Mapping[str, JointCalibration]) -> D
 
 def _mismatches(
     servos: list[Document], calibrations: Mapping[str, JointCalibration]
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     ids = {row.get("joint"): row.get("id") for row in servos}
     names = sorted(name for name in ids if isinstance(name, str))
     for joint, measured in calibrations.items():
@@ -97,13 +128,11 @@ def _mismatches(
             yield unknown_name(key, joint, "a servo's joint", names)
         elif ids[joint] != measured.servo_id:
             expected = f"{ids[joint]}, the id in the robot file: calibrate the joint again"
-            yield RobotFileFault(
-                key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected
-            )
+            yield TableFault(key=f"{key}.servo_id", got=str(measured.servo_id), expected=expected)
 
 
-def _told(fault: RobotFileFault) -> RobotFileFault:
-    return RobotFileFault(
+def _with_file_name(fault: TableFault) -> TableFault:
+    return TableFault(
         key=f"{CALIBRATION_FILE}: {fault.key}", got=fault.got, expected=fault.expected
     )
 
@@ -114,15 +143,13 @@ def _parse(file: Path) -> Document:
     except FileNotFoundError:
         return {"joints": {}}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fault = RobotFileFault(key="(file)", got=str(error), expected="a TOML document")
+        fault = TableFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
 
 
-def _faults(document: Document) -> Iterator[RobotFileFault]:
+def _faults(document: Document) -> Iterator[TableFault]:
     yield from check_record(document, "", CALIBRATION)
-    for name, record in table(document, "joints").items():
-        row = record if isinstance(record, dict) else {}
-        yield from check_record(row, f"joints.{name}", JOINT)
+    yield from check_tables(document, {"joints.*": JOINT})
 
 
 def _as_toml(calibrations: Mapping[str, JointCalibration]) -> str:

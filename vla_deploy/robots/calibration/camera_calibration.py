@@ -1,4 +1,4 @@
-"""Keep what calibration has measured of the camera in files beside the robot file.
+"""Keep what calibration has measured of the camera in files next to the robot file.
 
 `camera.yaml` holds the lens in the format of ROS' camera_info, so that existing files do; without
 it the camera's own intrinsics count. `camera_mounting.toml` holds by how much the camera sits
@@ -18,20 +18,20 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.robots.calibration.calibration import replace_text
 from vla_deploy.robots.calibration.lens_schema import lens_faults
-from vla_deploy.robots.calibration.replacing import replace_text
-from vla_deploy.robots.description import CameraDescription, CameraMounting, LensCalibration
+from vla_deploy.robots.camera import CameraDescription, CameraMounting, LensCalibration
 from vla_deploy.robots.errors import RobotFileError
-from vla_deploy.robots.schema import (
+from vla_deploy.runtime.one_line import one_line
+from vla_deploy.runtime.table_schema import (
     NUMBER,
     TEXT,
-    RobotFileFault,
     Shape,
-    ValueCheck,
+    TableFault,
+    build,
     check_record,
-    is_number,
+    numbers,
 )
-from vla_deploy.runtime.one_line import one_line
 
 LENS_FILE: Final = "camera.yaml"
 MOUNTING_FILE: Final = "camera_mounting.toml"
@@ -46,19 +46,12 @@ MODELS: Final[Mapping[str, tuple[int, ...]]] = {"plumb_bob": (4, 5), "rational_p
 Document = Mapping[str, Any]
 
 
-def _numbers(count: int) -> ValueCheck:
-    def holds(value: Any) -> bool:
-        return isinstance(value, list) and len(value) == count and all(map(is_number, value))
-
-    return ValueCheck(expected=f"a list of {count} numbers", holds=holds)
-
-
 MOUNTING: Shape = {
     "site": TEXT,
     "model": TEXT,
     "focal_px": NUMBER,
-    "translation_m": _numbers(3),
-    "quaternion_xyzw": _numbers(4),
+    "translation_m": numbers(3),
+    "quaternion_xyzw": numbers(4),
     "residual_m": NUMBER,
     "made_at": TEXT,
 }
@@ -69,18 +62,18 @@ MOUNTING_HEADER = """\
 
 def with_calibration(
     camera: CameraDescription, directory: Path
-) -> tuple[CameraDescription, tuple[RobotFileFault, ...]]:
+) -> tuple[CameraDescription, tuple[TableFault, ...]]:
     """Return a camera with the calibration files of its robot's folder, and their faults."""
-    faults: list[RobotFileFault] = []
+    faults: list[TableFault] = []
     try:
         camera = replace(camera, lens=read_lens(directory / LENS_FILE, camera))
     except RobotFileError as error:
-        faults += _told(LENS_FILE, error)
+        faults += _with_file_name(LENS_FILE, error)
     try:
         # Judged with the lens in force: through another one it was measured differently.
         camera = replace(camera, mounting=read_mounting(directory / MOUNTING_FILE, camera))
     except RobotFileError as error:
-        faults += _told(MOUNTING_FILE, error)
+        faults += _with_file_name(MOUNTING_FILE, error)
     return camera, tuple(faults)
 
 
@@ -152,8 +145,7 @@ def read_mounting(file: Path, camera: CameraDescription) -> CameraMounting | Non
     faults = tuple(check_record(document, "", MOUNTING)) or tuple(_wrong(document, camera))
     if faults:
         raise RobotFileError(file, faults)
-    lists = {key: tuple(document[key]) for key in ("translation_m", "quaternion_xyzw")}
-    return CameraMounting(**{**document, **lists})
+    return build(CameraMounting, document)
 
 
 def require_plausible(file: Path, mounting: CameraMounting, camera: CameraDescription) -> None:
@@ -177,38 +169,37 @@ def write_mounting(file: Path, mounting: CameraMounting) -> None:
     replace_text(file, MOUNTING_HEADER + "".join(rows))
 
 
-def _wrong(document: Document, camera: CameraDescription) -> Iterator[RobotFileFault]:
+def _wrong(document: Document, camera: CameraDescription) -> Iterator[TableFault]:
     for key in ("site", "model"):
         if document[key] != (expected := getattr(camera, key)):
-            told = f"{expected!r}, as in the robot file: measure this camera's mounting again"
-            yield RobotFileFault(key=key, got=repr(document[key]), expected=told)
+            wanted = f"{expected!r}, as in the robot file: measure this camera's mounting again"
+            yield TableFault(key=key, got=repr(document[key]), expected=wanted)
     length = float(np.linalg.norm(document["quaternion_xyzw"]))
     if abs(length - 1.0) > 1e-3:
-        yield RobotFileFault(
+        yield TableFault(
             key="quaternion_xyzw",
             got=f"one of length {length:.4g}",
             expected="a rotation: length 1",
         )
     shift_m = float(np.linalg.norm(document["translation_m"]))
     if shift_m > MAX_SHIFT_M:
-        told = f"at most {MAX_SHIFT_M} m; correct the site in the MJCF if it sits there"
-        yield RobotFileFault(key="translation_m", got=f"{shift_m:.3f} m", expected=told)
+        wanted = f"at most {MAX_SHIFT_M} m; correct the site in the MJCF if it sits there"
+        yield TableFault(key="translation_m", got=f"{shift_m:.3f} m", expected=wanted)
     turn_rad = 2.0 * math.acos(min(1.0, abs(document["quaternion_xyzw"][3])))
     if turn_rad > MAX_TURN_RAD:
-        told = f"at most {math.degrees(MAX_TURN_RAD):.0f} degrees; correct the site in the MJCF"
-        yield RobotFileFault(
-            key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=told
+        wanted = f"at most {math.degrees(MAX_TURN_RAD):.0f} degrees; correct the site in the MJCF"
+        yield TableFault(
+            key="quaternion_xyzw", got=f"{math.degrees(turn_rad):.1f}", expected=wanted
         )
     focal_px = camera.intrinsics.fx
     if abs(document["focal_px"] / focal_px - 1.0) > SAME_FOCAL_RATIO:
-        told = f"{focal_px:.1f}, the lens in force: run `vla-deploy camera hand-eye` again"
-        yield RobotFileFault(key="focal_px", got=repr(document["focal_px"]), expected=told)
+        wanted = f"{focal_px:.1f}, the lens in force: run `vla-deploy camera hand-eye` again"
+        yield TableFault(key="focal_px", got=repr(document["focal_px"]), expected=wanted)
 
 
 def _lens(document: Document) -> LensCalibration:
     matrix = [float(value) for value in document["camera_matrix"]["data"]]
-    told = document["distortion_coefficients"]["data"]
-    coefficients = tuple(float(value) for value in told)
+    coefficients = tuple(float(value) for value in document["distortion_coefficients"]["data"])
     return LensCalibration(
         intrinsics=Intrinsics(
             width=document["image_width"],
@@ -240,9 +231,9 @@ def _text(file: Path) -> str | None:
         raise _unreadable(file, str(error), "a text file that can be read") from error
 
 
-def _told(file: str, error: RobotFileError) -> list[RobotFileFault]:
+def _with_file_name(file: str, error: RobotFileError) -> list[TableFault]:
     return [replace(fault, key=f"{file}: {fault.key}") for fault in error.faults]
 
 
 def _unreadable(file: Path, got: str, expected: str) -> RobotFileError:
-    return RobotFileError(file, (RobotFileFault(key="(file)", got=got, expected=expected),))
+    return RobotFileError(file, (TableFault(key="(file)", got=got, expected=expected),))

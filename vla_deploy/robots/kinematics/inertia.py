@@ -15,7 +15,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.kinematic_tree import Vector
 from vla_deploy.robots.kinematics.mjcf_document import BodyElement, Element, MjcfDocument
 from vla_deploy.robots.kinematics.orientation import Attributes, matrix, numbers
-from vla_deploy.robots.schema import RobotFileFault
+from vla_deploy.runtime.table_schema import TableFault
 
 Array = NDArray[np.float64]
 
@@ -50,9 +50,9 @@ def inertia_of(document: MjcfDocument, body: BodyElement) -> LinkInertia | None:
     """
     _refuse_compiler_options(document)
     way = document.compiler.get("inertiafromgeom", "auto")
-    told = body.element.find("inertial")
-    if told is not None and way != "true":
-        return _explicit(document, told)
+    inertial = body.element.find("inertial")
+    if inertial is not None and way != "true":
+        return _explicit(document, inertial)
     return None if way == "false" else _joined([*_of_geoms(document, body)])
 
 
@@ -66,20 +66,20 @@ def _refuse_compiler_options(document: MjcfDocument) -> None:
 
 
 def _refuse(document: MjcfDocument, key: str, got: str, expected: str) -> None:
-    fault = RobotFileFault(key=key, got=got, expected=expected)
+    fault = TableFault(key=key, got=got, expected=expected)
     raise RobotFileError(document.path, (fault,))
 
 
-def _explicit(document: MjcfDocument, told: Element) -> LinkInertia:
-    if "fullinertia" in told.attrib:
-        xx, yy, zz, xy, xz, yz = numbers(told.attrib["fullinertia"])
+def _explicit(document: MjcfDocument, inertial: Element) -> LinkInertia:
+    if "fullinertia" in inertial.attrib:
+        xx, yy, zz, xy, xz, yz = numbers(inertial.attrib["fullinertia"])
         own = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
     else:
-        own = np.diag(numbers(told.get("diaginertia", "0 0 0")))
-    turned = matrix(document.turned(told.attrib))
+        own = np.diag(numbers(inertial.get("diaginertia", "0 0 0")))
+    turned = matrix(document.turned(inertial.attrib))
     return LinkInertia(
-        mass_kg=float(told.get("mass", "0")),
-        centre_m=numbers(told.get("pos", "0 0 0")),
+        mass_kg=float(inertial.get("mass", "0")),
+        centre_m=numbers(inertial.get("pos", "0 0 0")),
         tensor_kg_m2=turned @ own @ turned.T,
     )
 
@@ -100,24 +100,28 @@ def _joined(parts: Sequence[LinkInertia]) -> LinkInertia | None:
 def _of_geoms(document: MjcfDocument, body: BodyElement) -> Iterator[LinkInertia]:
     low, high = numbers(document.compiler.get("inertiagrouprange", _ALL_GROUPS))
     for geom in body.element.findall("geom"):
-        told = document.attributes(geom, body.child_class)
-        if not low <= float(told.get("group", "0")) <= high:
+        attributes = document.attributes(geom, body.child_class)
+        if not low <= float(attributes.get("group", "0")) <= high:
             continue
         # A mass counts before a density.
-        if float(told.get("mass", told.get("density", _WATER))) > 0.0:
-            yield _of_geom(document, body, told)
+        if float(attributes.get("mass", attributes.get("density", _WATER))) > 0.0:
+            yield _of_geom(document, body, attributes)
 
 
-def _of_geom(document: MjcfDocument, body: BodyElement, told: Attributes) -> LinkInertia:
-    shape = document.shape(told)
-    where = f"body {body.name}: geom {told.get('name', '')}".rstrip()
+def _of_geom(document: MjcfDocument, body: BodyElement, attributes: Attributes) -> LinkInertia:
+    shape = document.shape(attributes)
+    where = f"body {body.name}: geom {attributes.get('name', '')}".rstrip()
     if shape.kind not in _SOLIDS:
         expected = f"one of {', '.join(_SOLIDS)}, or an <inertial> in the body"
         _refuse(document, where, f"a {shape.kind} that has mass", expected)
-    if told.get("shellinertia", "false") == "true":
+    if attributes.get("shellinertia", "false") == "true":
         _refuse(document, where, "shellinertia", "a solid geom, or an <inertial> in the body")
     volume, per_kg = _SOLIDS[shape.kind](shape.size_m)
-    mass = float(told["mass"]) if "mass" in told else float(told.get("density", _WATER)) * volume
+    mass = (
+        float(attributes["mass"])
+        if "mass" in attributes
+        else float(attributes.get("density", _WATER)) * volume
+    )
     turned = matrix(np.array(shape.quaternion))
     return LinkInertia(
         mass_kg=mass,

@@ -1,4 +1,4 @@
-"""Hold a robot's links as a tree, and tell where they are for given joint values.
+"""Hold a robot's links as a tree, and compute where they are for given joint values.
 
 Positions are metres, quaternions x, y, z, w; each is relative to the parent link.
 """

@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
-from vla_deploy.robots.schema import RobotFileFault, is_number
+from vla_deploy.runtime.table_schema import TableFault, is_number
 
 Document = Mapping[str, Any]
 
@@ -53,7 +53,7 @@ def _range_of(joint: ElementTree.Element) -> tuple[float, float] | None:
     return low, high
 
 
-def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[RobotFileFault]:
+def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[TableFault]:
     """Yield what the robot file says and the MJCF does not bear out."""
     yield from _one_root_body(mjcf)
     yield from _named(_joint_names(document), "a joint of the MJCF", mjcf.joint_ranges)
@@ -62,16 +62,16 @@ def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[RobotFileFault]
     yield from _limits_inside_stops(document, mjcf)
 
 
-def _one_root_body(mjcf: MjcfNames) -> Iterator[RobotFileFault]:
+def _one_root_body(mjcf: MjcfNames) -> Iterator[TableFault]:
     # Pinocchio reads the first body of the world and drops the others without a word.
     if len(mjcf.root_bodies) != 1:
         got = f"{len(mjcf.root_bodies)} root bodies ({', '.join(mjcf.root_bodies)})"
-        yield RobotFileFault(key="mjcf", got=got, expected="a file with exactly one root body")
+        yield TableFault(key="mjcf", got=got, expected="a file with exactly one root body")
 
 
 def _named(
     used: Iterable[tuple[str, object]], kind: str, known: Iterable[str]
-) -> Iterator[RobotFileFault]:
+) -> Iterator[TableFault]:
     names = frozenset(known)
     for key, name in used:
         if isinstance(name, str) and name not in names:
@@ -98,7 +98,7 @@ def _geom_names(document: Document) -> Iterator[tuple[str, object]]:
             yield f"clearance.allow[{i}]", name
 
 
-def _limits_inside_stops(document: Document, mjcf: MjcfNames) -> Iterator[RobotFileFault]:
+def _limits_inside_stops(document: Document, mjcf: MjcfNames) -> Iterator[TableFault]:
     for joint, row in subtables(document, "limits").items():
         stops = mjcf.joint_ranges.get(joint)
         low, high = row.get("min"), row.get("max")
@@ -106,4 +106,4 @@ def _limits_inside_stops(document: Document, mjcf: MjcfNames) -> Iterator[RobotF
             continue
         if low < stops[0] or high > stops[1]:
             expected = f"inside the MJCF range {stops[0]}..{stops[1]}"
-            yield RobotFileFault(key=f"limits.{joint}", got=f"{low}..{high}", expected=expected)
+            yield TableFault(key=f"limits.{joint}", got=f"{low}..{high}", expected=expected)

@@ -65,18 +65,18 @@ class MjcfDocument:
         """Return how an element is turned in its parent, as a quaternion x, y, z, w."""
         return orientation(attributes, self.radian, self.compiler.get("eulerseq", "xyz"))
 
-    def shape(self, told: Attributes) -> Shape:
+    def shape(self, attributes: Attributes) -> Shape:
         """Return the shape that a geom's attributes describe, in its body's frame."""
-        kind = told.get("type", "mesh" if "mesh" in told else "sphere")
-        size = numbers(told.get("size", ""))
-        position, quaternion = numbers(told.get("pos", "0 0 0")), self.turned(told)
-        if "fromto" in told:
-            begin, end = np.split(numbers(told["fromto"]), 2)
+        kind = attributes.get("type", "mesh" if "mesh" in attributes else "sphere")
+        size = numbers(attributes.get("size", ""))
+        position, quaternion = numbers(attributes.get("pos", "0 0 0")), self.turned(attributes)
+        if "fromto" in attributes:
+            begin, end = np.split(numbers(attributes["fromto"]), 2)
             # MuJoCo lets z point from the second end to the first one.
             position, quaternion = (begin + end) / 2, along(begin - end)
             width = size[:1] if kind in _ROUND else np.repeat(size[:1], 2)
             size = np.append(width, np.linalg.norm(end - begin) / 2)
-        rgba = self.colours.get(told.get("material", ""), "") or told.get("rgba", "")
+        rgba = self.colours.get(attributes.get("material", ""), "") or attributes.get("rgba", "")
         return Shape(
             kind=kind,
             size_m=vector(size[: _SIZES.get(kind, 3)]),
@@ -95,7 +95,7 @@ def read_document(path: Path) -> MjcfDocument:
     """
     root = ElementTree.parse(path).getroot()
     compiler = root.find("compiler")
-    told: Attributes = {} if compiler is None else dict(compiler.attrib)
+    attributes: Attributes = {} if compiler is None else dict(compiler.attrib)
     first = root.findall("worldbody/body")[:1]
     return MjcfDocument(
         path=path,
@@ -103,8 +103,8 @@ def read_document(path: Path) -> MjcfDocument:
         bodies=tuple(found for body in first for found in _walk(body, "", _MAIN)),
         defaults=_defaults(root),
         colours={one.get("name", ""): one.get("rgba", "") for one in root.iter("material")},
-        compiler=told,
-        radian=1.0 if told.get("angle") == "radian" else math.pi / 180.0,
+        compiler=attributes,
+        radian=1.0 if attributes.get("angle") == "radian" else math.pi / 180.0,
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vla_deploy.robots.description import RobotDescription
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
-from vla_deploy.robots.schema import RobotFileFault
+from vla_deploy.runtime.table_schema import TableFault
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ class RobotModel:
         missing = [name for name in robot.joint_names if not whole.existJointName(name)]
         if missing:
             got = f"a model of {whole.nq} coordinates without {', '.join(missing)}"
-            fault = RobotFileFault(
+            fault = TableFault(
                 key="mjcf", got=got, expected="every servo joint below the first body"
             )
             raise RobotFileError(robot.mjcf_path, (fault,))

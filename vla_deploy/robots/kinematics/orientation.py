@@ -120,7 +120,7 @@ def yaw_rotation(yaw_rad: float) -> Array:
 
 _WAYS: Final[Mapping[str, Callable[[Array, float, str], Array]]] = {
     "quat": lambda wxyz, radian, order: np.roll(wxyz, -1),
-    "axisangle": lambda told, radian, order: turn(told[:3], told[3] * radian),
+    "axisangle": lambda values, radian, order: turn(values[:3], values[3] * radian),
     "euler": _from_euler,
     "xyaxes": _from_axes,
     "zaxis": lambda axis, radian, order: along(axis),

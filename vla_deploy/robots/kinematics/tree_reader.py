@@ -74,16 +74,16 @@ def _link(document: MjcfDocument, body: BodyElement, *, hide: bool) -> Link:
 def _joint(
     document: MjcfDocument, joint: Element, child_class: str, leaders: Mapping[str, str]
 ) -> Joint:
-    told = document.attributes(joint, child_class)
-    kind, name = told.get("type", "hinge"), told.get("name", "")
-    axis = numbers(told.get("axis", "0 0 1"))
+    attributes = document.attributes(joint, child_class)
+    kind, name = attributes.get("type", "hinge"), attributes.get("name", "")
+    axis = numbers(attributes.get("axis", "0 0 1"))
     unit = document.radian if kind == "hinge" else 1.0
     return Joint(
         name=name,
         kind=kind,
         axis=vector(axis / np.linalg.norm(axis)),
-        range=vector(numbers(told["range"]) * unit) if "range" in told else None,
-        position_m=vector(numbers(told.get("pos", "0 0 0"))),
+        range=vector(numbers(attributes["range"]) * unit) if "range" in attributes else None,
+        position_m=vector(numbers(attributes.get("pos", "0 0 0"))),
         follows=leaders.get(name),
     )
 
@@ -93,10 +93,10 @@ def _is_shown(document: MjcfDocument, geom: Element, child_class: str) -> bool:
 
 
 def _site(document: MjcfDocument, site: Element, body: BodyElement) -> Site:
-    told = document.attributes(site, body.child_class)
+    attributes = document.attributes(site, body.child_class)
     return Site(
-        name=told.get("name", ""),
+        name=attributes.get("name", ""),
         link=body.name,
-        position_m=vector(numbers(told.get("pos", "0 0 0"))),
-        quaternion=vector(document.turned(told)),
+        position_m=vector(numbers(attributes.get("pos", "0 0 0"))),
+        quaternion=vector(document.turned(attributes)),
     )

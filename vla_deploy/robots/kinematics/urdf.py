@@ -106,9 +106,11 @@ def _inertial(inertia: LinkInertia) -> Element:
 
 def _colliding(document: MjcfDocument, body: BodyElement) -> Iterator[Shape]:
     for geom in body.element.findall("geom"):
-        told = document.attributes(geom, body.child_class)
-        if int(told.get("contype", _COLLIDES)) or int(told.get("conaffinity", _COLLIDES)):
-            yield document.shape(told)
+        attributes = document.attributes(geom, body.child_class)
+        if int(attributes.get("contype", _COLLIDES)) or int(
+            attributes.get("conaffinity", _COLLIDES)
+        ):
+            yield document.shape(attributes)
 
 
 def _parts(link: Element, use: str, shape: Shape) -> list[Element]:
@@ -175,12 +177,12 @@ def _joint_attributes(document: MjcfDocument) -> dict[str, Attributes]:
     found = {}
     for body in document.bodies:
         for joint in body.element.findall("joint"):
-            told = document.attributes(joint, body.child_class)
-            found[told.get("name", "")] = told
+            attributes = document.attributes(joint, body.child_class)
+            found[attributes.get("name", "")] = attributes
     return found
 
 
-def _joint(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> Element:
+def _joint(robot: RobotDescription, joint: FrameJoint, attributes: Attributes) -> Element:
     element = Element("joint", name=joint.name, type=joint.kind)
     element.append(_origin(np.array(joint.xyz), np.array(joint.quaternion)))
     ElementTree.SubElement(element, "parent", link=joint.parent)
@@ -188,10 +190,10 @@ def _joint(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> Elem
     if joint.kind == FIXED:
         return element
     ElementTree.SubElement(element, "axis", xyz=_text(joint.axis))
-    limit = _limit(robot, joint, told)
+    limit = _limit(robot, joint, attributes)
     if limit is not None:
         ElementTree.SubElement(element, "limit", limit)
-    damping, friction = (_first(told, name) for name in ("damping", "frictionloss"))
+    damping, friction = (_first(attributes, name) for name in ("damping", "frictionloss"))
     if damping or friction:
         values = {"damping": _text((damping,)), "friction": _text((friction,))}
         ElementTree.SubElement(element, "dynamics", values)
@@ -202,16 +204,18 @@ def _joint(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> Elem
     return element
 
 
-def _first(told: Attributes, name: str) -> float:
+def _first(attributes: Attributes, name: str) -> float:
     """Return a coefficient; MuJoCo takes further ones for terms that URDF does not have."""
-    return float(numbers(told.get(name, "0"))[0])
+    return float(numbers(attributes.get(name, "0"))[0])
 
 
-def _limit(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> dict[str, str] | None:
+def _limit(
+    robot: RobotDescription, joint: FrameJoint, attributes: Attributes
+) -> dict[str, str] | None:
     """Return a joint's bounds; a follower's are what its leader's make of it."""
     coupling = joint.coupling or JointCoupling(leader=joint.name)
     if coupling.leader not in robot.joint_names:
-        return _wheel_limit(robot, told)
+        return _wheel_limit(robot, attributes)
     limits, factor = robot.limits[coupling.leader], coupling.multiplier
     ends = sorted(coupling.offset + factor * end for end in (limits.min, limits.max))
     return {
@@ -222,13 +226,13 @@ def _limit(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> dict
     }
 
 
-def _wheel_limit(robot: RobotDescription, told: Attributes) -> dict[str, str] | None:
+def _wheel_limit(robot: RobotDescription, attributes: Attributes) -> dict[str, str] | None:
     """Return a wheel's bounds, or None where the MJCF does not bound its torque."""
-    if "actuatorfrcrange" not in told:
+    if "actuatorfrcrange" not in attributes:
         return None
     base = robot.base
     speed = base.max_speed_m_s + base.max_turn_rad_s * base.track_m / 2
-    effort = np.abs(numbers(told["actuatorfrcrange"])).max()
+    effort = np.abs(numbers(attributes["actuatorfrcrange"])).max()
     return {"velocity": _text((speed / base.wheel_radius_m,)), "effort": _text((effort,))}
 
 

@@ -14,7 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.errors import VoiceError
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
-from vla_deploy.robots.description import VoiceSettings
+from vla_deploy.robots.devices import VoiceSettings
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
 from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, PreparedSound
 from vla_deploy.speech.voice.own_echo import OwnEcho

@@ -120,26 +120,28 @@ def test_a_recalled_prompt_is_not_read_to_its_end(
     assert len(model.decoder.tokens) == 16
 
 
-def test_an_answer_ends_when_its_time_is_up(model: LanguageModel) -> None:
-    with pytest.raises(AnswerFailed, match="time is up"):
-        model.answer(ASKED, bounds(within_s=0.0), SCHEMA)
+def recalled() -> Event:
+    event = Event()
+    event.set()
+    return event
 
 
-def test_an_answer_ends_when_nobody_waits_any_more(model: LanguageModel) -> None:
-    recall = Event()
-    recall.set()
-    with pytest.raises(AnswerFailed, match="nobody waits"):
-        model.answer(ASKED, bounds(recall=recall), SCHEMA)
-
-
-def test_an_answer_is_cut_at_its_most_tokens(model: LanguageModel) -> None:
-    with pytest.raises(AnswerFailed, match="3 tokens"):
-        model.answer(ASKED, bounds(most_tokens=3), SCHEMA)
-
-
-def test_a_prompt_beyond_the_context_is_refused(model: LanguageModel) -> None:
-    with pytest.raises(AnswerFailed, match="256 at most"):
-        model.answer([{"role": "user", "content": "kitchen " * 300}], bounds(), SCHEMA)
+@pytest.mark.parametrize(
+    ("limits", "asked", "schema", "why"),
+    [
+        ({"within_s": 0.0}, ASKED, SCHEMA, "time is up"),
+        ({"recall": recalled()}, ASKED, SCHEMA, "nobody waits"),
+        ({"most_tokens": 3}, ASKED, SCHEMA, "3 tokens"),
+        ({}, [{"role": "user", "content": "kitchen " * 300}], SCHEMA, "256 at most"),
+        ({}, ASKED, {"type": "nonsense"}, "the constraint broke"),
+    ],
+    ids=["no time", "recalled", "too long", "prompt beyond the context", "no schema"],
+)
+def test_an_answer_that_cannot_be_whole_is_an_error(
+    model: LanguageModel, limits: Any, asked: Any, schema: Any, why: str
+) -> None:
+    with pytest.raises(AnswerFailed, match=why):
+        model.answer(asked, bounds(**limits), schema)
 
 
 def test_a_model_answers_again_after_a_refused_prompt(model: LanguageModel) -> None:
@@ -147,11 +149,6 @@ def test_a_model_answers_again_after_a_refused_prompt(model: LanguageModel) -> N
     with pytest.raises(AnswerFailed):
         model.answer([{"role": "user", "content": "kitchen " * 300}], bounds(), SCHEMA)
     assert model.answer(ASKED, bounds(), SCHEMA).text == before
-
-
-def test_a_schema_that_is_none_is_told(model: LanguageModel) -> None:
-    with pytest.raises(AnswerFailed):
-        model.answer(ASKED, bounds(), {"type": "nonsense"})
 
 
 def test_the_closing_brace_ends_the_answer_without_an_end_token(model: LanguageModel) -> None:

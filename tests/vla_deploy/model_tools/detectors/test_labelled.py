@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.inference.errors import ImagesInvalid
-from vla_deploy.model_tools.detectors.images import read_image, spread_paths
-from vla_deploy.model_tools.detectors.labelled import read_labelled
+from vla_deploy.model_tools.detectors.labelled import read_image, read_labelled, spread_paths
 
 CLASSES = ("cup", "ball")
 

@@ -8,10 +8,8 @@ from onnx import TensorProto, helper, numpy_helper
 
 from vla_deploy.inference.errors import AccuracyLost, ImagesInvalid, ModelMismatch, PackageMissing
 from vla_deploy.inference.manifest import Variant
-from vla_deploy.model_tools.detectors.images import spread_paths
-from vla_deploy.model_tools.detectors.int8_files import head_nodes
-from vla_deploy.model_tools.detectors.labelled import read_labelled
-from vla_deploy.model_tools.detectors.quantising import quantise
+from vla_deploy.model_tools.detectors.labelled import read_labelled, spread_paths
+from vla_deploy.model_tools.detectors.quantising import head_nodes, quantise
 from vla_deploy.model_tools.verifying import verify
 
 

@@ -1,8 +1,7 @@
 import pytest
 
 from vla_deploy.model_servers.errors import ServersFileInvalid
-from vla_deploy.model_servers.servers_file import read_servers
-from vla_deploy.model_servers.settings import Api
+from vla_deploy.model_servers.settings import Api, read_servers
 
 GOOD = """
 [servers.bench]

@@ -2,8 +2,36 @@ import socket
 
 import pytest
 
-from vla_deploy.model_servers.calls.addresses import check_address, resolve
+from vla_deploy.model_servers.calls.privacy import check_address, check_privacy, resolve
+from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.model_servers.errors import PrivacyRefused, ServerUnreachable, TimedOut
+
+TEXT = Chat(messages=(ChatMessage(text="hello"),))
+IMAGE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))
+REMOTE = {"location": "remote", "vision": True}
+TEXT_ONLY = {**REMOTE, "allow_text_off_robot": True}
+
+
+@pytest.mark.parametrize(
+    ("declared", "chat", "refused"),
+    [
+        ({"vision": True}, IMAGE, None),
+        (REMOTE, TEXT, "allow_text_off_robot"),
+        (REMOTE, IMAGE, "allow_text_off_robot"),
+        (TEXT_ONLY, TEXT, None),
+        (TEXT_ONLY, IMAGE, "allow_images_off_robot"),
+        ({**TEXT_ONLY, "allow_images_off_robot": True}, IMAGE, None),
+    ],
+)
+def test_text_and_images_leave_the_robot_only_where_each_is_allowed(
+    settings, declared, chat, refused
+):
+    server = settings("https://example.org", **declared)
+    if refused is None:
+        check_privacy("cloud", server, chat)
+        return
+    with pytest.raises(PrivacyRefused, match=f"nothing was sent.*servers.cloud.{refused} = true"):
+        check_privacy("cloud", server, chat)
 
 
 @pytest.mark.parametrize(

@@ -1,31 +1,30 @@
-"""Back-off, breaker, admission, deadline, privacy, metrics: each alone, on a stepped clock."""
+"""Back-off, breaker, admission, deadline, metrics: each alone, on a stepped clock."""
 
 import threading
 
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from vla_deploy.model_servers.calls.admission import Admission
-from vla_deploy.model_servers.calls.backoff import Backoff, may_pass
-from vla_deploy.model_servers.calls.breaker import BreakerState, CircuitBreaker
-from vla_deploy.model_servers.calls.connection import bounded_s
-from vla_deploy.model_servers.calls.privacy import check_privacy
-from vla_deploy.model_servers.calls.rate import CallRate
-from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
+from vla_deploy.model_servers.calls.limits import (
+    Admission,
+    Backoff,
+    BreakerState,
+    CallRate,
+    CircuitBreaker,
+    bounded_s,
+    may_pass,
+)
+from vla_deploy.model_servers.chat import Completion
 from vla_deploy.model_servers.errors import (
     AnswerInvalid,
     Busy,
     CircuitOpen,
-    PrivacyRefused,
     ServerFailed,
     ServerUnreachable,
     TimedOut,
 )
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.runtime.deadline import Deadline
-
-TEXT = Chat(messages=(ChatMessage(text="hello"),))
-IMAGE = Chat(messages=(ChatMessage(text="what is it?", images=(b"jpeg",)),))
 
 
 def test_the_wait_is_jittered_over_a_bound_that_doubles_up_to_the_longest():
@@ -130,32 +129,6 @@ def test_a_deadline_bounds_every_wait_by_what_is_left(clock):
     clock.time_ns += 2 * NS_PER_S
     with pytest.raises(TimedOut, match="within 2 s"):
         bounded_s(ends, 0.5)
-
-
-REMOTE = {"location": "remote", "vision": True}
-TEXT_ONLY = {**REMOTE, "allow_text_off_robot": True}
-
-
-@pytest.mark.parametrize(
-    ("declared", "chat", "refused"),
-    [
-        ({"vision": True}, IMAGE, None),
-        (REMOTE, TEXT, "allow_text_off_robot"),
-        (REMOTE, IMAGE, "allow_text_off_robot"),
-        (TEXT_ONLY, TEXT, None),
-        (TEXT_ONLY, IMAGE, "allow_images_off_robot"),
-        ({**TEXT_ONLY, "allow_images_off_robot": True}, IMAGE, None),
-    ],
-)
-def test_text_and_images_leave_the_robot_only_where_each_is_allowed(
-    settings, declared, chat, refused
-):
-    server = settings("https://example.org", **declared)
-    if refused is None:
-        check_privacy("cloud", server, chat)
-        return
-    with pytest.raises(PrivacyRefused, match=f"nothing was sent.*servers.cloud.{refused} = true"):
-        check_privacy("cloud", server, chat)
 
 
 def test_metrics_count_calls_tokens_and_times():

@@ -2,8 +2,13 @@
 
 import pytest
 
-from vla_deploy.analysis.claims import ClaimedObject, ClaimedRelation, ClaimedTask, SceneClaims
-from vla_deploy.analysis.cross_check import weighed
+from vla_deploy.analysis.claims import (
+    ClaimedObject,
+    ClaimedRelation,
+    ClaimedTask,
+    SceneClaims,
+    weighed,
+)
 from vla_deploy.analysis.document import EvidenceSource
 from vla_deploy.feasibility.verdict import Feasible
 
