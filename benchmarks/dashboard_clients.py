@@ -22,9 +22,10 @@ from urllib.parse import urlsplit
 import psutil
 
 from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import arm, live_robot
+from benchmarks.live_robot import arm, live_robot, ticks_so_far
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc.topics import DASHBOARD_STATUS
 
 CLIENTS: Final = 50
 FROZEN: Final = 1
@@ -82,10 +83,10 @@ def _measure(session: RobotSession, seconds: float) -> dict[str, Any]:
 
 
 def _span(session: RobotSession, process: psutil.Process, seconds: float) -> dict[str, float]:
-    before, cpu = _ticks(session), process.cpu_times()
+    before, cpu = ticks_so_far(session), process.cpu_times()
     began_ns = session.clock.now_ns()
     session.pause(seconds)
-    after, then = _ticks(session), process.cpu_times()
+    after, then = ticks_so_far(session), process.cpu_times()
     spent_s = then.user + then.system - cpu.user - cpu.system
     took_s = (session.clock.now_ns() - began_ns) / NS_PER_S
     late, ticks = after[1] - before[1], after[0] - before[0]
@@ -96,14 +97,9 @@ def _span(session: RobotSession, process: psutil.Process, seconds: float) -> dic
     }
 
 
-def _ticks(session: RobotSession) -> tuple[int, int]:
-    status = session.document("control_status") or {}
-    return int(status["tick"]), int(status["late_ticks"])
-
-
 def _dashboard(session: RobotSession) -> tuple[psutil.Process, tuple[str, str]]:
     deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
-    while (sample := session.fresh("dashboard_status", age_limit_s=5.0)) is None:
+    while (sample := session.fresh(DASHBOARD_STATUS, age_limit_s=5.0)) is None:
         if session.clock.now_ns() > deadline_ns:
             raise NotServed("the dashboard tells no address; see `vla-deploy logs dashboard`")
         session.pause()

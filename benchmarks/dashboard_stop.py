@@ -26,6 +26,7 @@ from benchmarks.live_robot import NotReached, arm, await_change, live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import Topic, topics
 
 CLIENTS: Final = 20
 BOTH: Final = ("page", "door")
@@ -87,7 +88,7 @@ class _Presser:
 
     def address(self, door: str) -> tuple[str, int]:
         """Return where a door was told to be, also once it is gone."""
-        topic = {"page": "dashboard_status", "door": "stop_door_status"}[door]
+        topic: Topic[Any] = topics.DASHBOARD_STATUS if door == "page" else topics.STOP_DOOR_STATUS
         deadline_ns = self.session.clock.now_ns() + round(_START_S * NS_PER_S)
         while (told := self.session.document(topic)) is None:
             if self.session.clock.now_ns() > deadline_ns:
@@ -186,10 +187,10 @@ def _pid(session: RobotSession) -> int:
     """Return the running dashboard's pid."""
     deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
     while session.clock.now_ns() < deadline_ns:
-        table = session.document("process_table") or {"processes": []}
-        for row in table["processes"]:
-            if row["name"] == "dashboard" and row["state"] == "ready":
-                return int(row["pid"])
+        table = session.document(topics.PROCESS_TABLE)
+        for row in () if table is None else table["processes"]:
+            if row["name"] == "dashboard" and row["state"] == "ready" and row["pid"]:
+                return row["pid"]
         session.pause()
     raise NoStop("there is no dashboard to be without; see `vla-deploy status`")
 

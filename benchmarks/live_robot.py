@@ -1,6 +1,6 @@
 """Run the robot's real processes on a twin, at a priority that the benchmark chooses."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final
@@ -8,11 +8,17 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.motion import OperatorActName
 
 PROFILE_FILE: Final = "bench.toml"
 _ARM_S: Final = 30.0
 _LOOKS_PER_TRY: Final = 25
-_WAY: Final = {"stopped": "reset", "fault": "reset", "disarmed": "arm"}
+_WAY: Final[Mapping[str, OperatorActName]] = {
+    "stopped": "reset",
+    "fault": "reset",
+    "disarmed": "arm",
+}
 """What leads from a state towards being armed; elsewhere control is under way."""
 
 
@@ -69,6 +75,18 @@ def arm(session: RobotSession) -> None:
         await_change(session, state)
 
 
+def ticks_so_far(session: RobotSession) -> tuple[int, int]:
+    """Return how many ticks control has had, and how many of them were late.
+
+    Raises:
+        NotReached: control is silent.
+    """
+    status = session.document(topics.CONTROL_STATUS)
+    if status is None:
+        raise NotReached("control tells no ticks")
+    return status["tick"], status["late_ticks"]
+
+
 def await_change(session: RobotSession, state: str) -> None:
     """Return once control is not in this state any more, or after half a second."""
     for _ in range(_LOOKS_PER_TRY):
@@ -78,5 +96,5 @@ def await_change(session: RobotSession, state: str) -> None:
 
 
 def _state(session: RobotSession) -> str:
-    status = session.document("control_status", age_limit_s=0.5)
+    status = session.document(topics.CONTROL_STATUS, age_limit_s=0.5)
     return "silent" if status is None else str(status["state"])

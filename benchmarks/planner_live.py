@@ -24,7 +24,7 @@ from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.harness.process_stack import ProcessStack
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.ipc import RingReader, SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 
 PROFILE: Final = "jetson_orin_nano"
 ACCOUNTED: Final = ("planner", "speech")
@@ -46,10 +46,10 @@ class _Robot:
     def __init__(self, stack: ProcessStack, session: RobotSession, space: SharedSpace) -> None:
         self.stack = stack
         self.session = session
-        self._plans: RingReader = space.ring_reader("plan", from_start=False)
-        self._joints = space.cell_reader("joint_state")
-        self._base = space.cell_reader("base_state")
-        self._utterances = space.ring_writer("utterance")
+        self._plans = space.ring_reader(topics.PLAN, from_start=False)
+        self._joints = space.cell_reader(topics.JOINT_STATE)
+        self._base = space.cell_reader(topics.BASE_STATE)
+        self._utterances = space.ring_writer(topics.UTTERANCE)
         self._count = 0
 
     def rest(self) -> None:
@@ -84,8 +84,9 @@ class _Robot:
         """Give a command in words; return when."""
         self._count += 1
         now_ns = self.session.clock.now_ns()
-        message = {"command_id": f"bench-{self._count}", "text": text, "source": "bench"}
-        self._utterances.publish(message)
+        self._utterances.publish(
+            {"command_id": f"bench-{self._count}", "text": text, "source": "bench"}
+        )
         return now_ns
 
     def speak(self, text: str) -> int:

@@ -21,7 +21,7 @@ import psutil
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import arm, live_stack
+from benchmarks.live_robot import arm, live_stack, ticks_so_far
 from benchmarks.percentiles import percentile
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.session import RobotSession
@@ -110,10 +110,10 @@ def _late_ticks(
 
 def _counted(session: RobotSession) -> tuple[int, int]:
     """Return how many ticks of a window were late, and how many it had."""
-    before = session.document("control_status") or {}
+    tick, late_ticks = ticks_so_far(session)
     session.pause(_WINDOW_S)
-    after = session.document("control_status") or {}
-    return after["late_ticks"] - before["late_ticks"], after["tick"] - before["tick"]
+    tick_after, late_after = ticks_so_far(session)
+    return late_after - late_ticks, tick_after - tick
 
 
 def _robot(folder: Path) -> Path:

@@ -9,6 +9,7 @@ from platforms import load_profile
 from sim_twin.harness.stack import LockstepControl
 from sim_twin.sound.streams import streamed_microphone
 from sim_twin.sound.talker import Talker
+from vla_deploy.ipc import topics
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import build_stop_words
 from vla_deploy.speech.voice.tts import EspeakEngine
@@ -53,8 +54,9 @@ def _stop(
     listener = build_stop_words(context, profile)
     clock.add(SpeechNode(context, rig.robot, profile, microphone, stop_words=listener))
     rig.arm()
-    goal = {"kind": "goal", "motion_id": 1, "targets": _TARGETS, "speed_ratio": 0.1}
-    rig.space.ring_writer("motion_command").publish(goal)
+    rig.space.ring_writer(topics.MOTION_COMMAND).publish(
+        {"kind": "goal", "motion_id": 1, "targets": _TARGETS, "speed_ratio": 0.1}
+    )
     if not clock.run_until(lambda: _fastest(rig) > _MOVING_RAD_S, _PATIENCE_S):
         return None, None
     ends_ns = rig.speak(text, Talker(engine=EspeakEngine(voice=voice)), snr_db).ends_ns

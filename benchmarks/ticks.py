@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import arm, live_robot
+from benchmarks.live_robot import arm, live_robot, ticks_so_far
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
 from vla_deploy.cli.session import RobotSession
@@ -59,11 +59,10 @@ def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str
 def _late_ratios(session: RobotSession, seconds: float) -> tuple[float, float]:
     """Return the shares of control's late ticks and of the bare loop's."""
     session.pause(_SETTLE_S)
-    before = session.document("control_status") or {}
+    tick, late_ticks = ticks_so_far(session)
     bare = sleep_bare(session.clock, _PERIOD_S, seconds)
-    after = session.document("control_status") or {}
-    ticks = after["tick"] - before["tick"]
-    return (after["late_ticks"] - before["late_ticks"]) / ticks, bare.late_ticks / bare.tick
+    tick_after, late_after = ticks_so_far(session)
+    return (late_after - late_ticks) / (tick_after - tick), bare.late_ticks / bare.tick
 
 
 def sleep_bare(clock: Clock, period_s: float, seconds: float) -> TickClock:

@@ -14,6 +14,7 @@ from sim_twin.campaigns.strays import MARK, strays
 from sim_twin.harness.service_runner import RunnerState, ServiceRunner
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import IpcError
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.systemd import RESTART_S, watchdog_s
@@ -55,8 +56,8 @@ class RobotService:
             self._runner.stop()  # what it holds of an ended service goes too
             self._runner = self._started()
         self._await(self.is_ready, _READY_S, "not every process is ready")
-        for act, wanted in (("reset", ("disarmed", "armed")), ("arm", ("armed",))):
-            self._do(act, wanted)
+        self._do("reset", ("disarmed", "armed"))
+        self._do("arm", ("armed",))
 
     def has_ended(self) -> bool:
         """Return whether the service has ended as a person wanted: nobody starts it again."""
@@ -151,7 +152,7 @@ class RobotService:
         runner.start()
         return runner
 
-    def _do(self, act: str, wanted: tuple[str, ...]) -> None:
+    def _do(self, act: OperatorActName, wanted: tuple[str, ...]) -> None:
         """Do an act again and again, as a person would, until control is where it should be."""
         deadline_ns = self._clock.now_ns() + round(_ACT_S * NS_PER_S)
         while self.control_state() not in wanted:

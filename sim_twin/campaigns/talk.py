@@ -5,6 +5,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import RingReader, RingWriter
+from vla_deploy.ipc.payloads.tasks import TaskEvent, Utterance
 
 _LAST_EVENTS: Final = ("finished", "rejected")
 _ANSWER_NS: Final = 8 * NS_PER_S
@@ -14,7 +15,9 @@ _ANSWER_NS: Final = 8 * NS_PER_S
 class CommandTalk:
     """Give commands one at a time and see how each ends, without ever waiting."""
 
-    def __init__(self, utterances: RingWriter, events: RingReader, clock: Clock) -> None:
+    def __init__(
+        self, utterances: RingWriter[Utterance], events: RingReader[TaskEvent], clock: Clock
+    ) -> None:
         self._utterances = utterances
         self._events = events
         self._clock = clock
@@ -37,18 +40,18 @@ class CommandTalk:
 
     def cancel(self) -> None:
         """End what goes on."""
-        command = {"command_id": f"campaign-{uuid.uuid4().hex[:12]}", "source": "cli"}
-        self._utterances.publish({**command, "cancel": True})
+        command_id = f"campaign-{uuid.uuid4().hex[:12]}"
+        self._utterances.publish({"command_id": command_id, "source": "cli", "cancel": True})
 
     def listen(self) -> None:
         """Note how the command goes on and ends."""
         for event in self._events.drain():
             said = event.payload
-            if said.get("command_id") != self._now:
+            if said["command_id"] != self._now:
                 continue
             self._answer_by_ns = None
-            if said.get("event") in _LAST_EVENTS:
+            if said["event"] == "finished" or said["event"] == "rejected":
                 self._now = ""
-                success = bool(said.get("success"))
+                success = said["event"] == "finished" and said["success"]
                 self.done += success
                 self.failed += not success

@@ -15,7 +15,7 @@ from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.referee import ask, told_hazards
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import running
 
@@ -126,8 +126,10 @@ class WorkingRobot:
 
     def go(self, **targets: float) -> None:
         """Send joints somewhere, past the executor: it must be idle."""
-        goal = {"kind": "goal", "motion_id": next(self._motions), "speed_ratio": 1.0}
-        self._goals.publish({**goal, "targets": targets})
+        motion_id = next(self._motions)
+        self._goals.publish(
+            {"kind": "goal", "motion_id": motion_id, "targets": targets, "speed_ratio": 1.0}
+        )
 
     def use_profile(self, path: Path, meanwhile: Callable[[], object]) -> dict[str, Any]:
         """Ask for a profile, as `vla-deploy profile use` does, and return how that ended."""
@@ -146,8 +148,8 @@ class WorkingRobot:
     def talk(self) -> CommandTalk:
         """Return a way to give commands."""
         space = self._space
-        events = space.ring_reader("task_event", from_start=False)
-        return CommandTalk(space.ring_writer("utterance"), events, self.clock)
+        events = space.ring_reader(topics.TASK_EVENT, from_start=False)
+        return CommandTalk(space.ring_writer(topics.UTTERANCE), events, self.clock)
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Return whether something came true in time.
@@ -204,8 +206,8 @@ class WorkingRobot:
             return False
         self._session = RobotSession(Path(owner.run_dir), self.clock)
         self._space = SharedSpace(Path(owner.run_dir) / "ipc", self.clock)
-        self._goals = self._space.ring_writer("motion_command")
-        self._requests = self._space.ring_writer("profile_request")
+        self._goals = self._space.ring_writer(topics.MOTION_COMMAND)
+        self._requests = self._space.ring_writer(topics.PROFILE_REQUEST)
         return True
 
     def _last_words(self) -> str:

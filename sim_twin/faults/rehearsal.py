@@ -12,6 +12,7 @@ from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.faults.verdict import failures
 from sim_twin.faults.witness import FaultWitness
 from sim_twin.harness.stack import LockstepControl, LockstepStack
+from vla_deploy.ipc import topics
 
 _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5
@@ -51,7 +52,7 @@ class Rehearsal:
         self._scenario = scenario
         takes_all = scenario.meanwhile.takes_all
         self._stack = (LockstepStack if takes_all else LockstepControl)(tmp_path, seed)
-        self._base_command = self._stack.space.cell_writer("base_command")
+        self._base_command = self._stack.space.cell_writer(topics.BASE_COMMAND)
         if not takes_all:
             self._stack.add_senses()
         self._start_s = 0.0
@@ -91,8 +92,9 @@ class Rehearsal:
         """Set the robot in motion; return the command's id on a travel, else nothing."""
         match self._scenario.meanwhile:
             case Meanwhile.REACH:
-                goal = {"kind": "goal", "motion_id": 1, "targets": _REACH, "speed_ratio": 0.7}
-                self._stack.space.ring_writer("motion_command").publish(goal)
+                self._stack.space.ring_writer(topics.MOTION_COMMAND).publish(
+                    {"kind": "goal", "motion_id": 1, "targets": _REACH, "speed_ratio": 0.7}
+                )
             case Meanwhile.TRAVEL:
                 return self._give("move", distance_m=_TRAVEL_M)
             case Meanwhile.TURN:

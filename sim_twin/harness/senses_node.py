@@ -7,7 +7,7 @@ from drivers.clock import NS_PER_S
 from drivers.imu.base import Imu
 from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
-from vla_deploy.ipc import BY_NAME, SharedSpace
+from vla_deploy.ipc import BY_NAME, SharedSpace, topics
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
@@ -39,9 +39,9 @@ class SensesNode:
         self._imu: Imu = registry.open_imu(robot.imu.model, imu, clock)
         self._space = SharedSpace(context.run_dir / "ipc", clock)
         self._pose_tracker = PoseTracker(robot, RobotModel(robot), self._space)
-        self._scan = self._space.cell_writer("scan")
-        self._attitude = self._space.cell_writer("imu")
-        self._obstacles = self._space.cell_writer("near_obstacles")
+        self._scan = self._space.cell_writer(topics.SCAN)
+        self._attitude = self._space.cell_writer(topics.IMU)
+        self._obstacles = self._space.cell_writer(topics.NEAR_OBSTACLES)
         self._next_look_ns = 0
 
     def start(self) -> None:

@@ -2,7 +2,7 @@
 
 import itertools
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from drivers.audio.base import Samples
 from platforms import load_profile
@@ -13,7 +13,9 @@ from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.streams import streamed_microphone, streamed_speaker
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.control.node import ControlNode
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.motion import OperatorActName
+from vla_deploy.ipc.payloads.tasks import UtteranceContent
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.runtime.executors import InlineExecutor
@@ -50,8 +52,8 @@ class LockstepControl:
         self.robot = self.lockstep.robot
         self._profile = load_profile(profile)
         self.space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
-        self.operator = self.space.ring_writer("operator")
-        self._status = self.space.cell_reader("control_status")
+        self.operator = self.space.ring_writer(topics.OPERATOR)
+        self._status = self.space.cell_reader(topics.CONTROL_STATUS)
         self.control: Node = self._new_control()
         self.lockstep.add(self.control)
 
@@ -77,9 +79,9 @@ class LockstepControl:
     def status(self) -> dict[str, Any]:
         """Return control's newest status, or an empty document before the first."""
         sample = self._status.latest()
-        return sample.document() if sample is not None else {}
+        return {} if sample is None else {**sample.document()}
 
-    def operate(self, act: str) -> None:
+    def operate(self, act: OperatorActName) -> None:
         """Publish an operator's act."""
         self.operator.publish({"act": act, "source": "test", "reason": ""})
 
@@ -96,7 +98,7 @@ class LockstepControl:
         if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
             raise StackNotReady(f"control does not arm: {self.status()}")
 
-    def insist(self, act: str) -> None:
+    def insist(self, act: OperatorActName) -> None:
         """Do an operator's act again and again, as a person would, until it has its effect."""
         for _ in range(round(ACT_S / ACT_EVERY_S)):
             self.operate(act)
@@ -138,8 +140,8 @@ class LockstepStack(LockstepControl):
     ) -> None:
         """Start every node; with `speech` the robot hears and speaks too, which costs time."""
         super().__init__(tmp_path, seed, profile, robot=robot, world=world)
-        self._utterances = self.space.ring_writer("utterance")
-        self._events = self.space.ring_reader("task_event", from_start=True)
+        self._utterances = self.space.ring_writer(topics.UTTERANCE)
+        self._events = self.space.ring_reader(topics.TASK_EVENT, from_start=True)
         self._numbers = itertools.count(1)
         self.events: list[dict[str, Any]] = []
         self._outcomes: dict[str, dict[str, Any]] = {}
@@ -167,18 +169,18 @@ class LockstepStack(LockstepControl):
             page_stop_words=build_stop_words(context, self._profile, place=PAGE),
         )
 
-    def give(self, **utterance: Any) -> str:
+    def give(self, **content: Unpack[UtteranceContent]) -> str:
         """Give a command without waiting; return its id."""
         command_id = f"command-{next(self._numbers)}"
-        self._utterances.publish({"command_id": command_id, "source": "test"} | utterance)
+        self._utterances.publish({"command_id": command_id, "source": "test", **content})
         return command_id
 
     def outcome(self, command_id: str) -> dict[str, Any] | None:
         """Return a command's last event, once it has one."""
         for event in self._events.drain():
-            self.events.append(event.payload)
+            self.events.append({**event.payload})
             if event.payload["event"] in ("finished", "rejected"):
-                self._outcomes.setdefault(event.payload["command_id"], event.payload)
+                self._outcomes.setdefault(event.payload["command_id"], {**event.payload})
         return self._outcomes.get(command_id)
 
     def say(self, text: str, timeout_s: float = COMMAND_TIMEOUT_S) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import Sample, SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace, topics
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.localising.place_judge import PlaceState
@@ -38,13 +38,13 @@ class MapRecorder:
         """
         model = RobotModel(robot)
         site = model.site_pose(robot.lidar.site, full_positions(robot))
-        self._scan, self._imu = space.cell_reader("scan"), space.cell_reader("imu")
-        self._base_state = space.cell_reader("base_state")
-        self._images = space.frame_reader("rgbd")
+        self._scan, self._imu = space.cell_reader(topics.SCAN), space.cell_reader(topics.IMU)
+        self._base_state = space.cell_reader(topics.BASE_STATE)
+        self._images = space.frame_reader(topics.RGBD)
         self._body = BodyState(robot, model)
         self._body.start(space)
         self._camera = robot.camera
-        start = _tracked_pose(space.cell_reader("pose").latest())
+        start = _tracked_pose(space.cell_reader(topics.POSE).latest())
         self.on_old_frame = start is not None
         lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
         self.mapper = Mapper(start or ORIGIN, lidar, resolution_m)

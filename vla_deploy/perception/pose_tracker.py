@@ -3,7 +3,7 @@
 from drivers.clock import NS_PER_S
 from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
-from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
+from vla_deploy.ipc import CellReader, CellWriter, SharedSpace, topics
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.maps.grid_map import load_map
 from vla_deploy.navigation.pose import Pose2D
@@ -33,8 +33,8 @@ class PoseTracker:
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics."""
-        self._base_state: CellReader = space.cell_reader("base_state")
-        self._writer: CellWriter = space.cell_writer("pose")
+        self._base_state: CellReader = space.cell_reader(topics.BASE_STATE)
+        self._writer: CellWriter = space.cell_writer(topics.POSE)
 
     def add_imu(self, newest: ImuSample) -> None:
         """Use a sample of the IMU from the next step on."""
@@ -69,7 +69,7 @@ class PoseTracker:
 
 
 def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
-    last = space.cell_reader("pose").latest()
+    last = space.cell_reader(topics.POSE).latest()
     if last is not None:
         return Pose2D(*(float(last.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
     start = robot.start_pose

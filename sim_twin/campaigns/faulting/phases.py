@@ -6,6 +6,8 @@ from enum import Enum
 from typing import Final
 
 from sim_twin.harness.stack import LockstepControl
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.motion import GoalMotion
 
 PAYLOAD: Final = "red_cup"
 """What the left hand carries; its middle is where the hand's grip site is."""
@@ -55,8 +57,8 @@ class PhaseStage:
     def __init__(self, stack: LockstepControl) -> None:
         self._stack = stack
         self._lockstep = stack.lockstep
-        self._motions = stack.space.ring_writer("motion_command")
-        self._base = stack.space.cell_writer("base_command")
+        self._motions = stack.space.ring_writer(topics.MOTION_COMMAND)
+        self._base = stack.space.cell_writer(topics.BASE_COMMAND)
         self._number = 0
         self._speeds: tuple[float, float] | None = None
         self._begin: Mapping[Phase, Callable[[], None]] = {
@@ -136,6 +138,12 @@ class PhaseStage:
         self, targets: Mapping[str, float], speed: float, effort: Mapping[str, float] | None = None
     ) -> None:
         self._number += 1
-        goal = {"kind": "goal", "motion_id": self._number, "targets": dict(targets)}
-        extra = {"effort_ratio": dict(effort)} if effort else {}
-        self._motions.publish({**goal, "speed_ratio": speed, **extra})
+        goal: GoalMotion = {
+            "kind": "goal",
+            "motion_id": self._number,
+            "targets": dict(targets),
+            "speed_ratio": speed,
+        }
+        if effort:
+            goal["effort_ratio"] = dict(effort)
+        self._motions.publish(goal)

@@ -11,6 +11,7 @@ from vla_deploy.analysis.question import Analyser, SceneQuestion, question_about
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
 
@@ -52,7 +53,7 @@ def ask(session: RobotSession, goal: str) -> SceneQuestion:
     Raises:
         UsageError: perception is silent.
     """
-    frame = session.frame("rgbd", age_limit_s=FRESH_S)
+    frame = session.frame(topics.RGBD, age_limit_s=FRESH_S)
     image = None if frame is None else colours(frame)
     return question_about(session, session.scene(), goal, image)
 

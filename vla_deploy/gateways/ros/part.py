@@ -9,6 +9,7 @@ from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
 from vla_deploy.gateways.ros.graph import GraphLink
 from vla_deploy.gateways.ros.stamps import RosTime
+from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
 
@@ -29,7 +30,7 @@ class Gateway:
 
     def control_status(self) -> Mapping[str, Any] | None:
         """Return how control is, or None where it is silent."""
-        return self.link.document("control_status", _STATUS_AGE_S)
+        return self.link.document(topics.CONTROL_STATUS, _STATUS_AGE_S)
 
 
 class GatewayPart(Protocol):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellReader, SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.geometry.rotation import yaw_rotation
@@ -86,8 +86,8 @@ class BodyState:
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics."""
-        self._joint_state: CellReader = space.cell_reader("joint_state")
-        self._executor_status: CellReader = space.cell_reader("executor_status")
+        self._joint_state = space.cell_reader(topics.JOINT_STATE)
+        self._executor_status = space.cell_reader(topics.EXECUTOR_STATUS)
 
     def read(self) -> None:
         """Take the newest joint state."""

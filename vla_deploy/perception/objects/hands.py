@@ -6,6 +6,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Sample
+from vla_deploy.ipc.payloads.scene import HandDocument
 from vla_deploy.perception.naming.classes import OTHER
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world.touch import FingerSample, Grip, Touch, feel
@@ -32,9 +33,10 @@ class Hold:
         """Return whether the hand lost what it was to hold, rather than putting it down."""
         return not self.kind and self.touch.grip is Grip.LOST
 
-    def document(self) -> dict[str, Any]:
-        """Return it for the scene topic."""
+    def document(self, holding: str | None) -> HandDocument:
+        """Return it for the scene topic; `holding` is the id of what is held."""
         return {
+            "holding": holding,
             "class": self.kind or None,
             "told": self.reported or None,
             "felt": self.touch.grip.value,

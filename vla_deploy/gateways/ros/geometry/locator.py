@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import (
     SceneUnreadable,
@@ -54,7 +55,7 @@ class Locator:
 
     def scene(self) -> Mapping[str, Any] | None:
         """Return the scene's document, None where perception is silent."""
-        return self._link.document("scene", SCENE_AGE_S)
+        return self._link.document(topics.SCENE, SCENE_AGE_S)
 
     def place_at(self, x_m: float, y_m: float) -> str:
         """Return the named place that is nearest, "" where none is near."""

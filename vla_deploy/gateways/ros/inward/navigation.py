@@ -1,7 +1,6 @@
 """Serve NavigateToPose: the pose becomes a plan of one action, judged and driven as any other."""
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 from builtin_interfaces.msg import Duration
@@ -9,7 +8,6 @@ from geometry_msgs.msg import PoseStamped
 from nav2_msgs.action import NavigateToPose
 
 from drivers.clock import NS_PER_S
-from vla_deploy.client.following import Event
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.geometry.planar import Planar, inverse, joined, planar_of
 from vla_deploy.gateways.ros.geometry.rotation import quaternion_of, yaw_of
@@ -22,6 +20,8 @@ from vla_deploy.gateways.ros.inward.orders import (
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.outward.body import MAP, ODOM
 from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.tasks import ExecutorStatus, TaskEvent
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME
 
 FAILED: Final = 9000
@@ -83,7 +83,7 @@ class NavigationServer:
 
     def _frame(self, frame: str) -> Planar:
         link = self._gateway.link
-        pose, base = link.fresh("pose", _AGE_S), link.fresh("base_state", _AGE_S)
+        pose, base = link.fresh(topics.POSE, _AGE_S), link.fresh(topics.BASE_STATE, _AGE_S)
         if pose is None or base is None:
             raise OrderInvalid(f"the robot does not know its place now, by which {frame} is known")
         if frame == BASE_FRAME:
@@ -127,16 +127,16 @@ class Driving:
         self._order.cancel()
         return self._given_up(reason) if superseded else None
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: TaskEvent) -> None:
         if event["event"] == "setback":
             self._retries += 1
         if event["event"] == "action":
-            self._retries = max(self._retries, int(event.get("retries") or 0))
+            self._retries = max(self._retries, event["retries"])
         if event["event"] == "asked":  # nobody can answer here
-            self._cancelled = f"it needs a person's word: {event.get('question')}"
+            self._cancelled = f"it needs a person's word: {event['question']}"
             self._order.cancel()
 
-    def _finish(self, last: Event) -> GoalOutcome:
+    def _finish(self, last: TaskEvent) -> GoalOutcome:
         why = error_of(last)
         if not why and not self._cancelled:
             return GoalOutcome(ending=GoalEnding.SUCCEEDED, result=NavigateToPose.Result())
@@ -148,7 +148,7 @@ class Driving:
 
     def _tell(self, now_ns: int) -> None:
         link = self._gateway.link
-        sample = link.fresh("pose", _AGE_S)
+        sample = link.fresh(topics.POSE, _AGE_S)
         if sample is None:
             return
         x_m, y_m, yaw_rad = planar_of(sample)
@@ -160,16 +160,16 @@ class Driving:
         position = message.current_pose.pose.position
         position.x, position.y = x_m, y_m
         message.current_pose.pose.orientation = quaternion_of(0.0, 0.0, yaw_rad)
-        left_m = self._left_m((x_m, y_m), link.document("executor_status", 1.0) or {})
+        left_m = self._left_m((x_m, y_m), link.document(topics.EXECUTOR_STATUS, 1.0))
         message.distance_remaining = left_m
         seconds = left_m / self._gateway.robot.base.max_speed_m_s
         message.estimated_time_remaining = _duration(seconds)
         message.navigation_time = _duration((now_ns - self._began_ns) / NS_PER_S)
         self._feedback(message)
 
-    def _left_m(self, here: tuple[float, float], executor: Mapping[str, Any]) -> float:
+    def _left_m(self, here: tuple[float, float], executor: ExecutorStatus | None) -> float:
         """Return the length of the way that is left: of the planned one from the nearest point."""
-        way = executor.get("way_m") or [self._target[:2]]
+        way = (executor and executor["way_m"]) or [[*self._target[:2]]]
         nearest = min(range(len(way)), key=lambda i: math.dist(way[i], here))
         rest = way[nearest:]
         return math.dist(here, rest[0]) + sum(map(math.dist, rest, rest[1:]))

@@ -1,6 +1,6 @@
 """List what the gateway takes from the graph, as far as the robot file permits it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from control_msgs.action import FollowJointTrajectory
@@ -22,10 +22,11 @@ from vla_deploy.gateways.ros.inward.trajectories import TrajectoryServer
 from vla_deploy.gateways.ros.inward.velocity import Velocity
 from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.ros_settings import Accepts
 
-ALL_ACTS: Final = (ESTOP, "reset", "arm", "disarm")
+ALL_ACTS: Final[tuple[OperatorActName, ...]] = (ESTOP, "reset", "arm", "disarm")
 WHOLE_BODY: Final = "joint_trajectory_controller"
 OWN: Final = "/vla_deploy"
 """Before the names of the robot's own servers where servers beyond it have theirs."""
@@ -43,7 +44,11 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
     motions = Motions(link, gateway.robot.joint_index, "ros")
     motions.end_those_of_one_before()
     orders = CommandOrders(link)
-    acts = {Accepts.STOP: (ESTOP,), Accepts.ALL: ALL_ACTS}.get(accept)
+    by_setting: Mapping[Accepts, tuple[OperatorActName, ...]] = {
+        Accepts.STOP: (ESTOP,),
+        Accepts.ALL: ALL_ACTS,
+    }
+    acts = by_setting.get(accept)
     parts: list[GatewayPart] = [] if acts is None else [Acts(gateway, acts)]
     takes_all = accept is Accepts.ALL
     if settings.is_driven_by_nav2:

@@ -10,7 +10,7 @@ from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.claiming import PartsHold
 from vla_deploy.gateways.ros.inward.refusals import Refusals
 from vla_deploy.gateways.ros.part import Gateway
-from vla_deploy.ipc import CellWriter
+from vla_deploy.ipc import CellWriter, topics
 
 TOPIC: Final = "/cmd_vel"
 HOLDS_S: Final = 0.2
@@ -26,7 +26,7 @@ class Velocity:
     def __init__(self, gateway: Gateway, claim: PartsHold) -> None:
         self._gateway = gateway
         self._clock = gateway.link.clock
-        self._command: CellWriter = gateway.link.space.cell_writer("remote_base_command")
+        self._command: CellWriter = gateway.link.space.cell_writer(topics.REMOTE_BASE_COMMAND)
         self._claim = claim
         self._last_ns = self._stamp_ns = 0
         self._refusals = Refusals(TOPIC, gateway.link.clock)

@@ -11,6 +11,7 @@ from vla_deploy.gateways.ros.outward.activity import Activity
 from vla_deploy.gateways.ros.outward.objects import described, latest_last
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc import topics
 from vla_deploy.navigation.maps.map_file import MapFile
 
 STATE: Final = "/robot/state"
@@ -66,9 +67,9 @@ class ContextTopics:
         link, commands = self._gateway.link, self._gateway.commands
         return Activity.of(
             self._gateway.control_status(),
-            link.document("executor_status", _AGE_S),
-            link.document("planner_status", _STATUS_AGE_S),
-            link.document("speech_status", _STATUS_AGE_S),
+            link.document(topics.EXECUTOR_STATUS, _AGE_S),
+            link.document(topics.PLANNER_STATUS, _STATUS_AGE_S),
+            link.document(topics.SPEECH_STATUS, _STATUS_AGE_S),
             has_succeeded=commands.has_succeeded,
             ended_s=commands.ended_s,
         )
@@ -89,9 +90,9 @@ class ContextTopics:
 
     def _brief(self) -> dict[str, Any]:
         """Return the state that goes with a plan: place, gripper, what is held, battery."""
-        pose = self._gateway.link.fresh("pose", _AGE_S)
-        executor = self._gateway.link.document("executor_status", _AGE_S) or {}
-        held = [one for one in (executor.get("holding") or {}).values() if one]
+        pose = self._gateway.link.fresh(topics.POSE, _AGE_S)
+        executor = self._gateway.link.document(topics.EXECUTOR_STATUS, _AGE_S)
+        held = [one for one in executor["holding"].values() if one] if executor else []
         place = "" if pose is None else self._locator.place_at(*planar_of(pose)[:2])
         return {
             "location": place or "unknown",
@@ -129,7 +130,7 @@ class ContextTopics:
 
     def _place(self) -> tuple[list[float] | None, list[float] | None]:
         """Return x, y, z in m of the map and a quaternion x, y, z, w; None for a lost robot."""
-        sample = self._gateway.link.fresh("pose", _AGE_S)
+        sample = self._gateway.link.fresh(topics.POSE, _AGE_S)
         if sample is None or int(sample.data["state"]) >= _LOST:
             return None, None
         x_m, y_m, yaw_rad = planar_of(sample)

@@ -27,6 +27,7 @@ from vla_deploy.gateways.ros.graph import RELIABLE, SENSOR
 from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.outward.maps import grid_message
 from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.maps.map_file import MapFile
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
@@ -88,7 +89,7 @@ class EnvironmentMap:
 
     def _note_stance(self) -> None:
         link = self._gateway.link
-        pose, joints = link.fresh("pose", _AGE_S), link.fresh("joint_state", _AGE_S)
+        pose, joints = link.fresh(topics.POSE, _AGE_S), link.fresh(topics.JOINT_STATE, _AGE_S)
         if pose is None or joints is None or int(pose.data["state"]) > _TRACKING:
             self._stances.clear()  # a robot that is not sure where it is knows nothing of the map
             return
@@ -137,7 +138,7 @@ class EnvironmentMap:
 
     def _seen_by_camera(self) -> Floats:
         """Return what the depth image shows, without the robot's own arms, in the map."""
-        frame = self._gateway.link.frame("rgbd", _IMAGE_AGE_S)
+        frame = self._gateway.link.frame(topics.RGBD, _IMAGE_AGE_S)
         lens = self._gateway.robot.camera.intrinsics
         if frame is None or (frame.width, frame.height) != (lens.width, lens.height):
             return np.empty((0, 3))
@@ -149,7 +150,7 @@ class EnvironmentMap:
 
     def _near(self) -> Floats:
         """Return what perception has found to stand up from the floor nearby, in the map."""
-        sample = self._gateway.link.fresh("near_obstacles", 1.0)
+        sample = self._gateway.link.fresh(topics.NEAR_OBSTACLES, 1.0)
         if sample is None:
             return np.empty((0, 3))
         count = int(sample.data["count"])
@@ -157,7 +158,7 @@ class EnvironmentMap:
         return moved(np.column_stack(columns), self._stances[-1].map_from_base)
 
     def _seen_by_lidar(self) -> Floats:
-        sample = self._gateway.link.fresh("scan", _AGE_S)
+        sample = self._gateway.link.fresh(topics.SCAN, _AGE_S)
         if sample is None:
             return np.empty((0, 3))
         stance = min(self._stances, key=lambda one: abs(one.stamp_ns - sample.stamp_ns))

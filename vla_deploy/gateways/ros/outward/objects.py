@@ -16,6 +16,7 @@ from vla_deploy.gateways.ros.graph import RELIABLE
 from vla_deploy.gateways.ros.json_topic import JsonTopic
 from vla_deploy.gateways.ros.outward.body import MAP
 from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc import topics
 from vla_deploy.robots.kinematics.frame_tree import OPTICAL_FRAME
 
 RATE_HZ: Final = 5.0
@@ -47,7 +48,7 @@ class SceneObjects:
         wants_typed = self._typed.get_subscription_count() > 0
         if not (self._json.is_wanted or wants_typed) or not self._due.is_now(now_ns):
             return
-        sample = self._gateway.link.fresh("scene", _AGE_S)
+        sample = self._gateway.link.fresh(topics.SCENE, _AGE_S)
         if sample is None or sample.sequence == self._sequence:
             return
         self._sequence = sample.sequence
@@ -84,7 +85,7 @@ class SceneObjects:
 
     def _camera_from_map(self) -> Floats | None:
         link = self._gateway.link
-        pose, joints = link.fresh("pose", _AGE_S), link.fresh("joint_state", _AGE_S)
+        pose, joints = link.fresh(topics.POSE, _AGE_S), link.fresh(topics.JOINT_STATE, _AGE_S)
         if pose is None or joints is None:
             return None
         camera = self._frames.poses(np.asarray(joints.data["position"]))[OPTICAL_FRAME]

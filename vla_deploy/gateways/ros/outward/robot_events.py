@@ -1,7 +1,7 @@
 """Publish what happens: the events of the robot's own topics, each as JSON with a type of event."""
 
 import json
-from typing import Final
+from typing import Any, Final
 
 from vla_deploy_msgs.msg import RobotEvent
 
@@ -27,7 +27,7 @@ class EventsTopic:
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._events = gateway.graph.publisher(RobotEvent, TOPIC, RELIABLE)
-        self._rings: dict[str, RingReader] = {
+        self._rings: dict[str, RingReader[dict[str, Any]]] = {
             source: gateway.link.events(source) for source in SOURCES
         }
 

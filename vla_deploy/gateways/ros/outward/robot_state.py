@@ -12,6 +12,7 @@ from vla_deploy_msgs.msg import RobotState
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.outward.health import TOPICS, PartHealth, health_of
 from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc import topics
 
 STATE_HZ: Final = 2.0
 LOOK_HZ: Final = 10.0
@@ -39,7 +40,7 @@ class StateTopic:
         if not self._look_due.is_now(now_ns):
             return
         control = self._gateway.control_status()
-        executor = self._gateway.link.document("executor_status", _EXECUTOR_AGE_S)
+        executor = self._gateway.link.document(topics.EXECUTOR_STATUS, _EXECUTOR_AGE_S)
         key = _what_changes(control or {}, executor or {})
         if key != self._told or self._due.is_now(now_ns):
             self._told = key
@@ -53,7 +54,7 @@ class StateTopic:
         self, control: Mapping[str, Any] | None, executor: Mapping[str, Any]
     ) -> RobotState:
         gateway, known = self._gateway, control or {}
-        pose = gateway.link.fresh("pose", _POSE_AGE_S)
+        pose = gateway.link.fresh(topics.POSE, _POSE_AGE_S)
         return RobotState(
             stamp=gateway.time.now(),
             robot=gateway.robot.name,
