@@ -144,7 +144,7 @@ def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:
             "execution_time_s": event["execution_time_s"],
             "error": event["error"],
             "retries": event["retries"],
-            "note": event["note"],
+            "note": event.get("note"),
         }
 
 

@@ -178,7 +178,7 @@ def _action_line(event: ActionEvent) -> str:
     line = f"{_SIGNS.get(event['status'], event['status'])} {words}"
     if event["status"] != "active":
         line += f"  ({event['execution_time_s']:.1f} s)"
-    note = event["error"] or event["note"]
+    note = event["error"] or event.get("note")
     return f"{line}  {note}" if note else line
 
 
