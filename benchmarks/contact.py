@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.command import parser, show
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.control.judging.contact_torque import ContactTorque
-from vla_deploy.ipc import CellReader
+from vla_deploy.ipc import CellReader, topics
 from vla_deploy.robots.kinematics.model import RobotModel
 
 JOBS: Final = (
@@ -39,7 +39,7 @@ class TorqueListener:
         self._stack = stack
         self._count = len(stack.robot.joint_names)
         self._contact = ContactTorque(stack.robot, RobotModel(stack.robot))
-        self._joints: CellReader = stack.space.cell_reader("joint_state")
+        self._joints: CellReader = stack.space.cell_reader(topics.JOINT_STATE)
         self._ticks = 0
 
     def start(self) -> None:

@@ -26,6 +26,7 @@ from benchmarks.live_robot import live_robot
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc.topics import CONTROL_STATUS, DASHBOARD_STATUS
 
 CLIENTS: Final = 50
 FROZEN: Final = 1
@@ -97,12 +98,13 @@ def _span(session: RobotSession, process: psutil.Process, seconds: float) -> dic
 
 
 def _ticks(session: RobotSession) -> TickWatch:
-    return TickWatch.of(session.document("control_status") or {})
+    status = session.document(CONTROL_STATUS)
+    return TickWatch.of(status or {})
 
 
 def _dashboard(session: RobotSession) -> tuple[psutil.Process, tuple[str, str]]:
     deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
-    while (sample := session.fresh("dashboard_status", age_limit_s=5.0)) is None:
+    while (sample := session.fresh(DASHBOARD_STATUS, age_limit_s=5.0)) is None:
         if session.clock.now_ns() > deadline_ns:
             raise NotServed("the dashboard tells no address; see `vla-deploy logs dashboard`")
         session.pause()

@@ -22,7 +22,11 @@ from benchmarks.command import parser, show
 from benchmarks.live_robot import PROFILE_FILE, live_stack
 from drivers.clock import NS_PER_S
 from platforms import Profile, load_profile
+from sim_twin.harness.robot import RobotFailed
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.scene import ImageStatus, SightDocument
+from vla_deploy.ipc.payloads.supervision import ProcessRow
 
 PROFILE: Final = "jetson_orin_nano"
 PROCESS: Final = "perception"
@@ -50,11 +54,11 @@ class _Seen:
     stamps_ns: set[int] = field(default_factory=set)
     obstacles_ns: set[int] = field(default_factory=set)
     memory_mb: float = 0.0
-    sight: dict[str, Any] = field(default_factory=dict)
-    image: dict[str, Any] = field(default_factory=dict)
+    sight: SightDocument | None = None
+    image: ImageStatus | None = None
 
     def look(self, session: RobotSession) -> None:
-        obstacles, sample = session.fresh("near_obstacles"), session.fresh("scene")
+        obstacles, sample = session.fresh(topics.NEAR_OBSTACLES), session.fresh(topics.SCENE)
         if obstacles is not None:
             self.obstacles_ns.add(obstacles.stamp_ns)
         if sample is None:
@@ -65,15 +69,14 @@ class _Seen:
         if stamp_ns and stamp_ns not in self.stamps_ns:
             self.stamps_ns.add(stamp_ns)
             self.delays_s.append((sample.stamp_ns - stamp_ns) / NS_PER_S)
-        usage = _row(session)
-        self.memory_mb = max(self.memory_mb, float((usage or {}).get("memory_mb") or 0.0))
+        self.memory_mb = max(self.memory_mb, _row(session)["memory_mb"] or 0.0)
 
 
 def measure(seconds: float = 40.0, profile: str = PROFILE) -> dict[str, Any]:
     """Return delays, rates, CPU and memory of perception while the robot works.
 
     Raises:
-        RobotFailed: the processes do not come up.
+        RobotFailed: the processes do not come up, or perception shows nothing.
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         text = HERE.format(profile=profile)
@@ -87,7 +90,7 @@ def _watch(session: RobotSession, seconds: float) -> tuple[_Seen, float, float]:
     """Let the robot work; return what was seen, and CPU and wall seconds of the span."""
     events = session.command(text=_COMMAND)
     next(events, None)
-    seen, pid = _Seen(), int((_row(session) or {})["pid"])
+    seen, pid = _Seen(), _row(session)["pid"] or 0
     began_ns, began_cpu_s = session.clock.now_ns(), _cpu_s(pid)
     while session.clock.now_ns() < began_ns + round(seconds * NS_PER_S):
         seen.look(session)
@@ -98,7 +101,10 @@ def _watch(session: RobotSession, seconds: float) -> tuple[_Seen, float, float]:
 def _report(
     seen: _Seen, cpu_s: float, elapsed_s: float, profile: Profile, named: str
 ) -> dict[str, Any]:
-    budget, looks, model = profile.budgets[PROCESS], len(seen.delays_s), seen.sight["model"]
+    budget, looks = profile.budgets[PROCESS], len(seen.delays_s)
+    if seen.sight is None or seen.image is None:
+        raise RobotFailed("perception has told no scene")
+    model = seen.sight["model"]
     return {
         "profile": named,
         "perception_rate_hz": profile.perception_rate_hz,
@@ -121,9 +127,12 @@ def _report(
     }
 
 
-def _row(session: RobotSession) -> dict[str, Any] | None:
-    table = session.document("process_table") or {"processes": []}
-    return next((row for row in table["processes"] if row["name"] == PROCESS), None)
+def _row(session: RobotSession) -> ProcessRow:
+    table = session.document(topics.PROCESS_TABLE)
+    for row in () if table is None else table["processes"]:
+        if row["name"] == PROCESS:
+            return row
+    raise RobotFailed(f"{PROCESS} is not in the process table")
 
 
 def _cpu_s(pid: int) -> float:

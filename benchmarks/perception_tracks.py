@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.table_of_things import SHAPES, draw_arrangement, true_snapshot
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
+from vla_deploy.ipc import topics
 from vla_deploy.perception.images.detection import Detection
 from vla_deploy.perception.naming.class_fusion import NameSource
 from vla_deploy.perception.objects.filtering import Estimate
@@ -90,7 +91,7 @@ class SceneWatcher:
     def __init__(self, stack: LockstepStack) -> None:
         self.identities = IdentityWatch()
         self._stack = stack
-        self._scene = stack.space.cell_reader("scene")
+        self._scene = stack.space.cell_reader(topics.SCENE)
 
     def start(self) -> None:
         """Have nothing to open."""
@@ -261,7 +262,7 @@ def _near_truth(stack: LockstepStack, name: str) -> Mapping[str, Any] | None:
 
 
 def _document(stack: LockstepStack) -> Mapping[str, Any]:
-    sample = stack.space.cell_reader("scene").latest()
+    sample = stack.space.cell_reader(topics.SCENE).latest()
     assert sample is not None, "perception has told a scene by now"
     return sample.document()
 

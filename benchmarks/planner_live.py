@@ -23,6 +23,7 @@ from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
+from vla_deploy.ipc import topics
 
 PROFILE: Final = "jetson_orin_nano"
 ACCOUNTED: Final = ("planner", "speech")
@@ -44,7 +45,7 @@ class _Robot:
     def __init__(self, stack: ProcessStack) -> None:
         self.stack = stack
         self._session = stack.session
-        self._plans = self._session.events("plan")
+        self._plans = self._session.events(topics.PLAN)
 
     def rest(self) -> None:
         """End what is under way, and wait until nothing has moved for a while.
@@ -66,7 +67,10 @@ class _Robot:
 
     def moves(self) -> bool:
         """Return whether a wheel or a joint is faster than while the robot rests."""
-        joints, base = self._session.fresh("joint_state"), self._session.fresh("base_state")
+        joints, base = (
+            self._session.fresh(topics.JOINT_STATE),
+            self._session.fresh(topics.BASE_STATE),
+        )
         if joints is None or base is None:
             return False
         count = int(joints.data["joint_count"])

@@ -16,7 +16,8 @@ from benchmarks.planner_world import FlatWorld
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import load_profile
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.ipc import Event, IpcError, SharedSpace
+from vla_deploy.ipc import CellWriter, Event, IpcError, RingWriter, SharedSpace, topics
+from vla_deploy.ipc.payloads.tasks import PlanMessage
 from vla_deploy.planning.assembly import open_local_models, open_planner
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.node import PlannerNode
@@ -91,11 +92,12 @@ class PlannerSession:
         )
         self.node = self._built()
         self._numbers = itertools.count(1)
-        self._utterances = self._space.ring_writer("utterance")
-        self._told = self._space.ring_writer("task_event")
-        self._events = self._space.ring_reader("task_event", from_start=False)
-        self._plans = self._space.ring_reader("plan", from_start=False)
-        self._cells = {
+        # What is published may have any form, for a planner has to bear that.
+        self._utterances: RingWriter[Any] = self._space.ring_writer(topics.UTTERANCE)
+        self._told: RingWriter[Any] = self._space.ring_writer(topics.TASK_EVENT)
+        self._events = self._space.ring_reader(topics.TASK_EVENT, from_start=False)
+        self._plans = self._space.ring_reader(topics.PLAN, from_start=False)
+        self._cells: dict[str, CellWriter[Any]] = {
             name: self._space.cell_writer(name)
             for name in ("control_status", "scene", "executor_status", "pose")
         }
@@ -159,9 +161,9 @@ class PlannerSession:
         })  # fmt: skip
         self.node.step()
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Mapping[str, Any]:
         """Return what the planner tells of itself."""
-        sample = self._space.cell_reader("planner_status").latest()
+        sample = self._space.cell_reader(topics.PLANNER_STATUS).latest()
         return {} if sample is None else sample.document()
 
     def _built(self) -> PlannerNode:
@@ -198,12 +200,16 @@ class PlannerSession:
         return _answer("silence", text=f"nothing came of {command_id}")
 
 
-def _outcome(plans: list[Event], told: list[Mapping[str, Any]]) -> PlannerAnswer | None:
+def _outcome(
+    plans: list[Event[PlanMessage]], told: list[Mapping[str, Any]]
+) -> PlannerAnswer | None:
     said = tuple(str(one["text"]) for one in told if one["event"] == "said")
     rung = next((str(one["rung"]) for one in told if "rung" in one), FIRST_RUNG)
     for event in plans:
-        outcome = "stop" if event.payload.get("cancel") else "plan"
-        return _answer(outcome, plan=event.payload.get("plan"), rung=rung, said=said)
+        if "plan" in event.payload:
+            return _answer("plan", plan=event.payload["plan"], rung=rung, said=said)
+        if "cancel" in event.payload:
+            return _answer("stop", rung=rung, said=said)
     for one in told:
         if one["event"] == "rejected":
             return _answer("refuse", text=str(one["reason"]), said=said)

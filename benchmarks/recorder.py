@@ -23,7 +23,7 @@ from benchmarks.spans import REST, Spans
 from drivers.clock import NS_PER_S
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.control.judging.tick_recorder import TickRecorder
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.safety import SafetyInputs
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
@@ -103,7 +103,7 @@ def _recorder(stack: LockstepStack, seconds: float, folder: Path) -> dict[str, f
     step.add(node)
     step.run_for(seconds)
     looks, look_ns = spans.steps, spans.cpu_ns[REST]
-    stack.space.ring_writer("flight_request").publish({"source": "bench", "reason": ""})
+    stack.space.ring_writer(topics.FLIGHT_REQUEST).publish({"source": "bench", "reason": ""})
     if not step.run_until(lambda: bool(flights.files()), _WRITE_TIMEOUT_S):
         raise SystemExit("no flight was written")
     steps, step_ns = spans.steps - looks, spans.cpu_ns[REST] - look_ns

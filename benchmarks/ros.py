@@ -26,6 +26,7 @@ from benchmarks.percentiles import percentile
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import topics
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.supervisor.processes.ros_environment import launch_environment
@@ -110,9 +111,10 @@ def _late_ticks(
 
 def _counted(session: RobotSession) -> TickWatch:
     """Return the ticks of a window."""
-    before = TickWatch.of(session.document("control_status") or {})
+    before = session.document(topics.CONTROL_STATUS)
     session.pause(_WINDOW_S)
-    return TickWatch.of(session.document("control_status") or {}).since(before)
+    after = session.document(topics.CONTROL_STATUS)
+    return TickWatch.of(after or {}).since(TickWatch.of(before or {}))
 
 
 def _robot(folder: Path) -> Path:

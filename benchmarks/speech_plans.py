@@ -27,7 +27,7 @@ from training.voices.clip import SpokenClip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.endpointing import Phrase
-from vla_deploy.speech.event_publisher import utterance
+from vla_deploy.speech.event_publisher import SOURCE, utterance
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.verdict import PhraseVerdict, judge
 
@@ -111,7 +111,7 @@ def _heard_answer(
     doubted = heard.judgement.verdict is PhraseVerdict.DOUBTED
     if not doubted and heard.judgement.verdict is not PhraseVerdict.ACCEPTED:
         return None
-    return _answer(scene, utterance(heard, doubted=doubted))
+    return _answer(scene, {"source": SOURCE, **utterance(heard, doubted=doubted)})
 
 
 def _heard(recogniser: Recogniser, clip: SpokenClip, least: float) -> HeardPhrase:

@@ -22,6 +22,7 @@ from platforms import load_profile
 from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.harness.processes import ProcessStack
 from vla_deploy.control.reporting.telemetry import TickClock
+from vla_deploy.ipc import topics
 
 _PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
 _LOADS: Final = ("idle", "loaded")
@@ -60,9 +61,9 @@ def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str
 def _late_ratios(robot: ProcessStack, seconds: float) -> tuple[float, float]:
     """Return the shares of control's late ticks and of the bare loop's."""
     robot.pause(_SETTLE_S)
-    before = TickWatch.of(robot.document("control_status"))
+    before = TickWatch.of(robot.document(topics.CONTROL_STATUS))
     bare = sleep_bare(robot.clock, _PERIOD_S, seconds)
-    ticks = TickWatch.of(robot.document("control_status")).since(before)
+    ticks = TickWatch.of(robot.document(topics.CONTROL_STATUS)).since(before)
     return ticks.late_ratio, bare.late_ticks / bare.tick
 
 

@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
+from vla_deploy.ipc import topics
 
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")
 SIZES: Final = {
@@ -52,7 +53,7 @@ def main() -> None:
         stack = ProcessStack(Path(folder) / "base")
         try:
             stack.wait_until_armed()
-            if not stack.wait_until(lambda: stack.document("dashboard_status"), READY_S):
+            if not stack.wait_until(lambda: stack.document(topics.DASHBOARD_STATUS), READY_S):
                 raise RobotFailed(
                     "the dashboard does not tell its address: vla-deploy logs dashboard"
                 )
@@ -71,10 +72,10 @@ def take_all(stack: ProcessStack, browser: Browser, out: Path, views: tuple[str,
     Raises:
         RobotFailed: the robot does not come to the end of its command.
     """
-    url = stack.document("dashboard_status")["url"]
+    url = stack.document(topics.DASHBOARD_STATUS)["url"]
     for device, size in SIZES.items():
         if not stack.wait_until(
-            lambda: stack.document("executor_status")["state"] == "idle", WORK_S
+            lambda: stack.document(topics.EXECUTOR_STATUS)["state"] == "idle", WORK_S
         ):
             raise RobotFailed(f"the robot still works after {WORK_S:g} s: vla-deploy status")
         dark = THEMES[device] == "dark"

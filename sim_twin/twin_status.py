@@ -5,7 +5,7 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_page import TwinPace
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 
 _PERIOD_NS: Final = NS_PER_S // 2
 
@@ -17,7 +17,7 @@ class TwinStatus:
         self._pace = pace
         folder = run_dir / "ipc"
         self._space = SharedSpace(folder, clock) if folder.is_dir() else None
-        self._cell = self._space.cell_writer("twin_status") if self._space else None
+        self._cell = self._space.cell_writer(topics.TWIN_STATUS) if self._space else None
         self._due_ns = 0
 
     def publish(
@@ -29,7 +29,7 @@ class TwinStatus:
         self._due_ns = clock_ns + _PERIOD_NS
         self._cell.put_document(
             {
-                "pace": self._pace,
+                "pace": self._pace.value,
                 "simulated_ns": simulated_ns,
                 "real_time_factor": real_time_factor,
                 "held_by": held_by,

@@ -5,6 +5,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from vla_deploy.client.following import LAST_EVENTS
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import topics
 
 _ANSWER_NS: Final = 8 * NS_PER_S
 """After so long without a word nobody has heard the command: the planner was away."""
@@ -15,7 +16,7 @@ class CommandTalk:
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
-        self._events = link.events("task_event")
+        self._events = link.events(topics.TASK_EVENT)
         self._now = ""
         self._answer_by_ns: int | None = None
         self.done = 0
@@ -40,11 +41,11 @@ class CommandTalk:
         """Note how the command goes on and ends."""
         for event in self._events.drain():
             said = event.payload
-            if said.get("command_id") != self._now:
+            if said["command_id"] != self._now:
                 continue
             self._answer_by_ns = None
             if said.get("event") in LAST_EVENTS:
                 self._now = ""
-                success = bool(said.get("success"))
+                success = said["event"] == "finished" and said["success"]
                 self.done += success
                 self.failed += not success

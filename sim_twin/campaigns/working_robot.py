@@ -12,6 +12,7 @@ from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
+from vla_deploy.ipc import Topic, topics
 
 _SWITCH_S: Final = 90.0
 _FRESH_S: Final = 3.0
@@ -42,7 +43,9 @@ class WorkingRobot(ProcessStack):
 
     # --- look ---------------------------------------------------------------------------------
 
-    def document(self, topic: str, age_limit_s: float | None = _FRESH_S) -> dict[str, Any]:
+    def document(
+        self, topic: Topic[Any] | str, age_limit_s: float | None = _FRESH_S
+    ) -> dict[str, Any]:
         """Return the newest document of a cell, empty when there is none that young."""
         return super().document(topic, age_limit_s)
 
@@ -53,11 +56,11 @@ class WorkingRobot(ProcessStack):
 
     def ticks(self) -> TickWatch:
         """Return what control has counted since it started."""
-        return TickWatch.of(self.document("control_status"))
+        return TickWatch.of(self.document(topics.CONTROL_STATUS))
 
     def setpoint(self) -> list[float]:
         """Return what control sent to the joints last."""
-        sample = self.session.fresh("joint_state")
+        sample = self.session.fresh(topics.JOINT_STATE)
         return [] if sample is None else [float(one) for one in sample.data["setpoint"]]
 
     def memory_mib(self) -> dict[str, float]:
@@ -69,11 +72,13 @@ class WorkingRobot(ProcessStack):
     def use_profile(self, path: Path, meanwhile: Callable[[], object]) -> dict[str, Any]:
         """Ask for a profile, as `vla-deploy profile use` does, and return how that ended."""
         request_id = uuid.uuid4().hex
-        self.session.publish("profile_request", {"request_id": request_id, "profile": str(path)})
+        self.session.writer(topics.PROFILE_REQUEST).publish(
+            {"request_id": request_id, "profile": str(path)}
+        )
 
         def last() -> dict[str, Any]:
             meanwhile()
-            told: dict[str, Any] = self.document("profile_status").get("last", {})
+            told: dict[str, Any] = self.document(topics.PROFILE_STATUS).get("last", {})
             return told if told.get("request_id") == request_id else {}
 
         if not self.wait_until(last, _SWITCH_S):

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from sim_twin.errors import FaultRefused
 from sim_twin.faults.request import FaultRequest, parse_request
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.robots import RobotDescription
 
 SCENARIOS: Final = Path(__file__).with_name("scenarios")
@@ -60,7 +61,7 @@ class Expectation:
     stale_topics: tuple[str, ...] | None = None
     counts: tuple[str, ...] = ()
     runs_back: bool = False
-    recovery: tuple[str, ...] = ()
+    recovery: tuple[OperatorActName, ...] = ()
     pose_error_m: float | None = None
     yaw_error_rad: float | None = None
     travel: str | None = None

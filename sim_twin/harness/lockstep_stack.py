@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 from drivers import registry
 from drivers.audio.base import Samples
@@ -22,7 +22,9 @@ from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.client.link import RobotLink
 from vla_deploy.control.node import ControlNode
-from vla_deploy.ipc import BY_NAME, CellWriter, SharedSpace
+from vla_deploy.ipc import CellWriter, SharedSpace, topics
+from vla_deploy.ipc.payloads.motion import OperatorActName
+from vla_deploy.ipc.payloads.tasks import UtteranceContent
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
@@ -36,7 +38,7 @@ from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
 from vla_deploy.speech.voice.robot_voice import build_voice
 
 COMMAND_TIMEOUT_S: Final = 300.0
-LOOK_PERIOD_S: Final = 1.0 / BY_NAME["near_obstacles"].rate_hz
+LOOK_PERIOD_S: Final = 1.0 / topics.NEAR_OBSTACLES.rate_hz
 _COMMAND_S: Final = 0.02
 _ACT_S: Final = 3.0
 _ACT_EVERY_S: Final = 0.5
@@ -92,13 +94,13 @@ class LockstepControl(RobotUnderTest):
 
     def status(self) -> dict[str, Any]:
         """Return control's newest status, or an empty document before the first."""
-        return self.document("control_status")
+        return self.document(topics.CONTROL_STATUS)
 
-    def operate(self, act: str) -> None:
+    def operate(self, act: OperatorActName) -> None:
         """Publish an operator's act."""
-        self._link.publish("operator", {"act": act, "source": "test", "reason": ""})
+        self._link.writer(topics.OPERATOR).publish({"act": act, "source": "test", "reason": ""})
 
-    def insist(self, act: str) -> None:
+    def insist(self, act: OperatorActName) -> None:
         """Do an operator's act again and again, as a person would, until it has its effect."""
         for _ in range(round(_ACT_S / _ACT_EVERY_S)):
             self.operate(act)
@@ -107,7 +109,7 @@ class LockstepControl(RobotUnderTest):
 
     @cached_property
     def _base_command(self) -> CellWriter:
-        return self.space.cell_writer("base_command")
+        return self.space.cell_writer(topics.BASE_COMMAND)
 
     def drive_for(self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0) -> None:
         """Drive for a time, past the executor: control wants its commands again and again."""
@@ -159,7 +161,7 @@ class LockstepStack(LockstepControl):
     ) -> None:
         """Start every node; with `speech` the robot hears and speaks too, which costs time."""
         super().__init__(tmp_path, seed, profile, robot=robot, world=world)
-        self._events = self._link.events("task_event", from_start=True)
+        self._events = self._link.events(topics.TASK_EVENT, from_start=True)
         self._numbers = itertools.count(1)
         self.events: list[dict[str, Any]] = []
         self._outcomes: dict[str, dict[str, Any]] = {}
@@ -187,18 +189,20 @@ class LockstepStack(LockstepControl):
             page_stop_words=build_stop_words(context, self._profile, place=PAGE),
         )
 
-    def give(self, **utterance: Any) -> str:
+    def give(self, **content: Unpack[UtteranceContent]) -> str:
         """Give a command without waiting; return its id."""
         command_id = f"command-{next(self._numbers)}"
-        self._link.publish("utterance", {"command_id": command_id, "source": "test"} | utterance)
+        self._link.writer(topics.UTTERANCE).publish(
+            {"command_id": command_id, "source": "test", **content}
+        )
         return command_id
 
     def outcome(self, command_id: str) -> dict[str, Any] | None:
         """Return a command's last event, once it has one."""
         for event in self._events.drain():
-            self.events.append(event.payload)
+            self.events.append({**event.payload})
             if event.payload["event"] in ("finished", "rejected"):
-                self._outcomes.setdefault(event.payload["command_id"], event.payload)
+                self._outcomes.setdefault(event.payload["command_id"], {**event.payload})
         return self._outcomes.get(command_id)
 
     def say(self, text: str, timeout_s: float = COMMAND_TIMEOUT_S) -> dict[str, Any]:
@@ -258,9 +262,9 @@ class SensesNode:
         self._imu: Imu = registry.open_imu(robot.imu.model, imu, clock)
         self._space = SharedSpace(context.run_dir / "ipc", clock)
         self._pose_tracker = PoseTracker(robot, RobotModel(robot), self._space)
-        self._scan = self._space.cell_writer("scan")
-        self._attitude = self._space.cell_writer("imu")
-        self._obstacles = self._space.cell_writer("near_obstacles")
+        self._scan = self._space.cell_writer(topics.SCAN)
+        self._attitude = self._space.cell_writer(topics.IMU)
+        self._obstacles = self._space.cell_writer(topics.NEAR_OBSTACLES)
         self._next_look_ns = 0
 
     def start(self) -> None:

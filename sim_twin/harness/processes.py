@@ -22,6 +22,7 @@ from sim_twin.physics.truth import fastest_joint
 from sim_twin.referee import RemoteReferee
 from sim_twin.sound.talk import said, talk
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import topics
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor.runs.runtime import end_leftovers
 
@@ -30,7 +31,7 @@ _READY: Final = "ready;"
 _END_S: Final = 120.0
 """By the wall clock, and so for a busy computer: a process that hangs ends with the test."""
 _FRESH_S: Final = 1.0
-_TAKERS: Final = ("planner_status", "executor_status")
+_TAKERS: Final = (topics.PLANNER_STATUS, topics.EXECUTOR_STATUS)
 _LAST_WORDS: Final = 8
 
 
@@ -96,7 +97,7 @@ class ProcessStack(RunningRobot, RemoteReferee):
             raise RobotFailed(f"control does not arm: {self.status()['control']}")
         for topic in _TAKERS:
             if not self.wait_until(partial(self.document, topic, _FRESH_S)):
-                raise RobotFailed(f"{topic} is silent: {self.status()['process_table']}")
+                raise RobotFailed(f"{topic.name} is silent: {self.status()['process_table']}")
 
     @property
     def session(self) -> RobotSession:

@@ -17,12 +17,18 @@ import psutil
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import Topic, topics
+from vla_deploy.ipc.payloads.motion import GoalMotion, OperatorActName
 from vla_deploy.supervisor.processes.lifecycle import is_settled
 from vla_deploy.supervisor.runs.runtime import environment_of
 
 VLA_DEPLOY: Final = (sys.executable, "-m", "vla_deploy.cli")
 ARM_S: Final = 30.0
-_WAY: Final[Mapping[str, str]] = {"stopped": "reset", "fault": "reset", "disarmed": "arm"}
+_WAY: Final[Mapping[str, OperatorActName]] = {
+    "stopped": "reset",
+    "fault": "reset",
+    "disarmed": "arm",
+}
 """The act that leads from a state towards being armed; elsewhere control is under way."""
 _AGAIN_S: Final = 0.5
 _FIRST_MOTION: Final = 1_000_000
@@ -54,13 +60,13 @@ class RobotUnderTest(ABC):
     def close(self) -> None:
         """End the robot in order; ending twice is allowed."""
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
+    def document(self, topic: Topic[Any] | str, age_limit_s: float | None = None) -> dict[str, Any]:
         """Return the newest document of a cell, empty when there is none that young."""
         return self.link.document(topic, age_limit_s) or {}
 
     def control_status(self) -> dict[str, Any]:
         """Return what control says of itself, empty where it is silent."""
-        return self.document("control_status", self.status_age_limit_s)
+        return self.document(topics.CONTROL_STATUS, self.status_age_limit_s)
 
     def state(self) -> str:
         """Return control's state, "silent" where it publishes none."""
@@ -75,7 +81,7 @@ class RobotUnderTest(ABC):
         end_ns = self.clock.now_ns() + round(timeout_s * NS_PER_S)
         while (state := self.state()) != "armed":
             if self.clock.now_ns() > end_ns:
-                status = json.dumps(self.document("control_status"))
+                status = json.dumps(self.document(topics.CONTROL_STATUS))
                 raise RobotFailed(f"control is not armed after {timeout_s:g} s: {status}")
             if state in _WAY:
                 self.link.operate(_WAY[state])
@@ -96,9 +102,15 @@ class RobotUnderTest(ABC):
         effort_ratio: Mapping[str, float] | None = None,
     ) -> None:
         """Send joints somewhere, past the executor: it must be idle."""
-        goal = {"kind": "goal", "motion_id": next(self._motions), "targets": dict(targets)}
-        effort = {} if effort_ratio is None else {"effort_ratio": dict(effort_ratio)}
-        self.link.publish("motion_command", {**goal, "speed_ratio": speed_ratio, **effort})
+        goal: GoalMotion = {
+            "kind": "goal",
+            "motion_id": next(self._motions),
+            "targets": dict(targets),
+            "speed_ratio": speed_ratio,
+        }
+        if effort_ratio is not None:
+            goal["effort_ratio"] = dict(effort_ratio)
+        self.link.writer(topics.MOTION_COMMAND).publish(goal)
 
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
         """Return whether `condition()` came true in time."""
@@ -158,7 +170,7 @@ class RunningRobot(RobotUnderTest):
 
     def is_ready(self) -> bool:
         """Return whether every process that should run is ready."""
-        table = self.document("process_table", _FRESH_S)
+        table = self.document(topics.PROCESS_TABLE, _FRESH_S)
         return bool(table) and is_settled(table)
 
     def row(self, name: str) -> dict[str, Any]:
@@ -167,13 +179,13 @@ class RunningRobot(RobotUnderTest):
         Raises:
             KeyError: there is no such process.
         """
-        rows = {row["name"]: row for row in self.document("process_table")["processes"]}
+        rows = {row["name"]: row for row in self.document(topics.PROCESS_TABLE)["processes"]}
         row: dict[str, Any] = rows[name]
         return row
 
     def pids(self) -> dict[str, int]:
         """Return the id of every process that runs, the supervisor's too."""
-        table = self.document("process_table", _FRESH_S)
+        table = self.document(topics.PROCESS_TABLE, _FRESH_S)
         rows = {row["name"]: row["pid"] for row in table.get("processes", ()) if row["pid"]}
         return {**rows, "supervisor": table["supervisor_pid"]} if table else {}
 

@@ -19,7 +19,7 @@ from sim_twin.harness.service_runner import RunnerState, ServiceRules, ServiceRu
 from sim_twin.process import READY_FILE
 from sim_twin.referee import RemoteReferee
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.ipc import IpcError
+from vla_deploy.ipc import IpcError, Topic, topics
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE, environment_of, running
 from vla_deploy.supervisor.systemd import RESTART_S, watchdog_s
@@ -113,7 +113,7 @@ class RobotService(RunningRobot):
             self._runner.stop()  # what it holds of an ended service goes too
             self._runner = self._started()
         if not self.wait_until(self.is_ready, _READY_S):
-            table = json.dumps(self.document("process_table", _FRESH_S))
+            table = json.dumps(self.document(topics.PROCESS_TABLE, _FRESH_S))
             raise RobotFailed(
                 f"not every process is ready after {_READY_S:g} s: {self._runner.report}, {table}"
             )
@@ -125,7 +125,7 @@ class RobotService(RunningRobot):
 
     def skill(self) -> str:
         """Return which skill the executor is at, empty where it is at none."""
-        return str(self.document("executor_status", _FRESH_S).get("skill") or "")
+        return str(self.document(topics.EXECUTOR_STATUS, _FRESH_S).get("skill") or "")
 
     def why(self) -> str:
         """Return the cause of control's state, and what it says of it."""
@@ -166,7 +166,7 @@ class RobotService(RunningRobot):
             self._session = RobotSession(run_dir, self.clock)
         return self._session
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
+    def document(self, topic: Topic[Any] | str, age_limit_s: float | None = None) -> dict[str, Any]:
         """Return the newest document of a cell, empty when there is none that young."""
         try:
             return super().document(topic, age_limit_s)
@@ -175,7 +175,7 @@ class RobotService(RunningRobot):
 
     def _strays(self) -> list[str]:
         owner = running(self.base)
-        table = self.document("process_table", _FRESH_S)
+        table = self.document(topics.PROCESS_TABLE, _FRESH_S)
         rows = {row["pid"] for row in table["processes"] if row["pid"]} if table else None
         return strays(self._runner.members(), "" if owner is None else owner.run_id, rows)
 

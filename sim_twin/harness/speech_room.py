@@ -12,7 +12,8 @@ from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.talker import Talker, arrival
-from vla_deploy.ipc import Announced, Announcer, SharedSpace
+from vla_deploy.ipc import Announced, Announcer, SharedSpace, topics
+from vla_deploy.ipc.payloads.speech import HeardMessage
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
@@ -34,8 +35,8 @@ class SpeechRoom:
         self.mouth = SpeakerDevice(_FORMAT, self.ear.room)
         self.space = SharedSpace(run_dir / "ipc", self.clock)
         self.announcer = Announcer(self.space, "room", self.clock)
-        self._heard = self.space.ring_reader("heard", from_start=True)
-        self._status = self.space.cell_reader("speech_status")
+        self._heard = self.space.ring_reader(topics.HEARD, from_start=True)
+        self._status = self.space.cell_reader(topics.SPEECH_STATUS)
         self.node = self._node(run_dir, stop_words)
         self.node.start()
         self.run(0.5)
@@ -71,14 +72,14 @@ class SpeechRoom:
         room.lay(heard.sound.wave, room.row_at(self.clock.ns))
         return (heard.words[1] - heard.words[0]) / room.rate_hz
 
-    def heard(self) -> list[dict[str, Any]]:
+    def heard(self) -> list[HeardMessage]:
         """Return what the robot has heard since the last call."""
         return [event.payload for event in self._heard.drain()]
 
     def status(self) -> dict[str, Any]:
         """Return the newest `speech_status`."""
         sample = self._status.latest()
-        return {} if sample is None else sample.document()
+        return {} if sample is None else {**sample.document()}
 
     def close(self) -> None:
         """Stop the node and let go of its topics."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from benchmarks.perception_tracks import SceneWatcher
+from sim_twin.contracts.payloads import payload_faults
 from sim_twin.harness.lockstep_stack import LockstepStack
 
 COMMAND = "pick up the red cup and put it in the box"
@@ -36,6 +37,9 @@ def test_the_cup_ends_in_the_box_and_every_action_is_told(coarse_stack: Lockstep
     for action in outcome["actions"]:
         assert (action["id"], "active") in told
         assert (action["id"], "succeeded") in told
+    found = payload_faults(stack.space)
+    assert not any(found.values()), found
+    assert found.keys() >= {"motion_command", "motion_result", "scene", "claims"}
 
 
 @pytest.mark.timeout(120)

@@ -69,7 +69,7 @@ def question_of(
 
 
 def question_about(
-    topics: RobotTopics, scene: dict[str, Any], goal: str, image: Image | None = None
+    topics: RobotTopics, scene: Mapping[str, Any], goal: str, image: Image | None = None
 ) -> SceneQuestion:
     """Return a question about a scene, with where the robot is and what it holds now.
 

@@ -3,13 +3,15 @@
 import argparse
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar, Unpack
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
-from vla_deploy.ipc import RingReader
+from vla_deploy.ipc import RingReader, topics
+from vla_deploy.ipc.payloads.scene import SceneDocument
+from vla_deploy.ipc.payloads.tasks import TaskEvent, UtteranceContent
 from vla_deploy.supervisor.runs.runtime import default_base, running
 
 if TYPE_CHECKING:  # loads NumPy: an emergency stop must not wait for it
@@ -43,8 +45,8 @@ class RobotSession(RobotLink):
         return None
 
     def command(
-        self, pause: Callable[[], None] | None = None, **utterance: Any
-    ) -> Iterator[dict[str, Any]]:
+        self, pause: Callable[[], None] | None = None, **utterance: Unpack[UtteranceContent]
+    ) -> Iterator[TaskEvent]:
         """Give a command and return its events, up to and including the last one.
 
         `pause` waits between two reads of the events.
@@ -52,12 +54,15 @@ class RobotSession(RobotLink):
         Raises:
             CommandFailed: planner and executor do not answer; raised by the iterator.
         """
-        events = self.events("task_event")
+        events = self.events(topics.TASK_EVENT)
         return self.follow(self.utter(**utterance), events, pause)
 
     def follow(
-        self, command_id: str, events: RingReader, pause: Callable[[], None] | None = None
-    ) -> Iterator[dict[str, Any]]:
+        self,
+        command_id: str,
+        events: RingReader[TaskEvent],
+        pause: Callable[[], None] | None = None,
+    ) -> Iterator[TaskEvent]:
         """Return the task events of a given command; the last is `finished` or `rejected`.
 
         Where the command answers a question, the command that asked is followed from then on.
@@ -67,8 +72,8 @@ class RobotSession(RobotLink):
         """
         following = Following(
             command_id,
-            lambda: self.fresh("planner_status", age_limit_s=2.0),
-            lambda: self.fresh("executor_status", age_limit_s=1.0),
+            lambda: self.fresh(topics.PLANNER_STATUS, age_limit_s=2.0),
+            lambda: self.fresh(topics.EXECUTOR_STATUS, age_limit_s=1.0),
             self.clock,
         )
         return _events_of(following, events, pause or self.pause)
@@ -82,13 +87,13 @@ class RobotSession(RobotLink):
         for _ in self.command(cancel=True):
             pass
 
-    def scene(self) -> dict[str, Any]:
+    def scene(self) -> SceneDocument:
         """Return the document of the topic `scene`.
 
         Raises:
             UsageError: perception is silent.
         """
-        document = self.document("scene", age_limit_s=FRESH_S)
+        document = self.document(topics.SCENE, age_limit_s=FRESH_S)
         if document is None:
             raise UsageError("perception tells no scene; see: vla-deploy status")
         return document
@@ -101,7 +106,7 @@ class RobotSession(RobotLink):
         """
         from vla_deploy.robots import load_robot
 
-        table = self.document("process_table", age_limit_s=FRESH_S)
+        table = self.document(topics.PROCESS_TABLE, age_limit_s=FRESH_S)
         if table is None:
             raise UsageError(
                 "the supervisor does not tell which robot this is; see: vla-deploy status"
@@ -110,8 +115,8 @@ class RobotSession(RobotLink):
 
 
 def _events_of(
-    following: Following, events: RingReader, pause: Callable[[], None]
-) -> Iterator[dict[str, Any]]:
+    following: Following, events: RingReader[TaskEvent], pause: Callable[[], None]
+) -> Iterator[TaskEvent]:
     while True:
         why = following.why_lost()
         yield from following.take([event.payload for event in events.drain()])

@@ -9,7 +9,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.command_record import CommandRecord, Kind, record_of
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
-from vla_deploy.ipc import Event
+from vla_deploy.ipc import Event, topics
+from vla_deploy.ipc.payloads.tasks import FinishedEvent, TaskEvent, Utterance
 
 MOST_COMMANDS: Final = 200
 _JUDGE_PERIOD_NS: Final = NS_PER_S // 2
@@ -36,8 +37,8 @@ class CommandHistory:
         """Take what the rings hold; `follow` gets the events that come from now on."""
         self._link = link
         self._wall_ns = wall_ns
-        self._utterances = link.events("utterance", from_start=True)
-        self._events = link.events("task_event", from_start=True)
+        self._utterances = link.events(topics.UTTERANCE, from_start=True)
+        self._events = link.events(topics.TASK_EVENT, from_start=True)
         self._records: OrderedDict[str, CommandRecord] = OrderedDict()
         self._open: dict[str, Following] = {}
         self._lost = 0
@@ -51,8 +52,8 @@ class CommandHistory:
         now_ns = self._link.clock.now_ns()
         is_due = now_ns >= self._judge_due_ns
         reasons = self._reasons() if is_due else {}
-        for event in self._utterances.drain():
-            self._hear(event)
+        for said in self._utterances.drain():
+            self._hear(said)
         for event in self._events.drain():
             self._note(event)
         self._note_lost()
@@ -75,15 +76,15 @@ class CommandHistory:
         self.step()
         return list(reversed(self._records.values()))[:limit]
 
-    def _hear(self, event: Event) -> None:
+    def _hear(self, event: Event[Utterance]) -> None:
         record = record_of(event.payload, self._wall_s(event.stamp_ns))
         self._keep(record)
         if record.kind is not Kind.CANCEL:
             link = self._link
             self._open[record.command_id] = Following(
                 record.command_id,
-                planner=lambda: link.fresh("planner_status", age_limit_s=2.0),
-                executor=lambda: link.fresh("executor_status", age_limit_s=1.0),
+                planner=lambda: link.fresh(topics.PLANNER_STATUS, age_limit_s=2.0),
+                executor=lambda: link.fresh(topics.EXECUTOR_STATUS, age_limit_s=1.0),
                 clock=link.clock,
             )
 
@@ -93,9 +94,9 @@ class CommandHistory:
             forgotten, _ = self._records.popitem(last=False)
             self._open.pop(forgotten, None)
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: Event[TaskEvent]) -> None:
         told, at_s = event.payload, self._wall_s(event.stamp_ns)
-        command_id = str(told.get("command_id", ""))
+        command_id = told["command_id"]
         if command_id not in self._records:  # its words were pushed out of the ring unread
             self._keep(CommandRecord(command_id=command_id, source=_UNKNOWN, given_s=at_s))
         following = self._open.get(command_id)
@@ -103,7 +104,7 @@ class CommandHistory:
             list(following.take([told]))
         self._finish(command_id, told, at_s)
 
-    def _finish(self, command_id: str, told: dict[str, Any], at_s: float) -> None:
+    def _finish(self, command_id: str, told: TaskEvent, at_s: float) -> None:
         record = self._records[command_id]
         record.note(told, at_s)
         if self._follow is not None:
@@ -136,7 +137,7 @@ class CommandHistory:
         return (self._wall_ns() - self._link.clock.now_ns() + stamp_ns) / NS_PER_S
 
 
-def _unanswered(command_id: str) -> dict[str, Any]:
+def _unanswered(command_id: str) -> FinishedEvent:
     return {
         "command_id": command_id,
         "event": "finished",

@@ -1,12 +1,12 @@
 """Remember one command: who gave it, what became of it, how it stands."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Final
 
-from vla_deploy.client.following import Event
+from vla_deploy.ipc.payloads.tasks import FinishedEvent, RejectedEvent, TaskEvent, Utterance
 
 MOST_EVENTS: Final = 400
 MOST_CHARACTERS: Final = 1000
@@ -64,23 +64,17 @@ _AFTER: Final[Mapping[str, Standing]] = {
 }
 
 
-def _finished(event: Event) -> Standing:
-    error = str(event.get("error") or "")
-    if event.get("success"):
+def _finished(event: FinishedEvent) -> Standing:
+    error = event["error"] or ""
+    if event["success"]:
         return Standing.SUCCEEDED
     if error.startswith("lost"):
         return Standing.LOST
     return Standing.CANCELLED if error.endswith(_CANCELLED) else Standing.FAILED
 
 
-def _rejected(event: Event) -> Standing:
-    return Standing.CANCELLED if event.get("reason") == _CANCELLED else Standing.REJECTED
-
-
-_JUDGED: Final[Mapping[str, Callable[[Event], Standing]]] = {
-    "finished": _finished,
-    "rejected": _rejected,
-}
+def _rejected(event: RejectedEvent) -> Standing:
+    return Standing.CANCELLED if event["reason"] == _CANCELLED else Standing.REJECTED
 
 
 @dataclass(slots=True, kw_only=True)
@@ -99,14 +93,17 @@ class CommandRecord:
     given_s: float
     standing: Standing = Standing.GIVEN
     lost_events: int = 0
-    events: deque[Event] = field(default_factory=deque)
+    events: deque[dict[str, Any]] = field(default_factory=deque)
 
-    def note(self, event: Event, at_s: float) -> None:
+    def note(self, event: TaskEvent, at_s: float) -> None:
         """Add an event, and judge by it how the command stands."""
-        name = str(event.get("event"))
-        judge = _JUDGED.get(name)
-        self.standing = judge(event) if judge else _AFTER.get(name, self.standing)
-        self.events.append(event | {"at_s": round(at_s, 3)})
+        if event["event"] == "finished":
+            self.standing = _finished(event)
+        elif event["event"] == "rejected":
+            self.standing = _rejected(event)
+        else:
+            self.standing = _AFTER.get(event["event"], self.standing)
+        self.events.append({**event, "at_s": round(at_s, 3)})
         if len(self.events) > MOST_EVENTS:
             self.events.popleft()
             self.lost_events += 1
@@ -127,7 +124,7 @@ class CommandRecord:
         }
 
 
-def record_of(utterance: Mapping[str, Any], given_s: float) -> CommandRecord:
+def record_of(utterance: Utterance, given_s: float) -> CommandRecord:
     """Return the record of what was said to the planner."""
     kind = Kind.COMMAND
     for word in (Kind.ANSWER, Kind.CANCEL):

@@ -6,13 +6,14 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import UNFINISHED, ActionStatus
 from vla_deploy.ipc import Sample
+from vla_deploy.ipc.payloads.tasks import ActionResult, ExecutorStatus, PlannerStatus, TaskEvent
 
 ANSWER_TIMEOUT_S: Final = 5.0
 SILENCE_LIMIT_S: Final = 5.0
 LAST_EVENTS: Final = frozenset({"finished", "rejected"})
 
-Event = dict[str, Any]
-Newest = Callable[[], Sample | None]
+PlannerLook = Callable[[], Sample[PlannerStatus] | None]
+ExecutorLook = Callable[[], Sample[ExecutorStatus] | None]
 
 
 class Following:
@@ -23,7 +24,9 @@ class Following:
     command that asked.
     """
 
-    def __init__(self, command_id: str, planner: Newest, executor: Newest, clock: Clock) -> None:
+    def __init__(
+        self, command_id: str, planner: PlannerLook, executor: ExecutorLook, clock: Clock
+    ) -> None:
         """Begin now; `planner` and `executor` return their status while that is young."""
         self.command_id = command_id
         self.is_answered = False
@@ -32,7 +35,7 @@ class Following:
         self._executor = executor
         self._clock = clock
         self._watch = Watch("planner", in_planner(command_id), planner, clock)
-        self._actions: dict[str, Event] = {}
+        self._actions: dict[str, ActionResult] = {}
         self._answer_by_ns = clock.now_ns() + round(ANSWER_TIMEOUT_S * NS_PER_S)
 
     @property
@@ -44,7 +47,7 @@ class Following:
         """Return why nobody works on the command, or "" while somebody may."""
         return self._watch.why_lost() if self.is_answered else ""
 
-    def take(self, events: Iterable[Event]) -> Iterator[Event]:
+    def take(self, events: Iterable[TaskEvent]) -> Iterator[TaskEvent]:
         """Yield those that are the command's, up to its last one."""
         for event in events:
             if self.has_ended or event.get("command_id") != self.command_id:
@@ -52,31 +55,31 @@ class Following:
             self._note(event)
             yield event
 
-    def conclude(self, why: str) -> Event | None:
+    def conclude(self, why: str) -> TaskEvent | None:
         """Return the last event of a command that is lost, unless it has ended meanwhile."""
         if self.has_ended or not why:
             return None
         self.has_ended = True
         return lost(self.command_id, why, self._actions)
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: TaskEvent) -> None:
         self.is_answered = True
         self.has_ended = event["event"] in LAST_EVENTS
         _note_action(self._actions, event)
         if event["event"] == "answered":
-            self.command_id = str(event["of"])
+            self.command_id = event["of"]
             self._watch = Watch("planner", in_planner(self.command_id), self._planner, self._clock)
         if event["event"] == "plan":
             has_it = in_executor(self.command_id)
             self._watch = Watch("executor", has_it, self._executor, self._clock)
 
 
-def in_planner(command_id: str) -> Callable[[Event], bool]:
+def in_planner(command_id: str) -> Callable[[PlannerStatus], bool]:
     """Return what tells whether a planner's status names a command."""
     return lambda status: command_id in status.get("commands", ())
 
 
-def in_executor(command_id: str) -> Callable[[Event], bool]:
+def in_executor(command_id: str) -> Callable[[ExecutorStatus], bool]:
     """Return what tells whether an executor's status names a command."""
     return lambda status: status["command_id"] == command_id
 
@@ -85,7 +88,11 @@ class Watch:
     """Judge by a process' status whether it still works on a command."""
 
     def __init__(
-        self, who: str, has_it: Callable[[Event], bool], status: Newest, clock: Clock
+        self,
+        who: str,
+        has_it: Callable[[Any], bool],
+        status: Callable[[], Sample[Any] | None],
+        clock: Clock,
     ) -> None:
         self._who = who
         self._has_it = has_it
@@ -109,10 +116,10 @@ class Watch:
         return ""
 
 
-def lost(command_id: str, why: str, actions: Mapping[str, Event]) -> Event:
+def lost(command_id: str, why: str, actions: Mapping[str, ActionResult]) -> TaskEvent:
     """Return the last event of a command that nobody carries out any more."""
-    told = [
-        action | {"status": ActionStatus.LOST.value} if action["status"] in UNFINISHED else action
+    told: list[ActionResult] = [
+        {**action, "status": "lost"} if action["status"] in UNFINISHED else action
         for action in actions.values()
     ]
     return {
@@ -124,17 +131,24 @@ def lost(command_id: str, why: str, actions: Mapping[str, Event]) -> Event:
     }
 
 
-def _note_action(actions: dict[str, Event], event: Event) -> None:
+def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:
     """Keep the newest word about every action, in the form of the `finished` event."""
     if event["event"] == "plan":
         actions.update({action["id"]: _pending(action) for action in event["plan"]["actions"]})
     if event["event"] == "action":
-        told = {key: value for key, value in event.items() if key not in ("command_id", "event")}
-        identity = told.pop("action_id")
-        actions[identity] = {"id": identity} | told
+        actions[event["action_id"]] = {
+            "id": event["action_id"],
+            "skill": event["skill"],
+            "parameters": event["parameters"],
+            "status": event["status"],
+            "execution_time_s": event["execution_time_s"],
+            "error": event["error"],
+            "retries": event["retries"],
+            "note": event.get("note"),
+        }
 
 
-def _pending(action: Event) -> Event:
+def _pending(action: Mapping[str, Any]) -> ActionResult:
     return {
         "id": action["id"],
         "skill": action["skill"],

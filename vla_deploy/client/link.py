@@ -3,7 +3,7 @@
 import itertools
 import os
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import clock_of
@@ -15,8 +15,13 @@ from vla_deploy.ipc import (
     RingWriter,
     Sample,
     SharedSpace,
+    Topic,
+    topics,
 )
+from vla_deploy.ipc.payloads.motion import OperatorActName
+from vla_deploy.ipc.payloads.tasks import UtteranceContent
 from vla_deploy.ipc.stop_button import ESTOP, StopButton
+from vla_deploy.ipc.topics import P
 
 PAGE: Final = "page"
 
@@ -42,9 +47,9 @@ class RobotLink:
         self.source = source
         self.robot = robot
         self._space = SharedSpace(run_dir / "ipc", self.clock)
-        self._cells: dict[str, CellReader] = {}
-        self._frames: dict[str, FrameReader] = {}
-        self._writers: dict[str, RingWriter] = {}
+        self._cells: dict[Topic[Any] | str, CellReader[Any]] = {}
+        self._frames: dict[Topic | str, FrameReader] = {}
+        self._writers: dict[Topic[Any] | str, RingWriter[Any]] = {}
         self._stop_button: StopButton | None = None
         self._numbers = itertools.count(1)
 
@@ -58,7 +63,7 @@ class RobotLink:
         """Return the run's shared memory."""
         return self._space
 
-    def fresh(self, topic: str, age_limit_s: float | None = None) -> Sample | None:
+    def fresh(self, topic: Topic[P] | str, age_limit_s: float | None = None) -> Sample[P] | None:
         """Return the newest sample of a cell, or None when there is none that young."""
         if topic not in self._cells:
             self._cells[topic] = self._space.cell_reader(topic)
@@ -67,12 +72,12 @@ class RobotLink:
             return sample
         return sample if sample.age_s(self.clock.now_ns()) <= age_limit_s else None
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any] | None:
+    def document(self, topic: Topic[P] | str, age_limit_s: float | None = None) -> P | None:
         """Return the newest JSON document of a cell, or None when there is none that young."""
         sample = self.fresh(topic, age_limit_s)
         return None if sample is None else sample.document()
 
-    def frame(self, topic: str, age_limit_s: float) -> Frame | None:
+    def frame(self, topic: Topic | str, age_limit_s: float) -> Frame | None:
         """Return the newest image of a frame ring, or None when there is none that young."""
         if topic not in self._frames:
             self._frames[topic] = self._space.frame_reader(topic)
@@ -82,35 +87,39 @@ class RobotLink:
         age_s = (self.clock.now_ns() - frame.stamp_ns) / NS_PER_S
         return frame if age_s <= age_limit_s else None
 
-    def events(self, topic: str, *, from_start: bool = False) -> RingReader:
+    def events(self, topic: Topic[P] | str, *, from_start: bool = False) -> RingReader[P]:
         """Return what comes on a ring from now on, or also what is still in it."""
         return self._space.ring_reader(topic, from_start=from_start)
 
-    def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Publish an event.
-
-        Raises:
-            BadPayload: it is longer than a slot of the ring.
-        """
+    def writer(self, topic: Topic[P] | str) -> RingWriter[P]:
+        """Return the writer of a ring, which it opens at first use."""
         if topic not in self._writers:
             self._writers[topic] = self._space.ring_writer(topic)
-        self._writers[topic].publish(message)
+        return self._writers[topic]
 
-    def operate(self, act: str, reason: str = "", source: str = "") -> None:
+    def operate(self, act: OperatorActName, reason: str = "", source: str = "") -> None:
         """Publish an operator's act: estop, reset, arm or disarm; control reads it directly."""
         if act == ESTOP:
             self._press(reason, source or self.source)
             return
-        self.publish("operator", {"act": act, "source": source or self.source, "reason": reason})
+        self.writer(topics.OPERATOR).publish(
+            {"act": act, "source": source or self.source, "reason": reason}
+        )
 
-    def utter(self, **utterance: Any) -> str:
+    def utter(
+        self, *, command_id: str = "", source: str = "", **content: Unpack[UtteranceContent]
+    ) -> str:
         """Say something to the planner, and return the id that answers to it carry.
+
+        `command_id` is for what is about a command, `source` for who speaks through this one.
 
         Raises:
             BadPayload: it is longer than a slot of the ring.
         """
-        command_id = f"{self.source}-{os.getpid()}-{next(self._numbers)}"
-        self.publish("utterance", {"command_id": command_id, "source": self.source} | utterance)
+        command_id = command_id or f"{self.source}-{os.getpid()}-{next(self._numbers)}"
+        self.writer(topics.UTTERANCE).publish(
+            {"command_id": command_id, "source": source or self.source, **content}
+        )
         return command_id
 
     def close(self) -> None:

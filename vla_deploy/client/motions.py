@@ -3,15 +3,16 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.client.link import RobotLink
-from vla_deploy.ipc import ClaimBook
+from vla_deploy.ipc import ClaimBook, topics
 from vla_deploy.ipc.errors import ClaimRefused
 from vla_deploy.ipc.motion_ids import motion_ids, sender_of
+from vla_deploy.ipc.payloads.motion import CancelMotion, GoalMotion, TrajectoryMotion
 
 Floats = NDArray[np.float64]
 _JOINT_AGE_S: Final = 0.25
@@ -40,7 +41,7 @@ def joint_view(
     link: RobotLink, joint_index: Mapping[str, int], joints: Sequence[str]
 ) -> JointView | None:
     """Return how some joints are, or None where control is silent."""
-    sample = link.fresh("joint_state", _JOINT_AGE_S)
+    sample = link.fresh(topics.JOINT_STATE, _JOINT_AGE_S)
     if sample is None:
         return None
     chosen = [joint_index[joint] for joint in joints]
@@ -65,7 +66,7 @@ class Motions:
         self._index = joint_index
         self._sender = sender
         self._ids = motion_ids(link.clock, sender)
-        self._results = link.events("motion_result")
+        self._results = link.events(topics.MOTION_RESULT)
         self._ended: dict[int, Ended] = {}
         self._active: set[int] = set()
 
@@ -75,9 +76,7 @@ class Motions:
             told = event.payload
             if told["motion_id"] in self._active:
                 self._active.remove(told["motion_id"])
-                self._ended[told["motion_id"]] = Ended(
-                    status=str(told["status"]), reason=str(told["reason"])
-                )
+                self._ended[told["motion_id"]] = Ended(status=told["status"], reason=told["reason"])
 
     def follow(self, joints: Sequence[str], times_s: Floats, positions: Floats) -> int:
         """Ask control to pass timed points, and return the motion's id.
@@ -88,6 +87,7 @@ class Motions:
         return self._send(
             {
                 "kind": "trajectory",
+                "motion_id": next(self._ids),
                 "joints": list(joints),
                 "times_s": np.round(times_s, 6).tolist(),
                 "positions": np.round(positions, 6).tolist(),
@@ -104,6 +104,7 @@ class Motions:
         return self._send(
             {
                 "kind": "goal",
+                "motion_id": next(self._ids),
                 "targets": dict(targets),
                 "speed_ratio": speed_ratio,
                 "effort_ratio": dict(effort_ratio),
@@ -112,7 +113,8 @@ class Motions:
 
     def cancel(self, motion_id: int) -> None:
         """Ask control to end a motion, its joints on a ramp; its result follows."""
-        self._link.publish("motion_command", {"kind": "cancel", "motion_id": motion_id})
+        cancel: CancelMotion = {"kind": "cancel", "motion_id": motion_id}
+        self._link.writer(topics.MOTION_COMMAND).publish(cancel)
 
     def forget(self, motion_id: int) -> None:
         """Take no more interest in how a motion ends."""
@@ -135,16 +137,15 @@ class Motions:
 
     def end_those_of_one_before(self) -> None:
         """End motions whose sender was killed: nobody watches over them any more."""
-        status = self._link.document("control_status", _JOINT_AGE_S)
-        for motion_id in (status or {}).get("active_motions", ()):
+        status = self._link.document(topics.CONTROL_STATUS, _JOINT_AGE_S)
+        for motion_id in () if status is None else status["active_motions"]:
             if sender_of(motion_id) == self._sender:
                 self.cancel(motion_id)
 
-    def _send(self, command: dict[str, Any]) -> int:
-        motion_id = next(self._ids)
-        self._link.publish("motion_command", command | {"motion_id": motion_id})
-        self._active.add(motion_id)
-        return motion_id
+    def _send(self, command: GoalMotion | TrajectoryMotion) -> int:
+        self._link.writer(topics.MOTION_COMMAND).publish(command)
+        self._active.add(command["motion_id"])
+        return command["motion_id"]
 
 
 class Claimed:

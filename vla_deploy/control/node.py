@@ -29,7 +29,7 @@ from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.control.reporting.status import Status
 from vla_deploy.control.reporting.telemetry import Telemetry, TickClock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.power_off import power_off_asked
@@ -62,7 +62,7 @@ class ControlNode:
         self._act: OperatorAct | None = None
 
         space = SharedSpace(context.run_dir / "ipc", clock)
-        self._payload = Payload(robot, space.cell_reader("executor_status"))
+        self._payload = Payload(robot, space.cell_reader(topics.EXECUTOR_STATUS))
         servos = self._servos = ServoLine(robot, profile, devices, clock)
         wheels = self._wheels = Wheels(robot, profile, devices, clock)
         self._motions = MotionSet(axis_limits(robot))
@@ -73,14 +73,16 @@ class ControlNode:
         self._resetting = Resetting(servos, wheels)
 
         self._button = EstopButton(robot, devices, clock)
-        with closing(space.cell_reader("control_status")) as before:
+        with closing(space.cell_reader(topics.CONTROL_STATUS)) as before:
             self._inbox = OperatorInbox(
-                space.ring_reader("operator", from_start=True), self._button.source, before.latest()
+                space.ring_reader(topics.OPERATOR, from_start=True),
+                self._button.source,
+                before.latest(),
             )
         self._judging = Judging(space, robot, servos, wheels, clock)
         self._stopping = Stopping(robot, servos, wheels, self._joints, self._base, self._payload)
         self._modes = Modes(Arming(servos, wheels, clock), self._stopping, self._motions)
-        self._commands = space.ring_reader("motion_command", from_start=False)
+        self._commands = space.ring_reader(topics.MOTION_COMMAND, from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
         self._status = Status(
             self._ticks, self._modes, self._judging, self._inbox, self._motions, servos, wheels

@@ -11,12 +11,12 @@ from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import SOCKET_NAME, HttpSocket, open_socket
-from vla_deploy.ipc import CellWriter
+from vla_deploy.ipc import CellWriter, topics
+from vla_deploy.ipc.payloads.services import DashboardStatus
 from vla_deploy.runtime.net import DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
-STATUS_TOPIC: Final = "dashboard_status"
 _PUBLISH_NS: Final = NS_PER_S // 2
 _EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 _log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class DashboardNode:
         self._parts: list[Part] = []
         self._guard = PartGuard(_log)
         self._access: AccessControl | None = None
-        self._status: CellWriter
+        self._status: CellWriter[DashboardStatus]
         self._due_ns = 0
         self._url = ""
 
@@ -52,11 +52,12 @@ class DashboardNode:
         certificate, key = settings.tls_certificate, settings.tls_key
         tls = server_context(certificate, key) if certificate else None
         twin = self._context.devices_dir is not None  # runs on one computer share its ports
-        before = (self.link.document(STATUS_TOPIC) or {}).get("port")
+        status = self.link.document(topics.DASHBOARD_STATUS)
+        before = None if status is None else status["port"]
         tcp = open_port(settings.host, settings.port, search=twin, before=before)
         unix = open_socket(self._context.run_dir / SOCKET_NAME)
         self.sockets = (HttpSocket(tcp, tls), HttpSocket(unix))
-        self._status = self.link.space.cell_writer(STATUS_TOPIC)
+        self._status = self.link.space.cell_writer(topics.DASHBOARD_STATUS)
         # Sessions and limits on guesses run in real time.
         base, rules = self._context.run_dir.parent, _rules(settings)
         self._access = AccessControl.of_base(base, rules, MonotonicClock())

@@ -13,8 +13,8 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from vla_deploy.dashboard.access import UserRole, require
+from vla_deploy.ipc import topics
 
-STATUS_TOPIC: Final = "stop_door_status"
 _HOST: Final = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:\d{1,5})?")
 _POLICY: Final = {
     "default-src": "'none'",
@@ -49,7 +49,7 @@ def stop_door_url(request: HTTPConnection) -> str:
     The port is the one that the door published last, else that of the settings.
     """
     state = request.app.state
-    status = state.link.document(STATUS_TOPIC) or {}
+    status = state.link.document(topics.STOP_DOOR_STATUS) or {}
     port = status.get("port", state.settings.stop_port)
     return f"{state.settings.scheme}://{called_host(request) or state.settings.host}:{port}"
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import Clock
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.space import SharedSpace
 from vla_deploy.ipc.topics import BY_NAME
 
@@ -38,9 +39,9 @@ class Announcer:
         """
         self._source = source
         self._clock = clock
-        self._say = space.ring_writer("say")
-        self._told = space.ring_reader("voice_event", from_start=False)
-        self._status = space.cell_reader("speech_status")
+        self._say = space.ring_writer(topics.SAY)
+        self._told = space.ring_reader(topics.VOICE_EVENT, from_start=False)
+        self._status = space.cell_reader(topics.SPEECH_STATUS)
         self._numbers = itertools.count(1)
         self._said: deque[str] = deque(maxlen=_REMEMBERED)
         self._ended: dict[str, Announced] = {}

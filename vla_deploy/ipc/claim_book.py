@@ -4,15 +4,14 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
 from vla_deploy.ipc.errors import BadPayload, ClaimRefused
-from vla_deploy.ipc.memory.shared_document import Document
 from vla_deploy.ipc.space import SharedSpace
+from vla_deploy.ipc.topics import CLAIMS
 
-TOPIC: Final = "claims"
 _START_TIME_FIELD: Final = 19  # of /proc/<pid>/stat, counted behind the name
 
 
@@ -28,7 +27,7 @@ class ClaimBook:
         Raises:
             SpaceUnavailable: shared memory cannot be opened.
         """
-        self._shared = space.shared_document(TOPIC)
+        self._shared = space.shared_document(CLAIMS)
         self._clock = clock
         self._pid = os.getpid()
         self._pid_started = _start_time(self._pid) or 0
@@ -78,7 +77,7 @@ class ClaimBook:
         return obstacles(self.look(), wants)
 
     def _change(self, change: Callable[[Book, int], Book]) -> Book:
-        def turn(before: Document | None) -> Document:
+        def turn(before: dict[str, Any] | None) -> dict[str, Any]:
             book = _book_of(before)
             dead = [one.holder for one in (*book.granted, *book.waiting) if not _is_alive(one)]
             now_ns = self._clock.now_ns()
@@ -90,7 +89,7 @@ class ClaimBook:
             raise ClaimRefused(f"too many claims at once: {error}") from error
 
 
-def _book_of(document: Document | None) -> Book:
+def _book_of(document: dict[str, Any] | None) -> Book:
     if document is None:
         return Book()
     return Book(
@@ -100,7 +99,7 @@ def _book_of(document: Document | None) -> Book:
     )
 
 
-def _document_of(book: Book) -> Document:
+def _document_of(book: Book) -> dict[str, Any]:
     return {
         "capacities": dict(book.capacities),
         "granted": [asdict(claim) for claim in book.granted],

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from vla_deploy.ipc.errors import ReplayOnly
 from vla_deploy.ipc.topics import Topic
@@ -23,7 +23,7 @@ def mark_replay(directory: Path, file: str) -> None:
     (directory / MARK_FILE).write_text(json.dumps({"file": file}))
 
 
-def refuse_in_replay(directory: Path, topic: Topic) -> None:
+def refuse_in_replay(directory: Path, topic: Topic[Any]) -> None:
     """Let nobody write a topic of a replay.
 
     Raises:

@@ -10,9 +10,6 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Final
 
-REQUEST: Final = "ros_request"
-ANSWER: Final = "ros_answer"
-STATUS: Final = "ros_status"
 MOST_POINTS: Final = 200
 """Of a trajectory: what fits into a slot of the ring, and what the robot's own servers take."""
 MOST_JOINTS: Final = 32
@@ -78,6 +75,7 @@ class GoalRequest:
     `most_m_s` bounds the speed of the base, 0 leaves it to control.
     """
 
+    act: GoalAct = GoalAct.SEND
     request_id: str
     kind: GoalKind
     server: str
@@ -93,7 +91,7 @@ class GoalRequest:
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON."""
-        return {"act": GoalAct.SEND.value, **asdict(self), "kind": self.kind.value}
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,25 +123,25 @@ def read_request(document: Mapping[str, Any]) -> GoalRequest:
     Raises:
         GoalUnreadable: a part is missing, of the wrong kind, or out of bounds.
     """
-    fields = {key: value for key, value in document.items() if key != "act"}
     try:
-        pose = fields.get("pose")
+        pose, rows = document.get("pose"), document.get("positions", ())
         request = GoalRequest(
             **{
-                **fields,
-                "kind": GoalKind(fields["kind"]),
-                "parts": tuple(map(str, fields["parts"])),
+                **document,
+                "act": GoalAct(document["act"]),
+                "kind": GoalKind(document["kind"]),
+                "parts": tuple(map(str, document["parts"])),
                 "pose": None if pose is None else tuple(map(float, pose)),
-                "joints": tuple(map(str, fields.get("joints", ()))),
-                "times_s": tuple(map(float, fields.get("times_s", ()))),
-                "positions": tuple(tuple(map(float, row)) for row in fields.get("positions", ())),
+                "joints": tuple(map(str, document.get("joints", ()))),
+                "times_s": tuple(map(float, document.get("times_s", ()))),
+                "positions": tuple(tuple(map(float, row)) for row in rows),
             }
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise RosGoalUnreadable(f"{REQUEST}: not a request for a goal: {error}") from error
+        raise RosGoalUnreadable(f"ros_request: not a request for a goal: {error}") from error
     fault = next(_faults(request), "")
     if fault:
-        raise RosGoalUnreadable(f"{REQUEST} {request.request_id}: {fault}")
+        raise RosGoalUnreadable(f"ros_request {request.request_id}: {fault}")
     return request
 
 
@@ -156,7 +154,7 @@ def read_answer(document: Mapping[str, Any]) -> GoalAnswer:
     try:
         return GoalAnswer(**{**document, "state": GoalState(document["state"])})
     except (KeyError, TypeError, ValueError) as error:
-        raise RosGoalUnreadable(f"{ANSWER}: not an answer about a goal: {error}") from error
+        raise RosGoalUnreadable(f"ros_answer: not an answer about a goal: {error}") from error
 
 
 def _faults(request: GoalRequest) -> Iterator[str]:

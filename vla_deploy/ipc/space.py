@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from drivers.clock import Clock
 from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
@@ -14,14 +15,15 @@ from vla_deploy.ipc.memory.segment import Segment
 from vla_deploy.ipc.memory.shared_document import SharedDocument
 from vla_deploy.ipc.pulse import PulseReader
 from vla_deploy.ipc.replay_mark import refuse_in_replay
-from vla_deploy.ipc.topics import TOPICS, Topic, TopicKind
+from vla_deploy.ipc.topics import TOPICS, P, Topic, TopicKind
 
 
 class SharedSpace:
     """Give access to the shared memory of one run; the first process makes the files.
 
-    Every method but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`; in
-    a replay, which `is_replay` alone may write, every writer raises `ReplayOnly`.
+    A topic of the table brings the type of its payload along, a bare name does not. Every method
+    but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`; in a replay,
+    which `is_replay` alone may write, every writer raises `ReplayOnly`.
 
     Raises:
         SpaceUnavailable: the directory cannot be made.
@@ -31,7 +33,7 @@ class SharedSpace:
         self,
         directory: Path,
         clock: Clock,
-        topics: Iterable[Topic] = TOPICS,
+        topics: Iterable[Topic[Any]] = TOPICS,
         *,
         is_replay: bool = False,
     ) -> None:
@@ -45,61 +47,61 @@ class SharedSpace:
         except OSError as error:
             raise SpaceUnavailable(f"{directory}: cannot make it: {error.strerror}") from error
 
-    def cell_writer(self, name: str) -> CellWriter:
+    def cell_writer(self, topic: Topic[P] | str) -> CellWriter[P]:
         """Open a latest-value cell as its owner."""
-        topic = self._topic(name, TopicKind.CELL)
-        return CellWriter(self._segment(topic, writable=True), topic, self._clock)
+        declared = self._topic(topic, TopicKind.CELL)
+        return CellWriter(self._segment(declared, writable=True), declared, self._clock)
 
-    def cell_reader(self, name: str) -> CellReader:
+    def cell_reader(self, topic: Topic[P] | str) -> CellReader[P]:
         """Open a latest-value cell for reading."""
-        topic = self._topic(name, TopicKind.CELL)
-        return CellReader(self._segment(topic, writable=False), topic)
+        declared = self._topic(topic, TopicKind.CELL)
+        return CellReader(self._segment(declared, writable=False), declared)
 
-    def shared_document(self, name: str) -> SharedDocument:
+    def shared_document(self, topic: Topic[P] | str) -> SharedDocument[P]:
         """Open a cell whose document several processes change in turns."""
-        topic = self._topic(name, TopicKind.CELL)
-        return SharedDocument(self._segment(topic, writable=True), topic, self._clock)
+        declared = self._topic(topic, TopicKind.CELL)
+        return SharedDocument(self._segment(declared, writable=True), declared, self._clock)
 
-    def ring_writer(self, name: str) -> RingWriter:
+    def ring_writer(self, topic: Topic[P] | str) -> RingWriter[P]:
         """Open an event ring for publishing."""
-        topic = self._topic(name, TopicKind.RING)
-        return RingWriter(self._segment(topic, writable=True), topic, self._clock)
+        declared = self._topic(topic, TopicKind.RING)
+        return RingWriter(self._segment(declared, writable=True), declared, self._clock)
 
-    def ring_reader(self, name: str, *, from_start: bool) -> RingReader:
+    def ring_reader(self, topic: Topic[P] | str, *, from_start: bool) -> RingReader[P]:
         """Open an event ring for reading, from its oldest event or from now on."""
-        topic = self._topic(name, TopicKind.RING)
-        return RingReader(self._segment(topic, writable=False), from_start=from_start)
+        declared = self._topic(topic, TopicKind.RING)
+        return RingReader(self._segment(declared, writable=False), from_start=from_start)
 
-    def frame_writer(self, name: str) -> FrameWriter:
+    def frame_writer(self, topic: Topic[Any] | str) -> FrameWriter:
         """Open a frame ring as its owner."""
-        topic = self._topic(name, TopicKind.FRAME)
-        return FrameWriter(self._segment(topic, writable=True), topic)
+        declared = self._topic(topic, TopicKind.FRAME)
+        return FrameWriter(self._segment(declared, writable=True), declared)
 
-    def frame_reader(self, name: str) -> FrameReader:
+    def frame_reader(self, topic: Topic[Any] | str) -> FrameReader:
         """Open a frame ring for reading."""
-        return FrameReader(self._segment(self._topic(name, TopicKind.FRAME), writable=False))
+        return FrameReader(self._segment(self._topic(topic, TopicKind.FRAME), writable=False))
 
-    def record_writer(self, name: str) -> RecordWriter:
+    def record_writer(self, topic: Topic[Any] | str) -> RecordWriter:
         """Open a record ring as its owner."""
-        topic = self._topic(name, TopicKind.RECORD)
-        return RecordWriter(self._segment(topic, writable=True), topic, self._clock)
+        declared = self._topic(topic, TopicKind.RECORD)
+        return RecordWriter(self._segment(declared, writable=True), declared, self._clock)
 
-    def record_reader(self, name: str) -> RecordReader:
+    def record_reader(self, topic: Topic[Any] | str) -> RecordReader:
         """Open a record ring for reading."""
-        return RecordReader(self._segment(self._topic(name, TopicKind.RECORD), writable=False))
+        return RecordReader(self._segment(self._topic(topic, TopicKind.RECORD), writable=False))
 
-    def pulse_reader(self, name: str) -> PulseReader:
+    def pulse_reader(self, topic: Topic[Any] | str) -> PulseReader:
         """Follow how often a topic of any kind is written, and when it was last."""
-        return PulseReader(self._segment(self._topic(name, *TopicKind), writable=False))
+        return PulseReader(self._segment(self._topic(topic, *TopicKind), writable=False))
 
-    def doorbell(self, name: str) -> Doorbell:
+    def doorbell(self, topic: Topic[Any] | str) -> Doorbell:
         """Listen for the writers of an event or frame ring.
 
         Raises:
             UnknownTopic: no such topic, or a cell: cells are polled, they ring no bell.
         """
-        topic = self._topic(name, TopicKind.RING, TopicKind.FRAME)
-        bell = Doorbell(self._directory, topic.name, self._clock)
+        declared = self._topic(topic, TopicKind.RING, TopicKind.FRAME)
+        bell = Doorbell(self._directory, declared.name, self._clock)
         self._opened.append(bell)
         return bell
 
@@ -109,19 +111,20 @@ class SharedSpace:
             opened.close()
         self._opened.clear()
 
-    def _segment(self, topic: Topic, *, writable: bool) -> Segment:
+    def _segment(self, topic: Topic[Any], *, writable: bool) -> Segment:
         if writable and not self._is_replay:
             refuse_in_replay(self._directory, topic)
         segment = Segment(self._directory, topic, writable=writable)
         self._opened.append(segment)
         return segment
 
-    def _topic(self, name: str, *kinds: TopicKind) -> Topic:
+    def _topic(self, wanted: Topic[P] | str, *kinds: TopicKind) -> Topic[P]:
+        name = wanted if isinstance(wanted, str) else wanted.name
         topic = self._topics.get(name)
         if topic is None:
             known = ", ".join(sorted(self._topics))
             raise UnknownTopic(f"no topic {name!r}; topics.py declares: {known}")
         if topic.kind not in kinds:
-            wanted = " or ".join(kind.value for kind in kinds)
-            raise UnknownTopic(f"topic {name!r} is a {topic.kind.value}, not a {wanted}")
+            kind = " or ".join(kind.value for kind in kinds)
+            raise UnknownTopic(f"topic {name!r} is a {topic.kind.value}, not a {kind}")
         return topic

@@ -8,6 +8,7 @@ was frozen while it wrote to the same ring.
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.space import SharedSpace
 
 ESTOP: Final = "estop"
@@ -27,8 +28,8 @@ class StopButton:
         """
         self.source = source[:_SOURCE_LETTERS]
         self._clock = clock or MonotonicClock()
-        self._out = space.ring_writer("operator")
-        self._in = space.ring_reader("operator", from_start=True)
+        self._out = space.ring_writer(topics.OPERATOR)
+        self._in = space.ring_reader(topics.OPERATOR, from_start=True)
         self._newest_act: object = None
         self._newest_ns = 0
 
@@ -42,8 +43,8 @@ class StopButton:
         recent = self._clock.now_ns() - self._newest_ns < REPEAT_NS
         if recent and self._newest_act == ESTOP:
             return False
-        words = {"source": self.source, "reason": reason[:_REASON_LETTERS]}
-        self._out.force({"act": ESTOP} | words)
+        reason = reason[:_REASON_LETTERS]
+        self._out.force({"act": ESTOP, "source": self.source, "reason": reason})
         return True
 
     def close(self) -> None:

@@ -6,10 +6,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, wait
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import CellReader, Event, RingReader, SharedSpace
+from vla_deploy.ipc import Event, SharedSpace, topics
+from vla_deploy.ipc.payloads.tasks import MemoryStatus, TaskEvent, Utterance
 from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen
 from vla_deploy.memory.errors import MemoryUnusable
 from vla_deploy.memory.store import MemoryStore
@@ -52,9 +53,9 @@ class MemoryKeeper:
         self._run_id = run_id
         self._places = dict(places)
         self._wall_s = wall_s
-        self._utterances: RingReader = space.ring_reader("utterance", from_start=False)
-        self._events: RingReader = space.ring_reader("task_event", from_start=False)
-        self._scene: CellReader = space.cell_reader("scene")
+        self._utterances = space.ring_reader(topics.UTTERANCE, from_start=False)
+        self._events = space.ring_reader(topics.TASK_EVENT, from_start=False)
+        self._scene = space.cell_reader(topics.SCENE)
         self._open: OrderedDict[str, Episode] = OrderedDict()
         self._ended: list[Episode] = []
         self._seen: OrderedDict[str, LastSeen] = OrderedDict()
@@ -67,8 +68,8 @@ class MemoryKeeper:
 
     def step(self) -> None:
         """Take note of what has come in, and write what is complete."""
-        for event in self._utterances.drain():
-            self._begin(event)
+        for said in self._utterances.drain():
+            self._begin(said)
         for event in self._events.drain():
             self._follow(event.payload)
         now_ns = self._clock.now_ns()
@@ -86,14 +87,14 @@ class MemoryKeeper:
         self._executor.shutdown(wait=True)
         self._store.close()
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> MemoryStatus:
         """Return how remembering goes, for the status."""
         waiting = len(self._ended) + len(self._changed)
         return {"file": str(self._store.path), "waiting": waiting, "trouble": self.trouble}
 
     # --- commands -------------------------------------------------------------------------------
 
-    def _begin(self, event: Event) -> None:
+    def _begin(self, event: Event[Utterance]) -> None:
         told = event.payload
         command_id, text = str(told.get("command_id", "")), str(told.get("text") or "")
         if not command_id or not text:  # a cancel, or a whole plan from a program
@@ -107,13 +108,13 @@ class MemoryKeeper:
         while len(self._open) > MOST_OPEN:
             self._open.popitem(last=False)
 
-    def _follow(self, told: Mapping[str, Any]) -> None:
-        command_id = str(told.get("command_id", ""))
-        event, before = str(told.get("event")), self._open.get(command_id)
-        episode = None if before is None else _after(event, told, before)
+    def _follow(self, told: TaskEvent) -> None:
+        command_id = told["command_id"]
+        before = self._open.get(command_id)
+        episode = None if before is None else _after(told, before)
         if episode is None:
             return
-        if event not in _ENDS:
+        if told["event"] not in _ENDS:
             self._open[command_id] = episode
             return
         del self._open[command_id]
@@ -195,24 +196,18 @@ def _is_news(before: LastSeen, now: LastSeen) -> bool:
     )
 
 
-def _after(event: str, told: Mapping[str, Any], episode: Episode) -> Episode | None:
+def _after(told: TaskEvent, episode: Episode) -> Episode | None:
     """Return the episode after an event of its command, None where the event says nothing of it."""
-    match event:
-        case "plan":
-            plan = told.get("plan") or {}
-            return replace(
-                episode,
-                goal=str(plan.get("goal", "")),
-                reasoning=str(plan.get("reasoning", "")),
-                plan=plan,
-                rung=str(told.get("rung", "")),
-            )
-        case "rejected":
-            error = str(told.get("reason") or "")
-            return replace(episode, outcome=EpisodeOutcome.REFUSED, error=error)
-        case "finished":
-            outcome = EpisodeOutcome.SUCCEEDED if told.get("success") else EpisodeOutcome.FAILED
-            return replace(episode, outcome=outcome, error=str(told.get("error") or ""))
-        case "answered":  # It answered a question: what came of it is told of the question.
-            return replace(episode, outcome=EpisodeOutcome.SUCCEEDED)
+    if told["event"] == "plan":
+        plan = told["plan"]
+        goal, reasoning = str(plan.get("goal", "")), str(plan.get("reasoning", ""))
+        rung = told.get("rung", "")
+        return replace(episode, goal=goal, reasoning=reasoning, plan=plan, rung=rung)
+    if told["event"] == "rejected":
+        return replace(episode, outcome=EpisodeOutcome.REFUSED, error=told["reason"])
+    if told["event"] == "finished":
+        outcome = EpisodeOutcome.SUCCEEDED if told["success"] else EpisodeOutcome.FAILED
+        return replace(episode, outcome=outcome, error=told["error"] or "")
+    if told["event"] == "answered":  # It answered a question: what came of it is told of that.
+        return replace(episode, outcome=EpisodeOutcome.SUCCEEDED)
     return None

@@ -7,7 +7,7 @@ import numpy as np
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.client.place_state import PlaceState
-from vla_deploy.ipc import Sample, SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace, topics
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.maps.mapping import Mapper
 from vla_deploy.perception.geometry.cloud import sparse_points
@@ -43,13 +43,13 @@ class MapRecorder:
             RobotFileError: the MJCF does not fit the robot file.
         """
         model = RobotModel(robot)
-        self._scan, self._imu = space.cell_reader("scan"), space.cell_reader("imu")
-        self._base_state = space.cell_reader("base_state")
-        self._images = space.frame_reader("rgbd")
+        self._scan, self._imu = space.cell_reader(topics.SCAN), space.cell_reader(topics.IMU)
+        self._base_state = space.cell_reader(topics.BASE_STATE)
+        self._images = space.frame_reader(topics.RGBD)
         self._body = BodyState(robot, model)
         self._body.start(space)
         self._camera = robot.camera
-        start = _tracked_pose(space.cell_reader("pose").latest())
+        start = _tracked_pose(space.cell_reader(topics.POSE).latest())
         self.on_old_frame = start is not None
         self.mapper = Mapper(start or ORIGIN, lidar_place(robot, model), resolution_m)
         self._last = {"base_state": -1, "scan": -1, "rgbd": -1}

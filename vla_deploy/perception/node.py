@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S
 from drivers.opener import DeviceOpener
 from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace
+from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace, topics
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.perception.images.detector_worker import (
     DetectorWorker,
@@ -97,9 +97,10 @@ class PerceptionNode:
         self._body.start(space)
         self._pose_tracker.start(space)
         self._writers: dict[str, CellWriter] = {
-            name: space.cell_writer(name) for name in ("imu", "scan", "scene", "near_obstacles")
+            name: space.cell_writer(name) for name in ("imu", "scan", "near_obstacles")
         }
-        self._images: FrameWriter = space.frame_writer("rgbd")
+        self._scene = space.cell_writer(topics.SCENE)
+        self._images: FrameWriter = space.frame_writer(topics.RGBD)
         self._sensors.open()
         self._worker.replace(load_detector(self._shelf, self._profile, 0))
 
@@ -195,7 +196,7 @@ class PerceptionNode:
 
     def _restore_scene(self) -> None:
         """Restore what an earlier instance in this run knew of things."""
-        last = self._space.cell_reader("scene").latest()
+        last = self._space.cell_reader(topics.SCENE).latest()
         if last is not None:
             self._pipeline.scene.restore(last.document())
 
@@ -220,5 +221,4 @@ class PerceptionNode:
         now_ns = self._clock.now_ns()
         if now_ns >= self._next_scene_ns:
             self._next_scene_ns = now_ns + SCENE_PERIOD_NS
-            document = {**self._pipeline.document(now_ns), "away": self._sensors.away()}
-            self._writers["scene"].put_document(document)
+            self._scene.put_document(self._pipeline.document(now_ns, self._sensors.away()))

@@ -3,7 +3,7 @@
 from drivers.clock import NS_PER_S
 from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
-from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
+from vla_deploy.ipc import CellReader, CellWriter, SharedSpace, topics
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
@@ -31,8 +31,8 @@ class PoseTracker:
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics."""
-        self._base_state: CellReader = space.cell_reader("base_state")
-        self._writer: CellWriter = space.cell_writer("pose")
+        self._base_state: CellReader = space.cell_reader(topics.BASE_STATE)
+        self._writer: CellWriter = space.cell_writer(topics.POSE)
 
     def add_imu(self, newest: ImuSample) -> None:
         """Use a sample of the IMU from the next step on."""
@@ -75,5 +75,5 @@ def lidar_place(robot: RobotDescription, model: RobotModel) -> Pose2D:
 
 
 def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
-    last = space.cell_reader("pose").latest()
+    last = space.cell_reader(topics.POSE).latest()
     return robot.start_pose if last is None else Pose2D.of(last.data)

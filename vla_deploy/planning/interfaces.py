@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from typing import Any, Protocol
 
+from vla_deploy.ipc.payloads.tasks import AttemptDocument
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.planning.errors import Ambiguous, NotAble
@@ -138,10 +139,13 @@ class Attempt:
     took_s: float
     reason: str = ""
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> AttemptDocument:
         """Return it as JSON takes it."""
-        took_s = round(self.took_s, 4)
-        document = {"rung": self.back_end, "outcome": self.outcome.value, "took_s": took_s}
+        document: AttemptDocument = {
+            "rung": self.back_end,
+            "outcome": self.outcome.value,
+            "took_s": round(self.took_s, 4),
+        }
         return {**document, "reason": self.reason} if self.reason else document
 
 

@@ -7,7 +7,8 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace
+from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
+from vla_deploy.ipc.payloads.tasks import PlanMessage, PlannerStatus, TaskEvent, Utterance
 from vla_deploy.memory import MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.keeper import MemoryKeeper
@@ -66,15 +67,15 @@ class PlannerNode:
         self._is_stopped = False
         self._manager: CommandManager
         self._publisher: PlannerEvents
-        self._status: CellWriter
-        self._utterances: RingReader
-        self._events: RingReader
+        self._status: CellWriter[PlannerStatus]
+        self._utterances: RingReader[Utterance]
+        self._events: RingReader[TaskEvent]
 
     def start(self) -> None:
         """Open the topics; what an earlier planner left is taken up, or refused with the reason."""
-        self._utterances = self._space.ring_reader("utterance", from_start=True)
-        self._events = self._space.ring_reader("task_event", from_start=True)
-        plans = self._space.ring_reader("plan", from_start=True)
+        self._utterances = self._space.ring_reader(topics.UTTERANCE, from_start=True)
+        self._events = self._space.ring_reader(topics.TASK_EVENT, from_start=True)
+        plans = self._space.ring_reader(topics.PLAN, from_start=True)
         before = _unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
         self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
@@ -96,7 +97,7 @@ class PlannerNode:
             self._robot.planning.further_plans,
             self._prohibitions,
         )
-        self._status = self._space.cell_writer("planner_status")
+        self._status = self._space.cell_writer(topics.PLANNER_STATUS)
         for command_id in before.in_work:
             self._refuse(command_id, AWAY)
         for command_id in before.set_back:
@@ -106,8 +107,8 @@ class PlannerNode:
 
     def step(self) -> None:
         """Take what has come in, go on with what can, publish the status."""
-        for event in self._utterances.drain():
-            self._hear(event)
+        for said in self._utterances.drain():
+            self._hear(said)
         for event in self._events.drain():
             self._note(event)
         self._manager.advance()
@@ -117,7 +118,7 @@ class PlannerNode:
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + _STATUS_PERIOD_NS
             memory = self._keeper.document() if self._keeper is not None else None
-            self._status.put_document({**self._manager.document(), "memory": memory})
+            self._status.put_document(self._manager.document(memory))
 
     def stop(self) -> None:
         """Close the topics; what is planned in the executor is given up."""
@@ -148,7 +149,7 @@ class PlannerNode:
             return  # the process ends, and its memory with it
         self._executor.submit(prepared.close)
 
-    def _hear(self, event: Event) -> None:
+    def _hear(self, event: Event[Utterance]) -> None:
         self._manager.metrics.heard += 1
         if self._stops_all(event):
             self._manager.stop_all(command_id_of(event))
@@ -163,26 +164,25 @@ class PlannerNode:
     def _refuse(self, command_id: str, reason: str) -> None:
         self._publisher.refused(UserCommand(command_id=command_id, told_ns=0), reason)
 
-    def _stops_all(self, event: Event) -> bool:
+    def _stops_all(self, event: Event[Utterance]) -> bool:
         """Return whether all is to end; "never mind" to a question ends the question alone."""
         if event.payload.get("cancel"):
             return True
         declines = self._manager.dialogue.declines(event.payload.get("text"))
         return asks_to_stop(event) and not declines
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: Event[TaskEvent]) -> None:
         """Note what the executor publishes of a command."""
         payload, command_id = event.payload, command_id_of(event)
-        match payload.get("event"):
-            case "setback":
-                self._manager.set_back(command_id, payload)
-            case "rejected":
-                self._manager.turned_away(command_id, str(payload.get("reason") or ""))
-            case "finished":
-                error = str(payload.get("error") or "")
-                self._manager.has_ended(command_id, bool(payload.get("success")), error)
+        if payload["event"] == "setback":
+            self._manager.set_back(command_id, payload)
+        elif payload["event"] == "rejected":
+            self._manager.turned_away(command_id, payload.get("reason") or "")
+        elif payload["event"] == "finished":
+            error = payload.get("error") or ""
+            self._manager.has_ended(command_id, bool(payload.get("success")), error)
 
-    def _check_age(self, event: Event) -> None:
+    def _check_age(self, event: Event[Utterance]) -> None:
         """Refuse what the person has given up by now: the robot must not move by surprise."""
         age_s = (self._clock.now_ns() - event.stamp_ns) / NS_PER_S
         if age_s > UTTERANCE_AGE_S:
@@ -204,13 +204,15 @@ class _Unfinished:
     For those that are `set_back` the executor waits for another plan.
     """
 
-    unheard: tuple[Event, ...]
+    unheard: tuple[Event[Utterance], ...]
     in_work: tuple[str, ...]
     set_back: tuple[str, ...]
 
 
 def _unfinished(
-    utterances: Sequence[Event], events: Sequence[Event], plans: Sequence[Event]
+    utterances: Sequence[Event[Utterance]],
+    events: Sequence[Event[TaskEvent]],
+    plans: Sequence[Event[PlanMessage]],
 ) -> _Unfinished:
     """Return what the topics hold of the time before; nothing in a run that has just begun."""
     last = {command_id_of(event): str(event.payload.get("event", "")) for event in events}

@@ -8,9 +8,10 @@ is asked.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc.payloads.tasks import BackEndsStatus
 from vla_deploy.planning.comparison import move_the_same
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Ambiguous, Declined, NotUnderstood
@@ -104,7 +105,7 @@ class Planner:
         """Return what any of the back ends can use."""
         return frozenset().union(*(one.uses for one in self._slow))
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> BackEndsStatus:
         """Return who plans and how the servers have been doing, as JSON takes it."""
         documents = (one.document() for one in self._slow)
         return {

@@ -1,7 +1,6 @@
 """Let a node follow profile changes and budget directives between two of its steps."""
 
 import logging
-from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,13 @@ from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from platforms.profile import profile_from
 from platforms.profile_source import ProfileSource
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.supervision import (
+    AnsweredPhaseName,
+    PrepareProfile,
+    ProfileChangeMessage,
+    WatchProfile,
+)
 from vla_deploy.runtime.node import Adaptable, NeedsRestart, Node, Slowable
 from vla_deploy.runtime.rate_monitor import RateMonitor, TrialMonitor
 
@@ -75,14 +80,6 @@ class ReconfigurableNode:
         self._directives_sequence = -1
         self._change: _Change | None = None
         self._watch: TrialMonitor | None = None
-        self._handlers: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
-            "prepare": self._on_prepare,
-            "commit": self._on_commit,
-            "watch": self._on_watch,
-            "validate": self._on_validate,
-            "keep": self._on_keep,
-            "rollback": self._on_rollback,
-        }
 
     @property
     def period_s(self) -> float:
@@ -98,14 +95,14 @@ class ReconfigurableNode:
         """Start the node and listen from now on."""
         self._node.start()
         self._space = SharedSpace(self._ipc, self._clock)
-        self._changes = self._space.ring_reader("profile_change", from_start=False)
-        self._answers = self._space.ring_writer("profile_answer")
-        self._directives = self._space.cell_reader("resource_directives")
+        self._changes = self._space.ring_reader(topics.PROFILE_CHANGE, from_start=False)
+        self._answers = self._space.ring_writer(topics.PROFILE_ANSWER)
+        self._directives = self._space.cell_reader(topics.RESOURCE_DIRECTIVES)
 
     def step(self) -> None:
         """Follow what the supervisor says, then step the node."""
         for event in self._changes.drain():
-            self._handlers[event.payload["phase"]](event.payload)
+            self._follow(event.payload)
         self._tell_prepared()
         if self._name != _UNSLOWED:
             self._heed_directives()
@@ -123,7 +120,22 @@ class ReconfigurableNode:
 
     # --- phases of a change -------------------------------------------------------------------
 
-    def _on_prepare(self, message: Mapping[str, Any]) -> None:
+    def _follow(self, message: ProfileChangeMessage) -> None:
+        match message["phase"]:
+            case "prepare":
+                self._on_prepare(message)
+            case "commit":
+                self._on_commit(message)
+            case "watch":
+                self._on_watch(message)
+            case "validate":
+                self._on_validate(message)
+            case "keep":
+                self._on_keep(message)
+            case "rollback":
+                self._on_rollback(message)
+
+    def _on_prepare(self, message: PrepareProfile) -> None:
         self._abandon()
         source = ProfileSource.of_values(message["profile"], message["values"])
         future = self._executor.submit(self._prepare, source, self._tier)
@@ -155,7 +167,7 @@ class ReconfigurableNode:
         )
         self._change = None
 
-    def _on_commit(self, message: Mapping[str, Any]) -> None:
+    def _on_commit(self, message: ProfileChangeMessage) -> None:
         change = self._of(message)
         if change is None or not change.answered:
             self._answer(message["change_id"], "commit", "it has prepared nothing")
@@ -171,7 +183,7 @@ class ReconfigurableNode:
         self._begin_watch(change.change_id, kept_ratio)
         self._answer(change.change_id, "commit", "; ".join(refused))
 
-    def _on_watch(self, message: Mapping[str, Any]) -> None:
+    def _on_watch(self, message: WatchProfile) -> None:
         """Count from now on if this process has been started for the change, or was slow once."""
         kept_ratio = message["restarted"].get(self._name)
         if kept_ratio is not None:
@@ -182,20 +194,20 @@ class ReconfigurableNode:
     def _begin_watch(self, change_id: int, kept_ratio: float) -> None:
         self._watch = TrialMonitor(change_id, self._clock.now_ns(), kept_ratio / self.period_s)
 
-    def _on_validate(self, message: Mapping[str, Any]) -> None:
+    def _on_validate(self, message: ProfileChangeMessage) -> None:
         watch, change_id = self._watch, message["change_id"]
         if watch is None or watch.change_id != change_id:
             self._answer(change_id, "validate", "it has committed nothing")
             return
         self._answer(change_id, "validate", watch.fault(self._clock.now_ns(), self.period_s))
 
-    def _on_keep(self, message: Mapping[str, Any]) -> None:
+    def _on_keep(self, message: ProfileChangeMessage) -> None:
         change = self._of(message)
         if change is not None and change.way_back is not None:
             self._discard(change.way_back[1])
         self._change = self._watch = None
 
-    def _on_rollback(self, message: Mapping[str, Any]) -> None:
+    def _on_rollback(self, message: ProfileChangeMessage) -> None:
         change = self._of(message)
         if change is not None and change.way_back is not None:
             self._discard(self._switch(change.way_back))
@@ -224,11 +236,13 @@ class ReconfigurableNode:
         if isinstance(self._node, Adaptable):
             self._node.discard(content)
 
-    def _of(self, message: Mapping[str, Any]) -> _Change | None:
+    def _of(self, message: ProfileChangeMessage) -> _Change | None:
         change = self._change
         return change if change is not None and change.change_id == message["change_id"] else None
 
-    def _answer(self, change_id: int, phase: str, reason: str, *, restart: bool = False) -> None:
+    def _answer(
+        self, change_id: int, phase: AnsweredPhaseName, reason: str, *, restart: bool = False
+    ) -> None:
         self._answers.publish(
             {
                 "change_id": change_id,

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.action_status import ActionStatus
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
+from vla_deploy.ipc.payloads.tasks import ActionOutcome
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.plan import Action, FailureCause, Plan, execution_order
 from vla_deploy.plans.symbolic.state import SymbolicState
@@ -56,10 +57,10 @@ class ActionRecord:
     left: Mapping[str, float] | None = None
     """What is left of a relative motion that ended early; empty where nobody knows, else None."""
 
-    def document(self) -> dict[str, Any]:
-        """Return the record as it is told in events and results."""
+    @property
+    def outcome(self) -> ActionOutcome:
+        """Return the record as events and results have it."""
         return {
-            "id": self.action.id,
             "skill": self.action.skill,
             "parameters": self.action.parameters,
             "status": self.status.value,

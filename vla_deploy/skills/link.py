@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.place_state import DOUBT_TEXT, Doubt, PlaceState
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.motion_ids import motion_ids
+from vla_deploy.ipc.payloads.motion import ControlStatus, GoalMotion, TrajectoryMotion
+from vla_deploy.ipc.payloads.scene import HandDocument, SurfaceDocument, ThingDocument
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
@@ -44,14 +45,14 @@ class SkillLink:
     def __init__(self, space: SharedSpace, clock: Clock, robot: RobotDescription) -> None:
         self.robot = robot
         self.clock = clock
-        self._joint_state = space.cell_reader("joint_state")
-        self._pose = space.cell_reader("pose")
-        self._scene = space.cell_reader("scene")
-        self._scan = space.cell_reader("scan")
-        self._control_status = space.cell_reader("control_status")
-        self._results_in = space.ring_reader("motion_result", from_start=False)
-        self._commands = space.ring_writer("motion_command")
-        self._base = space.cell_writer("base_command")
+        self._joint_state = space.cell_reader(topics.JOINT_STATE)
+        self._pose = space.cell_reader(topics.POSE)
+        self._scene = space.cell_reader(topics.SCENE)
+        self._scan = space.cell_reader(topics.SCAN)
+        self._control_status = space.cell_reader(topics.CONTROL_STATUS)
+        self._results_in = space.ring_reader(topics.MOTION_RESULT, from_start=False)
+        self._commands = space.ring_writer(topics.MOTION_COMMAND)
+        self._base = space.cell_writer(topics.BASE_COMMAND)
         self._ids = motion_ids(clock, "executor")
         self.acting = ""
         """Whose motions are sent now: one of several actions that go on side by side."""
@@ -62,10 +63,8 @@ class SkillLink:
     def refresh(self) -> None:
         """Take in the motions that have ended."""
         for event in self._results_in.drain():
-            ended = EndedMotion(
-                status=str(event.payload["status"]), reason=str(event.payload["reason"])
-            )
-            motion_id = int(event.payload["motion_id"])
+            ended = EndedMotion(status=event.payload["status"], reason=event.payload["reason"])
+            motion_id = event.payload["motion_id"]
             if motion_id in self._active:
                 del self._active[motion_id]
                 self._ended[motion_id] = ended
@@ -162,19 +161,18 @@ class SkillLink:
         return np.asarray(sample.data["range_m"], dtype=np.float64)
 
     @property
-    def objects(self) -> Sequence[Mapping[str, Any]]:
+    def objects(self) -> Sequence[ThingDocument]:
         """Return the scene's objects as perception published them last."""
         sample = self._scene.latest()
         return () if sample is None else sample.document().get("objects", ())
 
     @property
-    def hands(self) -> Mapping[str, Mapping[str, Any]]:
+    def hands(self) -> Mapping[str, HandDocument]:
         """Return what each hand feels, as perception told it last; empty while it is silent."""
         sample = self._scene.latest()
         if sample is None or sample.age_s(self.clock.now_ns()) > PATIENCE_S:
             return {}
-        told: Mapping[str, Mapping[str, Any]] = sample.document().get("hands", {})
-        return told
+        return sample.document().get("hands", {})
 
     def snapshot(self) -> Snapshot | None:
         """Return the world as perception tells it now; None while it is silent or unreadable."""
@@ -190,16 +188,16 @@ class SkillLink:
     def scene_stamp_ns(self) -> int:
         """Return when the newest image that perception judged was taken; 0 before the first."""
         sample = self._scene.latest()
-        return 0 if sample is None else int(sample.document()["stamp_ns"])
+        return 0 if sample is None else sample.document()["stamp_ns"]
 
     @property
-    def surfaces(self) -> Sequence[Mapping[str, Any]]:
+    def surfaces(self) -> Sequence[SurfaceDocument]:
         """Return the horizontal surfaces that perception saw last."""
         sample = self._scene.latest()
         return () if sample is None else sample.document().get("surfaces", ())
 
     @property
-    def control_status(self) -> Mapping[str, Any] | None:
+    def control_status(self) -> ControlStatus | None:
         """Return control's newest status, or None when it is silent."""
         sample = self._control_status.latest()
         if sample is None or self.clock.now_ns() - sample.stamp_ns > NS_PER_S:
@@ -234,8 +232,9 @@ class SkillLink:
         effort_ratio: Mapping[str, float] | None = None,
     ) -> int:
         """Ask control to bring joints to targets; return the motion's id."""
-        command: dict[str, Any] = {
+        command: GoalMotion = {
             "kind": "goal",
+            "motion_id": next(self._ids),
             "targets": dict(targets),
             "speed_ratio": speed_ratio,
         }
@@ -254,8 +253,9 @@ class SkillLink:
 
         With a `contact_ratio` of the contact limits it ends as soon as it meets something.
         """
-        command: dict[str, Any] = {
+        command: TrajectoryMotion = {
             "kind": "trajectory",
+            "motion_id": next(self._ids),
             "joints": list(joints),
             "times_s": times_s.tolist(),
             "positions": positions.tolist(),
@@ -264,11 +264,10 @@ class SkillLink:
             command["contact_ratio"] = contact_ratio
         return self._send(command)
 
-    def _send(self, command: dict[str, Any]) -> int:
-        motion_id = next(self._ids)
-        self._active[motion_id] = self.acting
-        self._commands.publish(command | {"motion_id": motion_id})
-        return motion_id
+    def _send(self, command: GoalMotion | TrajectoryMotion) -> int:
+        self._active[command["motion_id"]] = self.acting
+        self._commands.publish(command)
+        return command["motion_id"]
 
     def cancel(self, motion_id: int) -> None:
         """End a motion that this executor started."""

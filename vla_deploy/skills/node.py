@@ -1,9 +1,8 @@
 """Run the executor: plans in, motions out, and a word about every action."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import asdict
-from typing import Any, Final
+from typing import Final, Literal
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
@@ -18,6 +17,14 @@ from vla_deploy.ipc import (
     RingWriter,
     Sample,
     SharedSpace,
+    topics,
+)
+from vla_deploy.ipc.payloads.tasks import (
+    ExecutorStatus,
+    GripDocument,
+    PlanMessage,
+    PlannerStatus,
+    TaskEvent,
 )
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import base_planner
@@ -39,11 +46,10 @@ PLANNER_AGE_S = 2.0
 PLAN_WITHIN_S: Final = 20.0
 # Another plan is waited for as long as the planner may take, and a moment besides.
 _MOMENT_S: Final = 2.0
-_IDLE = {False: "idle", True: "recovering"}
 _FAILED = frozenset({ActionStatus.ABORTED, ActionStatus.REJECTED, ActionStatus.LOST})
 
 
-def _told_hands(before: Sample | None) -> dict[str, Held]:
+def _told_hands(before: Sample[ExecutorStatus] | None) -> dict[str, Held]:
     """Return what an executor before this one, in the same run, said that the hands hold."""
     grips = {} if before is None else before.document().get("grips", {})
     return {hand: Held(**grip) for hand, grip in grips.items()}
@@ -69,10 +75,10 @@ class ExecutorNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
         self._adviser: Adviser
-        self._plans: RingReader
-        self._events: RingWriter
-        self._status: CellWriter
-        self._planner: CellReader
+        self._plans: RingReader[PlanMessage]
+        self._events: RingWriter[TaskEvent]
+        self._status: CellWriter[ExecutorStatus]
+        self._planner: CellReader[PlannerStatus]
         self._execution: PlanExecution | None = None
         self._recovery = Recovery()
         self._command_id = ""
@@ -94,12 +100,12 @@ class ExecutorNode:
         )
         self._adviser = Adviser(self._skills)
         self._skills.claims.declare(body_of(self._robot))
-        self._plans = self._space.ring_reader("plan", from_start=False)
-        self._events = self._space.ring_writer("task_event")
-        with closing(self._space.cell_reader("executor_status")) as before:
+        self._plans = self._space.ring_reader(topics.PLAN, from_start=False)
+        self._events = self._space.ring_writer(topics.TASK_EVENT)
+        with closing(self._space.cell_reader(topics.EXECUTOR_STATUS)) as before:
             self._told_hands = _told_hands(before.latest())
-        self._status = self._space.cell_writer("executor_status")
-        self._planner = self._space.cell_reader("planner_status")
+        self._status = self._space.cell_writer(topics.EXECUTOR_STATUS)
+        self._planner = self._space.cell_reader(topics.PLANNER_STATUS)
 
     def step(self) -> None:
         """Take new plans, advance the running one, tell the status."""
@@ -144,17 +150,25 @@ class ExecutorNode:
     def discard(self, prepared: tuple[float, float]) -> None:
         """Release nothing: these are numbers."""
 
-    def _take(self, message: Mapping[str, Any]) -> None:
-        command_id = str(message["command_id"])
-        if message.get("cancel"):
+    def _take(self, message: PlanMessage) -> None:
+        command_id = message["command_id"]
+        if "cancel" in message:
             self._call_off("cancelled on request")
             self._skills.link.halt()
-            self._tell(command_id, "finished", success=True, error=None, actions=[])
+            self._events.publish(
+                {
+                    "command_id": command_id,
+                    "event": "finished",
+                    "success": True,
+                    "error": None,
+                    "actions": [],
+                }
+            )
             return
         goes_on = self._recovery.is_awaited and command_id == self._command_id
         if "give_up" in message:
             if goes_on:
-                self._finish(str(message["give_up"]))
+                self._finish(message["give_up"])
             return
         refusal = refusal_of(self._skills.link.control_status)
         if goes_on and refusal is not None:
@@ -163,7 +177,7 @@ class ExecutorNode:
         if refusal is None and self._is_busy and not goes_on:
             refusal = "the robot is busy with another command; wait, or: vla-deploy stop"
         if refusal is not None:
-            self._tell(command_id, "rejected", reason=refusal)
+            self._events.publish({"command_id": command_id, "event": "rejected", "reason": refusal})
             return
         self._recovery = self._recovery.going_on() if goes_on else Recovery()
         self._command_id = command_id
@@ -195,15 +209,18 @@ class ExecutorNode:
         wait_ns = round((self._plan_within_s + _MOMENT_S) * NS_PER_S)
         self._recovery = self._recovery.awaiting(self._clock.now_ns() + wait_ns)
         done = [one.action.id for one in execution.records if one.status is ActionStatus.SUCCEEDED]
-        self._tell(
-            self._command_id,
-            "setback",
-            action_id=setback.action.id,
-            skill=setback.action.skill,
-            error=setback.error,
-            cause=str(setback.cause),
-            done=done,
-            left={one.action.id: one.left for one in execution.records if one.left is not None},
+        left = {one.action.id: one.left for one in execution.records if one.left is not None}
+        self._events.publish(
+            {
+                "command_id": self._command_id,
+                "event": "setback",
+                "action_id": setback.action.id,
+                "skill": setback.action.skill,
+                "error": setback.error,
+                "cause": str(setback.cause),
+                "done": done,
+                "left": left,
+            }
         )
 
     def _finish(self, why_no_other: str, success: bool = False) -> None:
@@ -218,12 +235,14 @@ class ExecutorNode:
         advice = "" if success else self._advice(records)
         told = ". ".join(one.rstrip(".?") for one in (*errors[:1], advice) if one)
         error = "; ".join(one for one in (told, why_no_other) if one) or None
-        self._tell(
-            self._command_id,
-            "finished",
-            success=success,
-            error=None if success else error,
-            actions=[record.document() for record in records],
+        self._events.publish(
+            {
+                "command_id": self._command_id,
+                "event": "finished",
+                "success": success,
+                "error": None if success else error,
+                "actions": [{"id": one.action.id, **one.outcome} for one in records],
+            }
         )
 
     def _advice(self, records: Sequence[ActionRecord]) -> str:
@@ -238,15 +257,22 @@ class ExecutorNode:
         return sample is not None and sample.age_s(self._clock.now_ns()) < PLANNER_AGE_S
 
     def _tell_action(self, record: ActionRecord) -> None:
-        document = record.document()
-        document["action_id"] = document.pop("id")
-        self._tell(self._command_id, "action", **document)
+        self._events.publish(
+            {
+                "command_id": self._command_id,
+                "event": "action",
+                "action_id": record.action.id,
+                **record.outcome,
+            }
+        )
 
     def _say(self, text: str) -> None:
-        self._tell(self._command_id, "said", text=text)
+        self._events.publish({"command_id": self._command_id, "event": "said", "text": text})
 
-    def _tell(self, command_id: str, event: str, **details: Any) -> None:
-        self._events.publish({"command_id": command_id, "event": event} | details)
+    def _state(self) -> Literal["idle", "executing", "recovering"]:
+        if self._execution is not None:
+            return "executing"
+        return "recovering" if self._recovery.is_awaited else "idle"
 
     def _tell_status(self) -> None:
         now_ns = self._clock.now_ns()
@@ -257,7 +283,7 @@ class ExecutorNode:
         active = execution.active if execution else None
         self._status.put_document(
             {
-                "state": "executing" if execution else _IDLE[self._recovery.is_awaited],
+                "state": self._state(),
                 "command_id": self._command_id if self._is_busy else None,
                 "action_id": active.action.id if active else None,
                 "skill": active.action.skill if active else None,
@@ -265,6 +291,15 @@ class ExecutorNode:
                 "holding": {
                     hand: held.kind if held else None for hand, held in self._skills.hands.items()
                 },
-                "grips": {hand: asdict(held) for hand, held in self._skills.hands.items() if held},
+                "grips": {hand: _grip(held) for hand, held in self._skills.hands.items() if held},
             }
         )
+
+
+def _grip(held: Held) -> GripDocument:
+    return {
+        "kind": held.kind,
+        "colour": held.colour,
+        "width_m": held.width_m,
+        "below_grip_m": held.below_grip_m,
+    }

@@ -9,11 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import Sample, SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace, topics
+from vla_deploy.ipc.payloads.services import RosStatus
 from vla_deploy.ipc.ros_goals import (
-    ANSWER,
-    REQUEST,
-    STATUS,
     GoalAct,
     GoalAnswer,
     GoalRequest,
@@ -60,9 +58,9 @@ class RosGoals:
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
         self._clock = clock
-        self._requests = space.ring_writer(REQUEST)
-        self._answers = space.ring_reader(ANSWER, from_start=False)
-        self._status = space.cell_reader(STATUS)
+        self._requests = space.ring_writer(topics.ROS_REQUEST)
+        self._answers = space.ring_reader(topics.ROS_ANSWER, from_start=False)
+        self._status = space.cell_reader(topics.ROS_STATUS)
         self._numbers = itertools.count(1)
         self._goals: dict[str, SentGoal] = {}
         self._words: dict[str, str] = {}
@@ -156,7 +154,7 @@ class RosGoals:
                 f": {said}" if said else ""
             )
 
-    def _watch(self, goal: SentGoal, sample: Sample | None) -> None:
+    def _watch(self, goal: SentGoal, sample: Sample[RosStatus] | None) -> None:
         """Send a goal as soon as the gateway is there, and lose it where the gateway is not."""
         now_ns = self._clock.now_ns()
         is_young = sample is not None and sample.age_s(now_ns) <= GATEWAY_AGE_S

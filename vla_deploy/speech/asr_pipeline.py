@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Set
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal
 
 from platforms import SpeechSettings
 from vla_deploy.speech.echo_gate import EchoGate
@@ -56,7 +56,7 @@ class AsrPipeline:
         self._refused: list[HeardPhrase] = []
 
     @property
-    def state(self) -> str:
+    def state(self) -> Literal["hearing", "transcribing", "listening"]:
         """Return what hearing does at this moment."""
         if self.endpointer.is_open:
             return "hearing"

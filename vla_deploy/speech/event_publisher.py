@@ -3,11 +3,13 @@
 import os
 from collections import Counter
 from itertools import count
-from typing import Any, Final
+from typing import Final, Unpack
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.latency import LatencyHistogram
-from vla_deploy.ipc import Announcer, SharedSpace
+from vla_deploy.ipc import Announcer, SharedSpace, topics
+from vla_deploy.ipc.payloads.speech import PhraseCounts
+from vla_deploy.ipc.payloads.tasks import HeardDoubt, HeardEvidence, UtteranceContent
 from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.verdict import PhraseVerdict
@@ -33,8 +35,8 @@ class SpeechEvents:
         self._counts: Counter[str] = Counter()
         self._latency = LatencyHistogram()
         self._clock = clock
-        self._heard = space.ring_writer("heard")
-        self._utterances = space.ring_writer("utterance")
+        self._heard = space.ring_writer(topics.HEARD)
+        self._utterances = space.ring_writer(topics.UTTERANCE)
         self._voice = Announcer(space, "speech", clock)
         self._stop = StopButton(space, SOURCE, clock)
         self._pause_ns, self._ask_from_ns = FIRST_PAUSE_NS, 0
@@ -54,30 +56,37 @@ class SpeechEvents:
             self._command(heard, doubted=True, ask_again=self._may_ask(now_ns))
         elif judgement.ask_again and self._may_ask(now_ns):
             self._voice.say(ASK_AGAIN)
+        sure = evidence(heard)
         self._heard.publish(
             {
                 "text": heard.text[:_LONGEST_TEXT],
-                "verdict": str(verdict),
+                "verdict": verdict.value,
                 "reason": judgement.reason,
                 "began_ns": heard.phrase.began_ns,
                 "ended_ns": heard.phrase.ended_ns,
                 "told_ns": now_ns,
-                **evidence(heard),
+                "confidence": sure["confidence"],
+                "others": sure["others"],
             }
         )
         self._latency.record(now_ns - heard.phrase.ended_ns)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> PhraseCounts:
         """Return counts and the time from the end of speech to its words, for `speech_status`."""
         return {
-            **{str(verdict): self._counts[verdict] for verdict in PhraseVerdict},
+            "accepted": self._counts[PhraseVerdict.ACCEPTED],
+            "doubted": self._counts[PhraseVerdict.DOUBTED],
+            "rejected": self._counts[PhraseVerdict.REJECTED],
+            "stop": self._counts[PhraseVerdict.STOP],
             "end_to_text_p50_s": self._latency.percentile_ns(0.5) / NS_PER_S,
             "end_to_text_p95_s": self._latency.percentile_ns(0.95) / NS_PER_S,
         }
 
-    def _command(self, heard: HeardPhrase, **doubt: bool) -> None:
+    def _command(self, heard: HeardPhrase, **doubt: Unpack[HeardDoubt]) -> None:
         command_id = f"{SOURCE}-{os.getpid()}-{next(self._numbers)}"
-        self._utterances.publish({"command_id": command_id, **utterance(heard, **doubt)})
+        self._utterances.publish(
+            {"command_id": command_id, "source": SOURCE, **utterance(heard, **doubt)}
+        )
 
     def _may_ask(self, now_ns: int) -> bool:
         """Return whether the robot may ask again now; it then counts as having asked."""
@@ -88,16 +97,12 @@ class SpeechEvents:
         return True
 
 
-def utterance(heard: HeardPhrase, **doubt: bool) -> dict[str, Any]:
+def utterance(heard: HeardPhrase, **doubt: Unpack[HeardDoubt]) -> UtteranceContent:
     """Return what the planner gets of a phrase; of a doubted one, if it may ask for it again."""
-    return {
-        "text": heard.text[:_LONGEST_TEXT],
-        "source": SOURCE,
-        "heard": evidence(heard) | doubt,
-    }
+    return {"text": heard.text[:_LONGEST_TEXT], "heard": {**evidence(heard), **doubt}}
 
 
-def evidence(heard: HeardPhrase) -> dict[str, Any]:
+def evidence(heard: HeardPhrase) -> HeardEvidence:
     """Return how sure the words of a phrase are, and what may have been said instead."""
     others = () if heard.transcript is None else heard.transcript.others
     return {

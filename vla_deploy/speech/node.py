@@ -3,13 +3,14 @@
 import logging
 from concurrent.futures import Executor, Future
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.ipc import BY_NAME, CellWriter, SharedSpace
+from vla_deploy.ipc import BY_NAME, SharedSpace, topics
+from vla_deploy.ipc.payloads.speech import SpeechStatus
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import NodeContext
@@ -85,9 +86,9 @@ class SpeechNode:
 
     def start(self) -> None:
         """Open topics, voice and listeners; the recogniser follows beside the steps."""
-        self._status: CellWriter = self._space.cell_writer("speech_status")
+        self._status = self._space.cell_writer(topics.SPEECH_STATUS)
         self._publisher = SpeechEvents(self._space, self._clock)
-        self._page = PageMicrophone(self._space.record_reader("page_sound"), self._clock)
+        self._page = PageMicrophone(self._space.record_reader(topics.PAGE_SOUND), self._clock)
         if self._voice is not None:
             self._voice.start(self._space)
         for listener in self._listeners:
@@ -236,18 +237,22 @@ class SpeechNode:
             self._status_due_ns = now_ns + STATUS_PERIOD_NS
             self._status.put_document(self._document())
 
-    def _document(self) -> dict[str, Any]:
+    def _document(self) -> SpeechStatus:
         asr, why = self._asr, self._why_deaf()
         recogniser = None if asr is None else asr.queue.recogniser
-        return {
+        document: SpeechStatus = {
             "state": "deaf" if why or asr is None else asr.state,
             "why": why,
             "speaking": self._playing() is not None,
             "model": {} if recogniser is None else {"name": recogniser.model.manifest.name},
             "heard": self._publisher.document(),
-            "voice": {} if self._voice is None else dict(self._voice.document()),
-            **{one.name: dict(one.document()) for one in self._listeners},
+            "voice": {} if self._voice is None else self._voice.document(),
         }
+        if self._stop_words is not None:
+            document["stop_words"] = self._stop_words.document()
+        if self._page_stop_words is not None:
+            document["page_stop_words"] = self._page_stop_words.document()
+        return document
 
     def _why_deaf(self) -> str:
         """Return why spoken commands are not understood; empty while they are."""

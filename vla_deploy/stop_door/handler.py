@@ -5,7 +5,7 @@ from http import HTTPStatus
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.ipc import IpcError, SharedSpace, StopButton
+from vla_deploy.ipc import IpcError, SharedSpace, StopButton, topics
 from vla_deploy.stop_door.http_messages import (
     ControlState,
     Malformed,
@@ -40,7 +40,7 @@ class StopHandler:
         self.refused = 0
         self._button = StopButton(space, SOURCE, clock)
         self._clock = clock
-        self._status = space.cell_reader("control_status")
+        self._status = space.cell_reader(topics.CONTROL_STATUS)
 
     def responder(self, peer: str) -> Responder:
         """Return what answers the client at an address."""

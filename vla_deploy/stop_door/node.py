@@ -5,12 +5,11 @@ from collections.abc import Callable
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.runtime.net import DashboardSettings, DashboardSettingsInvalid, NetError
 from vla_deploy.stop_door.handler import StopHandler
 from vla_deploy.stop_door.server import StopServer, open_listener
 
-STATUS_TOPIC: Final = "stop_door_status"
 DEFAULTS: Final = DashboardSettings()
 _WAIT_S: Final = 0.2
 _OPEN_PERIOD_S: Final = 0.001  # bounds what a flood of clients costs
@@ -45,7 +44,7 @@ class StopDoorNode:
         self._settings = DEFAULTS
         self._search = search
         self._handler = StopHandler(space, clock)
-        self._status = space.cell_writer(STATUS_TOPIC)
+        self._status = space.cell_writer(topics.STOP_DOOR_STATUS)
         self._port = _port_before(space)
         self._server: StopServer | None = None
         self._why = self._settings_fault = ""
@@ -105,23 +104,22 @@ class StopDoorNode:
                 "open": server is not None,
                 "why": (self._why or self._settings_fault)[:_WHY_LETTERS],
                 "host": self._settings.host,
-                "port": self._settings.stop_port if server is None else self._port,
+                "port": (server and self._port) or self._settings.stop_port,
                 "scheme": self._settings.scheme,
                 "pressed": self._handler.pressed,
                 "joined": self._handler.joined,
                 "failed": self._handler.failed,
                 "refused": self._handler.refused,
-                **_traffic(server),
+                "connections": 0 if server is None else server.connections,
+                "accepted": 0 if server is None else server.accepted,
+                "expired": 0 if server is None else server.expired,
+                "lost": 0 if server is None else server.lost,
+                "crowded_out": 0 if server is None else server.crowded_out,
             }
         )
 
 
-def _traffic(server: StopServer | None) -> dict[str, int]:
-    names = ("connections", "accepted", "expired", "lost", "crowded_out")
-    return {name: 0 if server is None else getattr(server, name) for name in names}
-
-
 def _port_before(space: SharedSpace) -> int | None:
     """Return the port of an earlier instance of this run, at which open pages look for it."""
-    sample = space.cell_reader(STATUS_TOPIC).latest()
+    sample = space.cell_reader(topics.STOP_DOOR_STATUS).latest()
     return None if sample is None else sample.document().get("port")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 
 WINDOW_NS: Final = 2 * NS_PER_S
 STATUS_AGE_S: Final = 1.0
@@ -35,7 +35,7 @@ class Health:
     ) -> None:
         self._clock = clock
         self._rate_hz = control_rate_hz
-        self._status = space.cell_reader("control_status")
+        self._status = space.cell_reader(topics.CONTROL_STATUS)
         self._history: deque[TickCount] = deque()
         self._looked_ns: int | None = None
 

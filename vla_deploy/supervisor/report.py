@@ -2,10 +2,10 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any
 
 from drivers.clock import Clock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.supervision import ProcessRow, UsageDocument, WatchedTopic
 from vla_deploy.supervisor.budgets.sampler import UsageSnapshot
 from vla_deploy.supervisor.processes.lifecycle import ProcessRecord
 from vla_deploy.supervisor.processes.liveness import Vital
@@ -13,21 +13,21 @@ from vla_deploy.supervisor.processes.process_manager import ProcessManager
 from vla_deploy.supervisor.runs.options import RunOptions
 
 _SUPERVISOR = "supervisor"
-_UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None, "cpu_s": None}
+_UNKNOWN_USAGE: UsageDocument = {
+    "memory_mb": None,
+    "rss_mb": None,
+    "cpu_ratio": None,
+    "cpu_s": None,
+}
 
 
 class ProcessTableWriter:
     """Write the `process_table` cell."""
 
     def __init__(self, run_id: str, options: RunOptions, space: SharedSpace, clock: Clock) -> None:
-        self._cell = space.cell_writer("process_table")
-        self._head = {
-            "run_id": run_id,
-            "robot": options.robot,
-            "profile": options.profile,
-            "twin": options.twin,
-            "supervisor_pid": os.getpid(),
-        }
+        self._cell = space.cell_writer(topics.PROCESS_TABLE)
+        self._run_id = run_id
+        self._options = options
 
     def publish(
         self,
@@ -38,19 +38,26 @@ class ProcessTableWriter:
         snapshot: UsageSnapshot | None,
     ) -> None:
         """Publish the table with what was measured; `refusal` is why no command is taken."""
-        self._head["profile"] = processes.profile
         pids = processes.pids()
         usages = {} if snapshot is None else _usages(snapshot)
         rows = [
-            {
-                **_row(name, record, pids, processes, vitals.get(name, ())),
-                **usages.get(name, _UNKNOWN_USAGE),
-            }
+            _row(
+                name,
+                record,
+                pids,
+                processes,
+                vitals.get(name, ()),
+                usages.get(name, _UNKNOWN_USAGE),
+            )
             for name, record in records.items()
         ]
         self._cell.put_document(
             {
-                **self._head,
+                "run_id": self._run_id,
+                "robot": self._options.robot,
+                "profile": processes.profile,
+                "twin": self._options.twin,
+                "supervisor_pid": os.getpid(),
                 "refusal": refusal,
                 "processes": rows,
                 "supervisor": usages.get(_SUPERVISOR, _UNKNOWN_USAGE),
@@ -60,7 +67,7 @@ class ProcessTableWriter:
         )
 
 
-def _usages(snapshot: UsageSnapshot) -> dict[str, dict[str, float]]:
+def _usages(snapshot: UsageSnapshot) -> dict[str, UsageDocument]:
     return {
         name: {
             "memory_mb": round(usage.memory_mb, 1),
@@ -78,7 +85,8 @@ def _row(
     pids: Mapping[str, int],
     processes: ProcessManager,
     vitals: tuple[Vital, ...],
-) -> dict[str, Any]:
+    usage: UsageDocument,
+) -> ProcessRow:
     return {
         "name": name,
         "state": record.state.value,
@@ -89,10 +97,11 @@ def _row(
         "reason": record.reason,
         "topics": [_topic(vital) for vital in vitals],
         "alarms": [alarm for vital in vitals for alarm in vital.alarms],
+        **usage,
     }
 
 
-def _topic(vital: Vital) -> dict[str, Any]:
+def _topic(vital: Vital) -> WatchedTopic:
     return {
         "topic": vital.topic,
         "age_s": round(vital.age_s, 3),

@@ -8,7 +8,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.runtime.power_off import ask_power_off
@@ -349,11 +349,11 @@ class FailurePolicy:
         elif spec.giving_up is GivingUp.NO_COMMANDS:
             self.refusal = f"{why}; see: vla-deploy crashes list, then start the run anew"
             # The planner may be the one that is gone: the executor gets the cancel directly.
-            space.ring_writer("plan").publish({"command_id": "supervisor", "cancel": True})
+            space.ring_writer(topics.PLAN).publish({"command_id": "supervisor", "cancel": True})
 
 
 def _arm(space: SharedSpace) -> None:
-    space.ring_writer("operator").publish(
+    space.ring_writer(topics.OPERATOR).publish(
         {"act": "arm", "source": "supervisor", "reason": "asked for by --arm"}
     )
 

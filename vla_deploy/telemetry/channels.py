@@ -53,7 +53,7 @@ ChannelValue = tuple[str, TopicValue]
 """The name of a channel, and a value of it."""
 
 
-def channels_of(topic: Topic) -> tuple[Channel, ...]:
+def channels_of(topic: Topic[Any]) -> tuple[Channel, ...]:
     """Return the channels of a topic: one, two for images, none for a private topic."""
     if topic.private:
         return ()
@@ -79,7 +79,7 @@ def value_text(channel: str, value: TopicValue, wall_offset_ns: int) -> bytes:
     return cell_text(BY_NAME[topic], value.payload) if is_cell else value.payload
 
 
-def cell_text(topic: Topic, payload: bytes) -> bytes:
+def cell_text(topic: Topic[Any], payload: bytes) -> bytes:
     """Return a cell's value as JSON; NaN and infinities become null."""
     if is_document(topic):
         return payload
@@ -118,7 +118,7 @@ def tick_bytes(text: bytes) -> bytes:
     return base64.b64decode(json.loads(text)["record"])
 
 
-def _content(topic: Topic) -> dict[str, Any]:
+def _content(topic: Topic[Any]) -> dict[str, Any]:
     """Return the schema of a message; documents are described in docs/architecture.md."""
     if topic.kind is TopicKind.RECORD:
         return {"properties": _TICK, "required": ["record"]}

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
+from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace, topics
+from vla_deploy.ipc.payloads.recording import FlightEvent, RecorderStatus
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.telemetry.flight import write_flight
 from vla_deploy.telemetry.folder import FlightFolder, dated
@@ -58,8 +59,8 @@ class RecorderNode:
         self._debounce = debounce or Debounce()
         self._writing: _Writing | None = None
         self._history: TopicHistory
-        self._events: RingWriter
-        self._status: CellWriter
+        self._events: RingWriter[FlightEvent]
+        self._status: CellWriter[RecorderStatus]
         self._status_due_ns = 0
         self._started_ns = 0
         self._parent_pid = os.getppid()
@@ -69,8 +70,8 @@ class RecorderNode:
         """Open every topic; what is still in the rings is read as well."""
         self._started_ns = self._clock.now_ns()
         self._history = TopicHistory(self._space)
-        self._events = self._space.ring_writer("flight_event")
-        self._status = self._space.cell_writer("recorder_status")
+        self._events = self._space.ring_writer(topics.FLIGHT_EVENT)
+        self._status = self._space.cell_writer(topics.RECORDER_STATUS)
         if self._rolling is not None:
             self._rolling.start()
 
@@ -165,13 +166,14 @@ class RecorderNode:
             self._failed(writing.causes, error)
         else:
             _log.info("saved %s", final)
-            self._publish("saved", writing.causes, file=str(final))
+            causes = _shown(writing.causes)
+            self._events.publish({"event": "saved", "causes": causes, "file": str(final)})
         self._writing = None
 
     def _failed(self, causes: list[FlightTrigger], error: OSError) -> None:
         reason = f"{self._folder.path}: {error.strerror or error}"
         _log.error("no flight saved of %s: %s; make room on that disk", causes[0].what, reason)
-        self._publish("failed", causes, reason=reason)
+        self._events.publish({"event": "failed", "causes": _shown(causes), "reason": reason})
 
     def _report_status(self, now_ns: int) -> None:
         if now_ns < self._status_due_ns:
@@ -181,6 +183,6 @@ class RecorderNode:
             {"writing": self._writing is not None, "held_bytes": self._history.held_bytes}
         )
 
-    def _publish(self, event: str, causes: list[FlightTrigger], **details: str) -> None:
-        whats = [cause.what for cause in causes[:_SHOWN_CAUSES]]
-        self._events.publish({"event": event, "causes": whats, **details})
+
+def _shown(causes: list[FlightTrigger]) -> list[str]:
+    return [cause.what for cause in causes[:_SHOWN_CAUSES]]

@@ -6,25 +6,25 @@ import numpy as np
 
 from vla_deploy.client.link import RobotLink
 from vla_deploy.client.place_state import Doubt, PlaceState
-from vla_deploy.ipc import Sample
+from vla_deploy.ipc import Sample, topics
 
 
 def collect(link: RobotLink) -> dict[str, Any]:
     """Return the status of every process; null where one is silent."""
-    pose = link.fresh("pose", age_limit_s=1.0)
-    dashboard = link.document("dashboard_status", age_limit_s=3.0)
+    pose = link.fresh(topics.POSE, age_limit_s=1.0)
+    dashboard = link.document(topics.DASHBOARD_STATUS, age_limit_s=3.0)
     return {
         "run_dir": str(link.run_dir),
-        "twin": link.document("twin_status", age_limit_s=3.0),
-        "process_table": link.document("process_table", age_limit_s=3.0),
-        "control": link.document("control_status", age_limit_s=1.0),
-        "planner": link.document("planner_status", age_limit_s=2.0),
-        "executor": link.document("executor_status", age_limit_s=2.0),
+        "twin": link.document(topics.TWIN_STATUS, age_limit_s=3.0),
+        "process_table": link.document(topics.PROCESS_TABLE, age_limit_s=3.0),
+        "control": link.document(topics.CONTROL_STATUS, age_limit_s=1.0),
+        "planner": link.document(topics.PLANNER_STATUS, age_limit_s=2.0),
+        "executor": link.document(topics.EXECUTOR_STATUS, age_limit_s=2.0),
         "pose": None if pose is None else pose_document(pose),
-        "scene": link.document("scene", age_limit_s=5.0),
-        "speech": link.document("speech_status", age_limit_s=2.0),
-        "profile": link.document("profile_status", age_limit_s=3.0),
-        "replay": link.document("replay_status", age_limit_s=3.0),
+        "scene": link.document(topics.SCENE, age_limit_s=5.0),
+        "speech": link.document(topics.SPEECH_STATUS, age_limit_s=2.0),
+        "profile": link.document(topics.PROFILE_STATUS, age_limit_s=3.0),
+        "replay": link.document(topics.REPLAY_STATUS, age_limit_s=3.0),
         "dashboard_url": None if dashboard is None else dashboard["url"],
     }
 

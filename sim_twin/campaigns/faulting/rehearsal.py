@@ -12,6 +12,7 @@ from sim_twin.campaigns.faulting.verdict import failures
 from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.harness.lockstep_stack import LockstepStack, lockstep_robot
+from vla_deploy.ipc import topics
 
 _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5
@@ -50,7 +51,7 @@ class Rehearsal:
     def __init__(self, scenario: Scenario, tmp_path: Path, seed: int = 0) -> None:
         self._scenario = scenario
         self._stack = lockstep_robot(tmp_path, seed, takes_all=scenario.meanwhile.takes_all)
-        self._base_command = self._stack.space.cell_writer("base_command")
+        self._base_command = self._stack.space.cell_writer(topics.BASE_COMMAND)
         self._start_s = 0.0
 
     def run(self) -> RehearsalOutcome:

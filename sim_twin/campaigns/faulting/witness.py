@@ -12,7 +12,7 @@ from drivers.clock import NS_PER_S
 from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.physics.truth import STANDSTILL_RAD_S
-from vla_deploy.ipc import BY_NAME
+from vla_deploy.ipc import BY_NAME, topics
 
 SENSOR_CELLS: Final = ("scan", "imu", "pose")
 _IMAGES: Final = "rgbd"
@@ -40,8 +40,8 @@ class FaultWitness:
         model = stack.lockstep.twin.engine.model
         self._dofs = [int(model.joint(part).dofadr[0]) for part in parts]
         self._places = [int(model.joint(part).qposadr[0]) for part in parts]
-        self._joints = stack.space.cell_reader("joint_state")
-        self._pose = stack.space.cell_reader("pose")
+        self._joints = stack.space.cell_reader(topics.JOINT_STATE)
+        self._pose = stack.space.cell_reader(topics.POSE)
         self._topics = _topics(stack)
 
     @property

@@ -12,6 +12,7 @@ from typing import Any, Final
 from sim_twin.campaigns.pressing.clock_shift import CannotShift, ClockShift
 from sim_twin.campaigns.talk import CommandTalk
 from sim_twin.campaigns.working_robot import WorkingRobot
+from vla_deploy.ipc import topics
 from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.supervisor.processes.crash_reports import crash_folder
 
@@ -140,7 +141,7 @@ class PressedScene:
 
     def budget(self) -> dict[str, Any]:
         """Return the supervisor's word about budgets."""
-        return self.robot.document("budget")
+        return self.robot.document(topics.BUDGET)
 
     def crashes(self) -> list[str]:
         """Return of which processes crash reports have been written."""

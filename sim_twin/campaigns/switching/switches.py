@@ -24,6 +24,7 @@ from sim_twin.campaigns.switching.profiles import BAD, GOOD, Bad, control_rate_h
 from sim_twin.campaigns.ticks import TickWatch
 from sim_twin.campaigns.working_robot import WorkingRobot
 from sim_twin.harness.robot import RobotFailed
+from vla_deploy.ipc import topics
 from vla_deploy.robots import load_robot
 
 SWITCHES: Final = 100
@@ -77,10 +78,10 @@ class SwitchCampaign:
 
     def refuse(self, bad: Bad) -> CampaignCase:
         """Ask for a profile that must not stay."""
-        in_force = self._robot.document("profile_status").get("profile")
+        in_force = self._robot.document(topics.PROFILE_STATUS).get("profile")
         seen = self._seen(bad.name, control_rate_hz(self._now), _AFTER_BAD_S)
         failures = list(judge(seen, bad.outcomes, bad.reason))
-        left = self._robot.document("profile_status").get("profile")
+        left = self._robot.document(topics.PROFILE_STATUS).get("profile")
         if left != in_force:
             failures.append(f"profile {left} in force, expected {in_force} as before")
         return _case(bad.case, failures, seen)
@@ -165,13 +166,13 @@ class _Meter:
 
     def look(self) -> None:
         """Look once."""
-        phase = str(self._robot.document("profile_status").get("phase", ""))
+        phase = str(self._robot.document(topics.PROFILE_STATUS).get("phase", ""))
         late = self._robot.ticks().late
         self.looks.append(CommitLook(now_ns=self._robot.clock.now_ns(), late=late, phase=phase))
         state = self._robot.state()
         self.states.add(state)
         if state != "armed":
-            status = self._robot.document("control_status")
+            status = self._robot.document(topics.CONTROL_STATUS)
             self.cause = " ".join(str(status.get(key, "")) for key in ("cause", "subject"))
         place = np.array(self._robot.setpoint())
         if self._before is not None and len(place) == len(self._before):

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
+from sim_twin.contracts.payloads import payload_faults
 from sim_twin.harness.lockstep_stack import LockstepStack
+
+SPOKEN = {
+    *("control_status", "executor_status", "operator", "plan", "planner_status", "say"),
+    *("speech_status", "task_event", "utterance", "voice_event"),
+}
 
 
 @pytest.mark.twin(speech=True)
@@ -18,6 +24,9 @@ def test_the_robot_speaks_in_its_room_and_ignores_its_own_voice(twin: LockstepSt
     twin.lockstep.run_for(1.5)
     assert heard.drain() == []
     assert not twin.status()["estop_latched"]
+    found = payload_faults(twin.space)
+    assert not any(found.values()), found
+    assert found.keys() >= SPOKEN
 
 
 @pytest.mark.twin(speech=True)
@@ -27,5 +36,6 @@ def test_a_talker_is_recognised_as_one_phrase(twin: LockstepStack) -> None:
     twin.lockstep.run_for(4.0)
     phrases = [event.payload for event in heard.drain()]
     assert len(phrases) == 1
+    assert payload_faults(twin.space)["heard"] == []
     assert phrases[0]["began_ns"] == pytest.approx(spoken.begins_ns, abs=300_000_000)
     assert phrases[0]["ended_ns"] == pytest.approx(spoken.ends_ns, abs=300_000_000)

@@ -9,7 +9,16 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import SharedSpace
 
 PLAN = {"actions": [{"id": "a1", "skill": "wave", "parameters": {}}]}
-ACTION = {"action_id": "a1", "skill": "wave", "status": "active", "error": None, "retries": 0}
+ACTION = {
+    "action_id": "a1",
+    "skill": "wave",
+    "parameters": {},
+    "status": "active",
+    "execution_time_s": 0.0,
+    "error": None,
+    "retries": 0,
+    "note": None,
+}
 
 
 class HandClock:
@@ -79,7 +88,7 @@ def test_an_event_says_how_a_command_stands(robot, event, details, state):
 
 
 def test_commands_of_other_sources_are_remembered_too_with_their_wall_time(robot):
-    robot.link.publish("utterance", {"command_id": "v1", "source": "voice", "text": "wave"})
+    robot.link.writer("utterance").publish({"command_id": "v1", "source": "voice", "text": "wave"})
     robot.clock.pass_s(1.0)
     robot.tell("v1", "accepted")
     robot.clock.pass_s(1.0)

@@ -117,7 +117,7 @@ def test_fingers_that_told_nothing_for_a_while_confirm_nothing(body: Body) -> No
 
 def test_it_is_told_with_width_and_effort(body: Body) -> None:
     presses(body)
-    assert body.left("cup").document() == {
-        "class": "cup", "told": "cup", "felt": "holding", "confirmed": True,
+    assert body.left("cup").document("cup_1") == {
+        "holding": "cup_1", "class": "cup", "told": "cup", "felt": "holding", "confirmed": True,
         "width_m": 0.066, "drift_m": 0.0, "effort_ratio": 0.25, "cause": "",
     }  # fmt: skip

@@ -52,7 +52,7 @@ def full_scene() -> Scene:
     scene._surfaces = [surface] * 8
     hold = Hold(kind="bottle", reported="bottle", touch=Touch(grip=Grip.LOST), is_confirmed=True,
                 cause=WHY)  # fmt: skip
-    scene._hands = {name: {"holding": "bottle_1", **hold.document()} for name in ("left", "right")}
+    scene._hands = {name: hold.document("bottle_1") for name in ("left", "right")}
     return scene
 
 

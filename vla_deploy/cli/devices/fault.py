@@ -13,6 +13,7 @@ from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.cli.twin import ask_twin
+from vla_deploy.ipc import topics
 
 _EXAMPLES: Final = """  vla-deploy fault list                     what can fail
   vla-deploy fault inject servo off left_elbow --for 2
@@ -155,8 +156,8 @@ def _scenario(word: str) -> dict[str, str]:
 
 def _require_no_cause(session: RobotSession) -> None:
     """Refuse where control has a cause already, from before the scenario."""
-    status = session.document("control_status", age_limit_s=1.0) or {}
-    if status.get("cause"):
+    status = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
+    if status is not None and status["cause"]:
         raise UsageError(
             f"control is {status['state']} already, cause {status['cause']}; end that first: "
             "vla-deploy fault clear, reset, arm"
@@ -168,9 +169,9 @@ def _watch(session: RobotSession, duration_s: float) -> dict[str, Any]:
     start_ns = now_ns = session.clock.now_ns()
     seen: dict[str, Any] = {"cause": "none", "after_s": None, "state": "silent"}
     while now_ns - start_ns < duration_s * NS_PER_S:
-        status: Mapping[str, Any] = session.document("control_status", age_limit_s=1.0) or {}
-        seen["state"] = status.get("state", "silent")
-        if seen["cause"] == "none" and status.get("cause"):
+        status = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
+        seen["state"] = "silent" if status is None else status["state"]
+        if seen["cause"] == "none" and status is not None and status["cause"]:
             seen |= {"cause": status["cause"], "after_s": (now_ns - start_ns) / NS_PER_S}
         session.pause()
         now_ns = session.clock.now_ns()

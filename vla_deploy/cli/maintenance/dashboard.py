@@ -23,6 +23,7 @@ from vla_deploy.client.access.accounts import (
 )
 from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
 from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generate_password, hash_password
+from vla_deploy.ipc import topics
 
 EXAMPLES = """  vla-deploy dashboard             print the page's address
   vla-deploy dashboard --open      open it in this computer's browser
@@ -128,7 +129,7 @@ def show_address(arguments: argparse.Namespace) -> int:
         CommandFailed: the dashboard does not answer, or no browser is found.
     """
     session = attach(arguments.runtime_base)
-    status = session.document("dashboard_status", age_limit_s=_STATUS_AGE_S)
+    status = session.document(topics.DASHBOARD_STATUS, age_limit_s=_STATUS_AGE_S)
     if status is None:
         raise CommandFailed(f"the dashboard does not answer: {_why_silent(session)}")
     if arguments.open and not webbrowser.open(status["url"]):
@@ -138,8 +139,8 @@ def show_address(arguments: argparse.Namespace) -> int:
 
 def _why_silent(session: RobotSession) -> str:
     """Return the supervisor's state of the dashboard in words."""
-    table = session.document("process_table", age_limit_s=_STATUS_AGE_S) or {"processes": []}
-    for row in table["processes"]:
+    table = session.document(topics.PROCESS_TABLE, age_limit_s=_STATUS_AGE_S)
+    for row in () if table is None else table["processes"]:
         if row["name"] == NAME:
             reason = f" ({row['reason']})" if row["reason"] else ""
             return f"it is {row['state']}{reason}; see: vla-deploy logs {NAME}"

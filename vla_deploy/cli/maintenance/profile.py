@@ -4,8 +4,9 @@ import argparse
 import json
 import sys
 import uuid
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
@@ -16,6 +17,8 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.install.files import slice_too_small
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.supervision import ConcludedRequest
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome, ChangePhase
 from vla_deploy.supervisor.profiles.profile_choice import choice_of, detect, start_profile
 from vla_deploy.supervisor.runs.runtime import running
@@ -188,30 +191,30 @@ def _choose(arguments: argparse.Namespace, name: str) -> int:
     return emit(arguments, document, f"profile {name}: {outcome} for the next start; no robot runs")
 
 
-def _request(session: RobotSession, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
+def _request(session: RobotSession, name: str, arguments: argparse.Namespace) -> ConcludedRequest:
     """Send the request to the supervisor and wait for its outcome.
 
     Raises:
         CommandFailed: the supervisor does not report one.
     """
     request_id = uuid.uuid4().hex
-    session.publish(
-        "profile_request",
+    session.writer(topics.PROFILE_REQUEST).publish(
         {
             "request_id": request_id,
             "profile": name,
             "allow_restart": arguments.allow_restart,
             "dry_run": arguments.dry_run,
-        },
+        }
     )
     phases = [""]
 
-    def look() -> dict[str, Any] | None:
-        status = session.document("profile_status", age_limit_s=3.0) or {}
-        last: dict[str, Any] = status.get("last", {})
-        if last.get("request_id") == request_id:
-            return last
-        phase = status.get("phase", "")
+    def look() -> ConcludedRequest | None:
+        status = session.document(topics.PROFILE_STATUS, age_limit_s=3.0)
+        if status is None:
+            return None
+        if status["last"].get("request_id") == request_id:
+            return status["last"]
+        phase = status["phase"]
         if phase not in ("", phases[-1]) and not arguments.json:
             print(_PHASE_WORDS[phase], flush=True)
             phases.append(phase)
@@ -223,7 +226,7 @@ def _request(session: RobotSession, name: str, arguments: argparse.Namespace) ->
     return outcome
 
 
-_PHASE_WORDS = {
+_PHASE_WORDS: Final[Mapping[str, str]] = {
     ChangePhase.PREPARE: "every process prepares",
     ChangePhase.SET_POWER: "setting the power mode",
     ChangePhase.COMMIT: "switching over",

@@ -13,6 +13,7 @@ from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.feasibility.abilities import Abilities
 from vla_deploy.feasibility.question import SceneQuestion
 from vla_deploy.feasibility.verdict import Task
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
 
@@ -54,7 +55,7 @@ def ask(session: RobotSession, goal: str) -> SceneQuestion:
     Raises:
         UsageError: perception is silent.
     """
-    frame = session.frame("rgbd", age_limit_s=FRESH_S)
+    frame = session.frame(topics.RGBD, age_limit_s=FRESH_S)
     image = None if frame is None else colours(frame)
     return question_about(session, session.scene(), goal, image)
 

@@ -7,6 +7,8 @@ from typing import Any, Final
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.supervision import BudgetDocument, BudgetRow, LadderStepDocument
 
 AGE_LIMIT_S: Final = 3.0
 WATCH_PERIOD_S: Final = 1.0
@@ -47,30 +49,30 @@ def run(arguments: argparse.Namespace) -> int:
         session.pause(WATCH_PERIOD_S)
 
 
-def collect(session: RobotSession) -> dict[str, Any]:
+def collect(session: RobotSession) -> BudgetDocument:
     """Return the supervisor's report on the budgets.
 
     Raises:
         CommandFailed: there is none.
     """
-    budget = session.document("budget", AGE_LIMIT_S)
+    budget = session.document(topics.BUDGET, AGE_LIMIT_S)
     if budget is None:
         raise CommandFailed("the supervisor does not tell its budgets; see: vla-deploy status")
     return budget
 
 
-def as_text(budget: dict[str, Any]) -> str:
+def as_text(budget: BudgetDocument) -> str:
     """Return the budgets as lines for a person."""
     hint = [f"hint: {budget['hint']}"] if budget["hint"] else []
     return "\n".join([*_lines(budget), "", *_ladder(budget), "", *_enforced(budget), *hint])
 
 
-def _lines(budget: dict[str, Any]) -> list[str]:
+def _lines(budget: BudgetDocument) -> list[str]:
     head = f"{'process':<12} {'metric':<14} {'used':>10} {'limit':>12} {'state':<8} reason"
     return [head, *(_line(row).rstrip() for row in budget["rows"])]
 
 
-def _line(row: dict[str, Any]) -> str:
+def _line(row: BudgetRow) -> str:
     used = "unknown" if row["measured"] is None else f"{row['measured']:g}"
     limit = f"{'>=' if row['at_least'] else '<='} {row['limit']:g}"
     name = f"{row['metric'].rpartition('_')[0]} {UNITS.get(row['metric'], '')}"
@@ -80,7 +82,7 @@ def _line(row: dict[str, Any]) -> str:
     )
 
 
-def _ladder(budget: dict[str, Any]) -> list[str]:
+def _ladder(budget: BudgetDocument) -> list[str]:
     ladder = budget["ladder"]
     in_force = [
         f"  {_step_words(one)}, for {one['since_s']:g} s: {one['why']}" for one in ladder["taken"]
@@ -97,14 +99,14 @@ def _ladder(budget: dict[str, Any]) -> list[str]:
     ]
 
 
-def _step_words(step: dict[str, Any]) -> str:
+def _step_words(step: LadderStepDocument) -> str:
     words = step["action"].replace("_", " ")
     if step["process"]:
         words += f" {step['process']}"
     return f"{words} to {100 * step['ratio']:g} %" if step["action"] == "slow" else words
 
 
-def _enforced(budget: dict[str, Any]) -> list[str]:
+def _enforced(budget: BudgetDocument) -> list[str]:
     return [
         "enforced by:",
         *(

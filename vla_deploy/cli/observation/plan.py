@@ -13,6 +13,7 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.operation.say import EXIT_ASKED, read_json
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.client.action_words import action_words
+from vla_deploy.ipc import topics
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.confirmation import confirmation_of
@@ -52,12 +53,10 @@ def register(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Plan the command and print the plan; exit code 2 where it is refused."""
     session = _session(arguments)
-    table, status = (
-        {} if session is None else session.document(topic, FRESH_S) or {}
-        for topic in ("process_table", "profile_status")
-    )
-    robot = load_robot(arguments.robot or table.get("robot", "butler"))
-    profile = load_profile(arguments.profile or status.get("profile", "desktop"))
+    table = session and session.document(topics.PROCESS_TABLE, FRESH_S)
+    status = session and session.document(topics.PROFILE_STATUS, FRESH_S)
+    robot = load_robot(arguments.robot or (table["robot"] if table else "butler"))
+    profile = load_profile(arguments.profile or (status["profile"] if status else "desktop"))
     planner = planner_for(robot, profile, MonotonicClock(), base_of(arguments))
     request = _request(arguments, robot, session)
     result = planner.plan(request)

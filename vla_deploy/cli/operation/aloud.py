@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal, TypedDict
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.cli.twin import answer_of, has_twin
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.speech import HeardMessage
+from vla_deploy.ipc.payloads.tasks import TaskEvent
 
 DEFAULT_VOICE: Final = "en-gb"
 STOP: Final = "stop"
@@ -21,7 +24,13 @@ _STATUS_AGE_S: Final = 2.0
 _MAX_TIMES_SAID: Final = 3
 _MOVING_M_S: Final = 0.01
 _MOVING_RAD_S: Final = 0.06  # a servo's speed has steps of 0.024
-Event = dict[str, Any]
+
+
+class HeardLine(TypedDict):
+    """Show among a command's events what was heard."""
+
+    event: Literal["heard"]
+    text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +41,7 @@ class Hearing:
     """
 
     words_ended_ns: int
-    heard: Event
+    heard: HeardMessage
     command_id: str
 
     @property
@@ -64,9 +73,9 @@ class Aloud:
         if why:
             raise UsageError(f"the robot hears nothing: {why}; give the command without --aloud")
         self._session = session
-        self._heard = session.events("heard")
-        self._utterances = session.events("utterance")
-        self._events = session.events("task_event")
+        self._heard = session.events(topics.HEARD)
+        self._utterances = session.events(topics.UTTERANCE)
+        self._events = session.events(topics.TASK_EVENT)
         self._commands: dict[str, str] = {}
 
     def speak(self, text: str, voice: str = DEFAULT_VOICE, snr_db: float | None = None) -> Hearing:
@@ -83,10 +92,12 @@ class Aloud:
         return Hearing(
             words_ended_ns=ended_ns,
             heard=heard,
-            command_id=self._commands.get(str(heard["text"]), ""),
+            command_id=self._commands.get(heard["text"], ""),
         )
 
-    def follow(self, hearing: Hearing, pause: Callable[[], None] | None = None) -> Iterator[Event]:
+    def follow(
+        self, hearing: Hearing, pause: Callable[[], None] | None = None
+    ) -> Iterator[TaskEvent]:
         """Return the task events of the command, up to and including the last one.
 
         Raises:
@@ -100,12 +111,12 @@ class Aloud:
             raise UsageError(f"what was heard is no command: {verdict}")
         return self._session.follow(hearing.command_id, self._events, pause)
 
-    def _first_heard(self, began_ns: int, ended_ns: int) -> Event:
+    def _first_heard(self, began_ns: int, ended_ns: int) -> HeardMessage:
         while self._session.clock.now_ns() < ended_ns + _HEARD_WITHIN_S * NS_PER_S:
             heard = [event.payload for event in self._heard.drain()]
             for event in self._utterances.drain():
-                if event.payload.get("source") == "voice":
-                    self._commands[str(event.payload["text"])] = str(event.payload["command_id"])
+                if event.payload["source"] == "voice":
+                    self._commands[event.payload["text"]] = event.payload["command_id"]
             for one in heard:
                 if one["ended_ns"] > began_ns:
                     return one
@@ -117,7 +128,7 @@ class Aloud:
 
 def why_deaf(session: RobotSession) -> str:
     """Return why the robot understands no speech; empty when it listens."""
-    status = session.document("speech_status", age_limit_s=_STATUS_AGE_S)
+    status = session.document(topics.SPEECH_STATUS, age_limit_s=_STATUS_AGE_S)
     if status is None:
         return "no speech process runs"
     if status["state"] == "deaf":
@@ -144,14 +155,14 @@ class MotionWatch:
             self.first_ns = min((*self._base_ns(), *self._joints_ns()), default=None)
 
     def _base_ns(self) -> Iterator[int]:
-        base = self._session.fresh("base_state", age_limit_s=1.0)
+        base = self._session.fresh(topics.BASE_STATE, age_limit_s=1.0)
         if base is not None and (
             abs(base.data["v_m_s"]) > _MOVING_M_S or abs(base.data["w_rad_s"]) > _MOVING_RAD_S
         ):
             yield base.stamp_ns
 
     def _joints_ns(self) -> Iterator[int]:
-        joints = self._session.fresh("joint_state", age_limit_s=1.0)
+        joints = self._session.fresh(topics.JOINT_STATE, age_limit_s=1.0)
         if joints is None:
             return
         count = int(joints.data["joint_count"])
@@ -175,9 +186,11 @@ class SpokenCommand:
         self._times_said = 0
         self._hearing: Hearing | None = None
         self._planned_ns: int | None = None
-        self._stamped = session.events("task_event")
+        self._stamped = session.events(topics.TASK_EVENT)
 
-    def events(self, text: str, voice: str, snr_db: float | None) -> Iterator[Event]:
+    def events(
+        self, text: str, voice: str, snr_db: float | None
+    ) -> Iterator[TaskEvent | HeardLine]:
         """Speak, and yield what was heard and the task events, up to and including the last one.
 
         Raises:
@@ -212,7 +225,7 @@ class SpokenCommand:
         self._hearing = self._aloud.speak(text, self._voice, snr_db)
         return self._hearing
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: TaskEvent) -> None:
         if event["event"] == "plan":
             plans = [one for one in self._stamped.drain() if one.payload["event"] == "plan"]
             self._planned_ns = plans[-1].stamp_ns if plans else self._session.clock.now_ns()
@@ -239,5 +252,5 @@ class SpokenCommand:
 
 def is_speaking(session: RobotSession) -> bool:
     """Return whether the robot speaks."""
-    status = session.document("speech_status", age_limit_s=_STATUS_AGE_S)
+    status = session.document(topics.SPEECH_STATUS, age_limit_s=_STATUS_AGE_S)
     return status is not None and bool(status["speaking"] or status["voice"].get("waiting"))

@@ -21,6 +21,7 @@ from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.aloud import (
     DEFAULT_VOICE,
+    HeardLine,
     MotionWatch,
     SpokenCommand,
     wait_until_listening,
@@ -30,6 +31,9 @@ from vla_deploy.cli.operation.say import line_of
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.cli.twin import SteppingClock, ask_referee
 from vla_deploy.client.action_words import action_words
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.supervision import ProcessTable
+from vla_deploy.ipc.payloads.tasks import TaskEvent
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -120,21 +124,21 @@ class Demo:
             session.pause(SETTLE_S)
             judged = self._judge(session)
             film_files = self._stop_film(session) if film else {}
-            table = session.document("process_table") or {}
+            table = session.document(topics.PROCESS_TABLE)
         return self._outcome(took_s, wall_s, judged, film_files, table) | seen
 
     def _wait_armed(self, session: RobotSession) -> None:
         def is_armed() -> bool | None:
-            status = session.document("control_status", age_limit_s=1.0) or {}
-            return status.get("state") == "armed" or None
+            status = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
+            return (status is not None and status["state"] == "armed") or None
 
         if not session.wait_for(is_armed, ARM_TIMEOUT_S, 0.1):
-            status = session.document("control_status", age_limit_s=1.0)
+            status = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
             raise CommandFailed(f"the robot did not arm within {ARM_TIMEOUT_S:g} s: {status}")
 
     def _give_command(
         self, session: RobotSession, clock: SteppingClock
-    ) -> Iterator[dict[str, Any]]:
+    ) -> Iterator[TaskEvent | HeardLine]:
         """Return the events of the command: spoken, or as text where no speech is understood."""
         order = self._arguments.order
         self._why_typed = self._why_typed or wait_until_listening(session)
@@ -147,9 +151,9 @@ class Demo:
         self._print(f'a voice says: "{order}"')
         return spoken.events(order, self._arguments.voice, self._arguments.snr)
 
-    def _follow(self, events: Iterator[dict[str, Any]], session: RobotSession) -> None:
+    def _follow(self, events: Iterator[TaskEvent | HeardLine], session: RobotSession) -> None:
         for event in events:
-            self._last = event
+            self._last = {**event}
             if event["event"] == "plan":
                 self._plan = event["plan"]
             line = event["text"] if event["event"] == "heard" else line_of(event)
@@ -170,11 +174,12 @@ class Demo:
 
     def _control_counters(self, session: RobotSession) -> dict[str, Any]:
         """Return control's counters, and a digest of all bytes on its buses."""
-        status = session.document("control_status") or {}
+        status = session.document(topics.CONTROL_STATUS)
+        buses = {} if status is None else status["buses"]
         return {
-            "ticks": status.get("tick"),
-            "late_ticks": status.get("late_ticks"),
-            "bus_timeouts": sum(bus.get("timeouts", 0) for bus in status.get("buses", {}).values()),
+            "ticks": status and status["tick"],
+            "late_ticks": status and status["late_ticks"],
+            "bus_timeouts": sum(bus.get("timeouts", 0) for bus in buses.values()),
             "wire_digest": ask_referee(session, "truth")["wire_digest"],
         }
 
@@ -206,7 +211,7 @@ class Demo:
         wall_s: float,
         judged: dict[str, Any],
         film_files: dict[str, Any],
-        table: dict[str, Any],
+        table: ProcessTable | None,
     ) -> dict[str, Any]:
         refused = self._last["reason"] if self._last.get("event") == "rejected" else None
         acted = bool(self._last.get("success"))
@@ -214,7 +219,8 @@ class Demo:
         error = self._last.get("error")
         if acted and not success:
             error = "the robot reports success, but MuJoCo does not see the object in the container"
-        processes = {row["name"]: row["cpu_ratio"] for row in table.get("processes", [])}
+        rows = [] if table is None else table["processes"]
+        processes = {row["name"]: row["cpu_ratio"] for row in rows}
         return {
             "success": success,
             "refused": refused,
@@ -229,8 +235,8 @@ class Demo:
             "placement_error_m": judged["placement_error_m"],
             "judged_by": judged["judged_by"],
             "film": film_files,
-            "peak_memory_mb": table.get("peak_memory_mb"),
-            "memory_kind": table.get("memory_kind"),
+            "peak_memory_mb": table and table["peak_memory_mb"],
+            "memory_kind": table and table["memory_kind"],
             "cpu_ratio": processes,
         }
 

@@ -16,6 +16,7 @@ from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.client.motions import Claimed, Motions, joint_view
 from vla_deploy.client.readiness import SILENT, refusal_of
+from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import JointLimits
 
@@ -120,14 +121,14 @@ def _moved(
 ) -> tuple[str, str]:
     """Move, and return how that ended and why."""
     claim = Claimed(session, "cli/joint", robot.groups_moving([name]))
-    refusal = refusal_of(session.document("control_status", _FRESH_S)) or claim.why_not_taken()
+    refusal = refusal_of(session.document(topics.CONTROL_STATUS, _FRESH_S)) or claim.why_not_taken()
     if refusal:
         raise CommandFailed(refusal)
     motions = Motions(session, robot.joint_index, "cli")
     try:
         motion_id = motions.go({name: target}, {}, speed_ratio)
         while (ended := motions.ended(motion_id)) is None:
-            if session.document("control_status", _FRESH_S) is None:
+            if session.document(topics.CONTROL_STATUS, _FRESH_S) is None:
                 raise CommandFailed(SILENT)
             session.pause()
             motions.step()

@@ -10,6 +10,8 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import attach, base_of
 from vla_deploy.client.acts import REACHED, why_not
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.motion import ControlStatus
 from vla_deploy.supervisor.runs.runtime import running
 
 WAIT_S = 5.0
@@ -37,13 +39,13 @@ def run(arguments: argparse.Namespace) -> int:
     session = attach(arguments.runtime_base)
     session.operate(arguments.act, arguments.reason)
 
-    def reached() -> dict[str, Any] | None:
-        status = session.document("control_status", age_limit_s=1.0)
+    def reached() -> ControlStatus | None:
+        status = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
         return status if status is not None and REACHED[arguments.act](status) else None
 
     status = session.wait_for(reached, WAIT_S)
     if status is None:
-        last = session.document("control_status", age_limit_s=1.0)
+        last = session.document(topics.CONTROL_STATUS, age_limit_s=1.0)
         raise CommandFailed(f"{why_not(last)}; see: vla-deploy status")
     cause = f" ({status['cause']})" if status["cause"] else ""
     return emit(arguments, status, f"control: {status['state']}{cause}")
@@ -53,7 +55,7 @@ def run_stop(arguments: argparse.Namespace) -> int:
     """Cancel the running command; the robot comes to rest and stays armed."""
     session = attach(arguments.runtime_base)
     session.cancel()
-    refusal = refusal_of(session.document("control_status", age_limit_s=1.0))
+    refusal = refusal_of(session.document(topics.CONTROL_STATUS, age_limit_s=1.0))
     print(f"stopped; {refusal or 'the robot is ready'}")
     return 0
 

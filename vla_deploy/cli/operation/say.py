@@ -13,6 +13,7 @@ from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.aloud import DEFAULT_VOICE, STOP, Aloud
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.client.action_words import action_words
+from vla_deploy.ipc.payloads.tasks import ActionEvent, PlanEvent, TaskEvent, UtteranceContent
 
 EXIT_ASKED: Final = 3
 EXAMPLES = """  vla-deploy say "go to the kitchen"
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _utterance(arguments: argparse.Namespace) -> dict[str, Any]:
+def _utterance(arguments: argparse.Namespace) -> UtteranceContent:
     if arguments.plan:
         return {"plan": read_json(arguments.plan, "plan")}
     if arguments.answer:
@@ -109,16 +110,16 @@ class Follower:
         self._terminal = sys.stdin if terminal is None else terminal
         self._is_asked = False
 
-    def follow(self, utterance: dict[str, Any]) -> dict[str, Any]:
+    def follow(self, utterance: UtteranceContent) -> dict[str, Any]:
         """Give a command and return its last event, or a question that cannot be answered here."""
         return self.narrate(self._session.command(self.pause, **utterance))
 
-    def narrate(self, events: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    def narrate(self, events: Iterable[TaskEvent]) -> dict[str, Any]:
         """Print a command's events and return the last one; Ctrl-C cancels the command."""
         last: dict[str, Any] = {}
         try:
             for event in events:
-                last = event
+                last = {**event}
                 line = line_of(event)
                 if line and not self._quiet and event["event"] != "rejected":
                     print(line, flush=True)
@@ -140,7 +141,7 @@ class Follower:
                 self._session.utter(text=typed, answer=True)
 
 
-def line_of(event: Mapping[str, Any]) -> str | None:
+def line_of(event: TaskEvent) -> str | None:
     """Return one line for a task event, or None for one that adds nothing."""
     match event["event"]:
         case "queued":
@@ -164,7 +165,7 @@ def line_of(event: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _plan_line(event: Mapping[str, Any]) -> str:
+def _plan_line(event: PlanEvent) -> str:
     actions = event["plan"]["actions"]
     steps = "; ".join(action_words(one["skill"], one["parameters"]) for one in actions)
     back_end = event.get("rung", "")
@@ -172,7 +173,7 @@ def _plan_line(event: Mapping[str, Any]) -> str:
     return f"plan: {steps}{by}"
 
 
-def _action_line(event: Mapping[str, Any]) -> str:
+def _action_line(event: ActionEvent) -> str:
     words = action_words(event["skill"], event["parameters"])
     line = f"{_SIGNS.get(event['status'], event['status'])} {words}"
     if event["status"] != "active":

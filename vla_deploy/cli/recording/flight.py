@@ -12,6 +12,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import RobotSession, attach, base_of
+from vla_deploy.ipc import Event, topics
+from vla_deploy.ipc.payloads.recording import FlightEvent
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
@@ -114,16 +116,17 @@ def run_save(arguments: argparse.Namespace) -> int:
     return emit(arguments, answer, answer["file"])
 
 
-def _save(session: RobotSession, reason: str) -> dict[str, Any] | None:
+def _save(session: RobotSession, reason: str) -> FlightEvent | None:
     """Request a flight; return the recorder's answer, None when it is silent."""
-    answers = session.events("flight_event")
-    session.publish("flight_request", {"source": session.source, "reason": reason})
+    answers = session.events(topics.FLIGHT_EVENT)
+    session.writer(topics.FLIGHT_REQUEST).publish({"source": session.source, "reason": reason})
 
-    def look() -> dict[str, Any] | None:
-        payloads = [event.payload for event in answers.drain()]
-        return next((one for one in payloads if "request" in one["causes"]), None)
+    def look() -> Event[FlightEvent] | None:
+        events = answers.drain()
+        return next((one for one in events if "request" in one.payload["causes"]), None)
 
-    return session.wait_for(look, SAVE_TIMEOUT_S)
+    answer = session.wait_for(look, SAVE_TIMEOUT_S)
+    return None if answer is None else answer.payload
 
 
 def _folder(arguments: argparse.Namespace) -> FlightFolder:

@@ -17,6 +17,7 @@ from vla_deploy.cli.recording.runs import (
     watched_run,
 )
 from vla_deploy.cli.session import RobotSession, attach, base_of
+from vla_deploy.ipc import topics
 from vla_deploy.telemetry.recorded_file import read_file
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.recording.once import OneRecording
@@ -70,7 +71,7 @@ def run_start(arguments: argparse.Namespace) -> int:
         arguments, duration_s=arguments.duration, label=arguments.label, source=_source()
     )
     session = attach(arguments.runtime_base)
-    session.publish("recording_request", request.document())
+    session.writer(topics.RECORDING_REQUEST).publish(request.document())
     status = _wait(session, lambda status: status.get("source") == request.source)
     return emit(arguments, status, lambda: _words(status))
 
@@ -78,7 +79,7 @@ def run_start(arguments: argparse.Namespace) -> int:
 def run_stop(arguments: argparse.Namespace) -> int:
     """Ask the recorder to end, and wait until it has."""
     session = attach(arguments.runtime_base)
-    session.publish("recording_request", {"act": STOP, "source": session.source})
+    session.writer(topics.RECORDING_REQUEST).publish({"act": STOP, "source": session.source})
     status = _wait(session, lambda status: status["state"] == "off")
     return emit(arguments, status, lambda: _words(status))
 
@@ -89,7 +90,7 @@ def run_status(arguments: argparse.Namespace) -> int:
     Raises:
         CommandFailed: it is silent.
     """
-    status = attach(arguments.runtime_base).document("recording_status", _STATUS_AGE_S)
+    status = attach(arguments.runtime_base).document(topics.RECORDING_STATUS, _STATUS_AGE_S)
     if status is None:
         raise CommandFailed("the recorder is silent; see: vla-deploy status")
     return emit(arguments, status, lambda: _words(status))
@@ -144,7 +145,7 @@ def _wait(session: RobotSession, reached: Callable[[Status], bool]) -> Status:
     """
 
     def look() -> Status | None:
-        status = session.document("recording_status", _STATUS_AGE_S)
+        status = session.document(topics.RECORDING_STATUS, _STATUS_AGE_S)
         return status if status is not None and reached(status) else None
 
     status = session.wait_for(look, ANSWER_WITHIN_S)

@@ -11,6 +11,8 @@ from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.recording.runs import find_recorded, stop_requested
 from vla_deploy.cli.session import RobotSession, attach, base_of
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.recording import ReplayAct, ReplayStatus
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE
 from vla_deploy.runtime.node import run_node
 from vla_deploy.supervisor.processes.process import ChildProcess
@@ -103,7 +105,7 @@ class _Address:
 
     def print_once(self) -> None:
         """Print it, if that is still to be done and it is known."""
-        status = self._session.document("dashboard_status") if self._wanted else None
+        status = self._session.document(topics.DASHBOARD_STATUS) if self._wanted else None
         if status is not None:
             self._wanted = False
             print(f"dashboard: {status['url']}", flush=True)
@@ -128,8 +130,8 @@ def _page(runtime: Runtime, file: RecordedFile) -> ChildProcess:
     return ChildProcess(command, environment, run_dir / LOGS_DIR / "dashboard.out")
 
 
-def _acts(arguments: argparse.Namespace) -> list[tuple[str, float]]:
-    acts: list[tuple[str, float]] = []
+def _acts(arguments: argparse.Namespace) -> list[tuple[ReplayAct, float]]:
+    acts: list[tuple[ReplayAct, float]] = []
     if arguments.at_s is not None:
         acts.append(("seek", arguments.at_s))
     if arguments.speed is not None:
@@ -143,14 +145,14 @@ def _acts(arguments: argparse.Namespace) -> list[tuple[str, float]]:
 
 def _ask(arguments: argparse.Namespace) -> int:
     session = attach(arguments.runtime_base)
-    if session.document("replay_status", _STATUS_AGE_S) is None:
+    if session.document(topics.REPLAY_STATUS, _STATUS_AGE_S) is None:
         raise UsageError("what runs here is no replay; begin one: vla-deploy replay FILE")
     asked_ns = session.clock.now_ns()
     for act, value in _acts(arguments):
-        session.publish("replay_request", {"act": act, "value": value})
+        session.writer(topics.REPLAY_REQUEST).publish({"act": act, "value": value})
 
-    def look() -> dict[str, Any] | None:
-        sample = session.fresh("replay_status")
+    def look() -> ReplayStatus | None:
+        sample = session.fresh(topics.REPLAY_STATUS)
         is_later = sample is not None and sample.stamp_ns > asked_ns + NS_PER_S // 20
         return sample.document() if sample is not None and is_later else None
 

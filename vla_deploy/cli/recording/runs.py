@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.session import RobotSession
+from vla_deploy.ipc import topics
 from vla_deploy.runtime.node import Node, NodeContext, run_node
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
@@ -31,11 +32,12 @@ def find_recorded(base: Path, name: str) -> Path:
 
 def watched_run(session: RobotSession) -> NodeContext:
     """Return the context of a node that only watches this run, a robot's or a replay's."""
-    head = session.document("process_table") or session.document("replay_status") or {}
+    table, replay = session.document(topics.PROCESS_TABLE), session.document(topics.REPLAY_STATUS)
+    head = table or replay
     return NodeContext(
         run_dir=Path(session.run_dir),
-        robot=str(head.get("robot", "butler")),
-        profile=str(head.get("profile", "")),
+        robot="butler" if head is None else head["robot"],
+        profile="" if table is None else table["profile"],
         devices_dir=None,
         clock=session.clock,
     )

@@ -1,5 +1,7 @@
 """Gather what the safety judge sees each tick."""
 
+from typing import Any
+
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
@@ -7,11 +9,12 @@ from vla_deploy.control.motion.axes import Floats, any_of
 from vla_deploy.control.output.joint_steps import JointSteps
 from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.control.output.wheels import Wheels
-from vla_deploy.ipc import CellReader, Sample, SharedSpace
+from vla_deploy.ipc import CellReader, Sample, SharedSpace, topics
+from vla_deploy.ipc.payloads.supervision import BudgetStop
 from vla_deploy.safety import SafetyInputs, Surroundings
 
-REMOTE = "remote_base_command"
-BASE_COMMANDS = ("base_command", REMOTE)
+BASE_COMMANDS = (topics.BASE_COMMAND, topics.REMOTE_BASE_COMMAND)
+REMOTE = topics.REMOTE_BASE_COMMAND.name
 _OVER_S = 1.0
 _NO_REASON = "a budget is exhausted"
 
@@ -23,8 +26,8 @@ class InputCollector:
         self.v_m_s = 0.0
         self.w_rad_s = 0.0
         self._base_commands = tuple(map(space.cell_reader, BASE_COMMANDS))
-        self._process_table = space.cell_reader("process_table")
-        self._budget = BudgetWatch(space.cell_reader("budget_stop"))
+        self._process_table = space.cell_reader(topics.PROCESS_TABLE)
+        self._budget = BudgetWatch(space.cell_reader(topics.BUDGET_STOP))
         self._servos = servos
         self._wheels = wheels
         self._clock = clock
@@ -118,7 +121,7 @@ class InputCollector:
         age_s = (self._clock.now_ns() - state.climate_stamp_ns) / NS_PER_S
         return np.where(polled, age_s, state.age_s)
 
-    def _age_s(self, cell: CellReader) -> float | None:
+    def _age_s(self, cell: CellReader[Any]) -> float | None:
         sample = cell.latest()
         return None if sample is None else sample.age_s(self._clock.now_ns())
 
@@ -140,7 +143,7 @@ def _age_s(command: Sample, now_ns: int) -> float:
 class BudgetWatch:
     """Read whether the supervisor's budgets demand a protective stop, and which."""
 
-    def __init__(self, cell: CellReader) -> None:
+    def __init__(self, cell: CellReader[BudgetStop]) -> None:
         self._cell = cell
         self._sequence = 0
         self._reason: str | None = None

@@ -17,7 +17,7 @@ from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.control.judging.thresholds import IMU_AGE_S, POSE_AGE_S
 from vla_deploy.control.judging.zone_watch import ZoneWatch
 from vla_deploy.control.motion.axes import Floats, all_of
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.safety.balance import tip_margin_ratio
@@ -63,8 +63,8 @@ class SurroundingsWatch:
         self._footprint = Footprint(corners_m=((0.0, 0.0),), radius_m=robot.base.footprint_radius_m)
         self._zones = ZoneWatch(space, robot, model, self._body, self._footprint)
         self._clearance = ClearanceWatch(robot, self._body)
-        self._pose = space.cell_reader("pose")
-        self._imu = space.cell_reader("imu")
+        self._pose = space.cell_reader(topics.POSE)
+        self._imu = space.cell_reader(topics.IMU)
         self._acceleration: Floats | None = None
         self._areas = {
             area.name: np.array(area.polygon_m, dtype=np.float64) for area in robot.home.zones

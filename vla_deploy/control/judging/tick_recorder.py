@@ -4,7 +4,7 @@ from dataclasses import fields
 from operator import attrgetter
 
 from vla_deploy.control.motion.axes import Floats
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.memory.delta import DeltaWriter
 from vla_deploy.ipc.memory.packing import Catalogue, types_within
 from vla_deploy.safety import SafetyInputs, SafetyLimits, SafetyState, Verdict
@@ -24,7 +24,7 @@ class TickRecorder:
 
     def __init__(self, space: SharedSpace) -> None:
         catalogue = Catalogue(types_within(SafetyState, SafetyInputs, SafetyLimits, Verdict))
-        self._ring = space.record_writer("tick_record")
+        self._ring = space.record_writer(topics.TICK_RECORD)
         self._delta = DeltaWriter((*_JUDGED, *_SENT), catalogue, key_every=_KEY_EVERY)
         self._is_open = False
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from vla_deploy.ipc import RingReader, Sample
+from vla_deploy.ipc.payloads.motion import ControlStatus, OperatorRequest
 
 UNKNOWN = "unknown"
 LOST = "operator events were lost"
@@ -31,9 +32,9 @@ class OperatorInbox:
 
     def __init__(
         self,
-        ring: RingReader,
+        ring: RingReader[OperatorRequest],
         button: Callable[[], str | None] = lambda: None,
-        last_status: Sample | None = None,
+        last_status: Sample[ControlStatus] | None = None,
     ) -> None:
         self._ring = ring
         self._button = button
@@ -61,7 +62,7 @@ class OperatorInbox:
         """Return the next act other than an emergency stop."""
         return self._waiting.popleft() if self._waiting else None
 
-    def _recall(self, last_status: Sample | None) -> str | None:
+    def _recall(self, last_status: Sample[ControlStatus] | None) -> str | None:
         """Return who asked for a stop that no control has seen to its end."""
         told_ns = -1 if last_status is None else last_status.stamp_ns
         held = self._ring.drain()

@@ -1,9 +1,11 @@
 """Decide control's mode: one pure function of mode, verdict and acts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from vla_deploy.ipc.payloads.motion import ControlStateName
 from vla_deploy.safety import Reaction
 
 
@@ -76,19 +78,20 @@ def _next_while_armed(mode: Mode, pause: bool, at_rest: bool) -> Mode:
     return Mode.PAUSING if mode is Mode.ARMED else mode
 
 
-def status_name(mode: Mode, reaction: Reaction) -> str:
+def status_name(mode: Mode, reaction: Reaction) -> ControlStateName:
     """Return the mode in the words of `control_status`; fault: it cannot be armed at present."""
     if mode is Mode.DISARMED and reaction >= Reaction.HOLD:
         return "fault"
-    return _WORDS.get(mode, mode.value)
+    return _WORDS[mode]
 
 
-_WORDS = {
+_WORDS: Final[Mapping[Mode, ControlStateName]] = {
+    Mode.DISARMED: "disarmed",
     Mode.ARMING: "disarmed",
+    Mode.ARMED: "armed",
     Mode.DISARMING: "stopping",
     Mode.PAUSING: "protective_stop",
     Mode.PAUSED: "protective_stop",
+    Mode.STOPPING: "stopping",
+    Mode.STOPPED: "stopped",
 }
-
-CONTROL_STATES: Final = (*dict.fromkeys(_WORDS.get(mode, mode.value) for mode in Mode), "fault")
-"""Every word that `status_name` has."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from vla_deploy.control.motion.axes import Flags, Floats
 from vla_deploy.ipc import CellReader
+from vla_deploy.ipc.payloads.tasks import ExecutorStatus
 from vla_deploy.robots import RobotDescription
 
 # An empty gripper closes to where it was sent; fingers on an object stop short of it, pressing.
@@ -18,7 +19,9 @@ PRESS_M: Final = 0.004
 class Payload:
     """Look at the hands when a stop has to know; a held thing outlives the executor."""
 
-    def __init__(self, robot: RobotDescription, executor_status: CellReader) -> None:
+    def __init__(
+        self, robot: RobotDescription, executor_status: CellReader[ExecutorStatus]
+    ) -> None:
         self._grippers = {
             name: [robot.joint_index[joint] for joint in robot.group(hand.gripper).joints]
             for name, hand in robot.hands.items()

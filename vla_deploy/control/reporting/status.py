@@ -17,6 +17,7 @@ from vla_deploy.control.reporting.status_document import (
 )
 from vla_deploy.control.reporting.status_pace import StatusPace
 from vla_deploy.control.reporting.telemetry import TickClock
+from vla_deploy.ipc.payloads.motion import ControlStatus
 
 
 class Status:
@@ -41,7 +42,7 @@ class Status:
         self._wheels = wheels
         self._pace = StatusPace()
 
-    def due(self, every_ticks: int) -> dict[str, Any] | None:
+    def due(self, every_ticks: int) -> ControlStatus | None:
         """Return the document where this tick has to tell it."""
         if not self._pace.is_due(self._ticks.tick, self._matters(), every_ticks):
             return None
@@ -56,7 +57,7 @@ class Status:
             self._judging.state.latched,
         )
 
-    def _document(self) -> dict[str, Any]:
+    def _document(self) -> ControlStatus:
         verdict, ticks = self._judging.verdict, self._ticks
         return {
             "state": status_name(self._modes.mode, verdict.reaction),

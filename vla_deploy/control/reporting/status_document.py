@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.dynamixel import BusState
 from vla_deploy.control.motion.axes import Floats
+from vla_deploy.ipc.payloads.motion import JointReadings, VerdictFields
 from vla_deploy.safety import Cause, Verdict
 
 _LONGEST_DETAIL = 1500
@@ -24,7 +25,7 @@ class Bus(Protocol):
         ...
 
 
-def verdict_document(verdict: Verdict) -> dict[str, Any]:
+def verdict_document(verdict: Verdict) -> VerdictFields:
     """Return who stops or slows the robot and by which numbers; null where none applies."""
     return {
         "cause": "" if verdict.cause is Cause.NONE else verdict.cause.value,
@@ -43,12 +44,12 @@ def detail(*parts: str) -> str:
     return "; ".join(part for part in parts if part)[:_LONGEST_DETAIL]
 
 
-def bus_document(*buses: Bus) -> dict[str, Any]:
+def bus_document(*buses: Bus) -> dict[str, Mapping[str, Any]]:
     """Return each bus' counters by its name."""
     return {bus.name: bus.counters for bus in buses}
 
 
-def joint_document(state: BusState) -> dict[str, list[float | None]]:
+def joint_document(state: BusState) -> JointReadings:
     """Return what servos tell slowly, in joint order; null where it was not read yet."""
     return {
         "temperature_c": _tenths(state.temperature_c),

@@ -1,24 +1,24 @@
 """Tell the other processes what control does; nothing here waits or allocates much."""
 
 from collections.abc import Iterable
-from typing import Any
 
 from drivers.dynamixel import BusState
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.control.motion.motions import MotionResult
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.control.reporting.tick_periods import TickPeriods
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.motion import ControlStatus
 
 
 class Telemetry:
     """Write control's topics."""
 
     def __init__(self, space: SharedSpace, joint_count: int) -> None:
-        self._joints = space.cell_writer("joint_state")
-        self._base = space.cell_writer("base_state")
-        self._status = space.cell_writer("control_status")
-        self._results = space.ring_writer("motion_result")
+        self._joints = space.cell_writer(topics.JOINT_STATE)
+        self._base = space.cell_writer(topics.BASE_STATE)
+        self._status = space.cell_writer(topics.CONTROL_STATUS)
+        self._results = space.ring_writer(topics.MOTION_RESULT)
         record = self._joints.record
         record["joint_count"] = joint_count
         names = (
@@ -50,7 +50,7 @@ class Telemetry:
         record["enabled"] = wheels.enabled
         self._base.commit()
 
-    def tell_status(self, document: dict[str, Any]) -> None:
+    def tell_status(self, document: ControlStatus) -> None:
         """Publish control_status."""
         self._status.put_document(document)
 

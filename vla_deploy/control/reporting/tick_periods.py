@@ -1,7 +1,9 @@
 """Count how far apart ticks begin, as shares of the period that was in force."""
 
 from bisect import bisect_left
-from typing import Any, Final
+from typing import Final
+
+from vla_deploy.ipc.payloads.motion import TickPeriodCounts
 
 LATE_RATIO: Final = 1.2
 """A tick is late when more than this many periods lie between its begin and the last one's."""
@@ -26,7 +28,7 @@ class TickPeriods:
         """Return how many were late."""
         return sum(self._counts[BOUNDS_RATIO.index(LATE_RATIO) + 1 :])
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> TickPeriodCounts:
         """Return bounds, counts between them, and the sum of all, for `control_status`."""
         return {
             "le": BOUNDS_RATIO,

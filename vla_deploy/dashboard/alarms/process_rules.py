@@ -1,7 +1,7 @@
 """Find processes that are lost, restarted or silent, and topics with invalid values."""
 
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Any, Final
 
 from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
 from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
@@ -147,7 +147,7 @@ def old_topics(robot: RobotStatus) -> Iterator[AlarmFinding]:
             yield _old(topic, age_s, limit_s, _silent_sensor(robot, topic))
 
 
-def _is_at_work(robot: RobotStatus, topic: Topic) -> bool:
+def _is_at_work(robot: RobotStatus, topic: Topic[Any]) -> bool:
     """Return whether its age matters: a silent supervisor is another rule's finding."""
     if topic.owner == _SUPERVISOR:
         return topic.name != "process_table" and robot.document("process_table") is not None
@@ -159,13 +159,13 @@ def _rate_ratio(robot: RobotStatus, process: str) -> float:
     return max(float(directives.get("rate_ratio", {}).get(process, 1.0)), _LEAST_RATIO)
 
 
-def _silent_sensor(robot: RobotStatus, topic: Topic) -> str:
+def _silent_sensor(robot: RobotStatus, topic: Topic[Any]) -> str:
     """Return the sensor that caused it, where its process still publishes other topics."""
     sensor = OF_SENSOR.get(topic.name, "")
     return sensor if sensor and robot.document("scene") is not None else ""
 
 
-def _old(topic: Topic, age_s: float, limit_s: float, sensor: str) -> AlarmFinding:
+def _old(topic: Topic[Any], age_s: float, limit_s: float, sensor: str) -> AlarmFinding:
     culprit = f"the {sensor} has gone silent: no {topic.name}"
     return AlarmFinding(
         process=topic.owner,

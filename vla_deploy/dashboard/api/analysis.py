@@ -15,6 +15,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.access.rates import TokenBuckets
 from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.ipc import topics
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import MapInvalid
 from vla_deploy.world import SceneUnreadable
@@ -44,7 +45,7 @@ class Analyst:
             ApiError: there is no scene, the robot's map cannot be used, or there are too many
                 requests.
         """
-        scene = self._link.document("scene", age_limit_s=FRESH_S)
+        scene = self._link.document(topics.SCENE, age_limit_s=FRESH_S)
         if scene is None:
             raise _unavailable("no_scene", "perception tells no scene")
         if self._asked.take("") > 0.0:

@@ -1,15 +1,17 @@
 """Give the robot commands, and answer how they ended."""
 
 from http import HTTPStatus
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Unpack
 
 from fastapi import APIRouter, Depends, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import MOST_CHARACTERS, CommandRecord
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.ipc.payloads.tasks import UtteranceContent
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 
@@ -88,8 +90,9 @@ async def cancel(command_id: CommandId, request: Request) -> CommandAccepted:
     return _uttered(request, cancel=True)
 
 
-def _uttered(request: Request, **utterance: Any) -> CommandAccepted:
-    command_id = request.app.state.link.utter(**utterance)
+def _uttered(request: Request, **utterance: Unpack[UtteranceContent]) -> CommandAccepted:
+    link: RobotLink = request.app.state.link
+    command_id = link.utter(**utterance)
     note(request, given=command_id, text=utterance.get("text", ""))
     return CommandAccepted(command_id=command_id)
 

@@ -12,6 +12,8 @@ from vla_deploy.client.acts import REACHED, Status, why_not
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.stop_button import ESTOP
 
 router = APIRouter(tags=["operate"])
@@ -23,7 +25,7 @@ async def carried_out(link: RobotLink, act: str, within_s: float) -> tuple[bool,
     """Wait until control's status shows an act; return whether it did in time, and the status."""
     end_ns = link.clock.now_ns() + round(within_s * NS_PER_S)
     while True:
-        status = link.document("control_status", age_limit_s=1.0)
+        status = link.document(topics.CONTROL_STATUS, age_limit_s=1.0)
         if status is not None and REACHED[act](status):
             return True, status
         if link.clock.now_ns() >= end_ns:
@@ -72,8 +74,8 @@ async def disarm(request: Request, why: ReasonBody | None = None) -> dict[str, A
     return await _act(request, "disarm", why)
 
 
-async def _act(request: Request, act: str, why: ReasonBody | None) -> dict[str, Any]:
-    link = request.app.state.link
+async def _act(request: Request, act: OperatorActName, why: ReasonBody | None) -> dict[str, Any]:
+    link: RobotLink = request.app.state.link
     reason = why.reason if why else ""
     link.operate(act, reason)
     note(request, reason=reason)

@@ -10,8 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from platforms.errors import ProfileError
 from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, note, require
 from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.supervision import ProfileStatus
 from vla_deploy.supervisor.profiles.profile_choice import detect
 
 router = APIRouter(prefix="/profile", tags=["profile"])
@@ -81,23 +84,22 @@ async def use(body: ProfileBody, request: Request) -> ProfileRequested:
     """Request another profile; the robot returns to the old one by itself if it fails."""
     _check(body.name, _profile_status(request))
     request_id = uuid.uuid4().hex
-    request.app.state.link.publish(
-        "profile_request",
+    link: RobotLink = request.app.state.link
+    link.writer(topics.PROFILE_REQUEST).publish(
         {
             "request_id": request_id,
             "profile": body.name,
             "allow_restart": body.may_restart,
             "dry_run": body.dry_run,
-        },
+        }
     )
     note(request, profile=body.name, dry_run=body.dry_run)
     return ProfileRequested(request_id=request_id)
 
 
-def _profile_status(request: Request) -> dict[str, Any] | None:
-    link = request.app.state.link
-    status: dict[str, Any] | None = link.document("profile_status", age_limit_s=3.0)
-    return status
+def _profile_status(request: Request) -> ProfileStatus | None:
+    link: RobotLink = request.app.state.link
+    return link.document(topics.PROFILE_STATUS, age_limit_s=3.0)
 
 
 def _parents(name: str) -> tuple[str, ...]:
@@ -116,14 +118,14 @@ def _values(name: str) -> dict[str, Any]:
         ) from error
 
 
-def _names(status: dict[str, Any] | None) -> list[str]:
+def _names(status: ProfileStatus | None) -> list[str]:
     """Return the shipped profiles, and the custom one with which the run began."""
     shipped = [name for name in profile_names() if not name.endswith(_TO_INHERIT_FROM)]
-    begun_with = str((status or {}).get("begun_with", ""))
+    begun_with = "" if status is None else status["begun_with"]
     return shipped if begun_with in ("", *shipped) else [begun_with, *shipped]
 
 
-def _check(name: str, status: dict[str, Any] | None) -> None:
+def _check(name: str, status: ProfileStatus | None) -> None:
     """Accept only offered names: a path could read any file."""
     names = _names(status)
     if name not in names:

@@ -10,8 +10,10 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.errors import ApiError
+from vla_deploy.ipc import topics
 from vla_deploy.telemetry.errors import RecordingRefused
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
@@ -107,7 +109,7 @@ def recordings(request: Request) -> list[dict[str, Any]]:
 def status(request: Request) -> dict[str, Any]:
     """Return the recorder's status; state "silent" where it publishes none."""
     link = request.app.state.link
-    document: dict[str, Any] | None = link.document("recording_status", _STATUS_AGE_S)
+    document: dict[str, Any] | None = link.document(topics.RECORDING_STATUS, _STATUS_AGE_S)
     return {"state": "silent"} if document is None else document
 
 
@@ -140,7 +142,7 @@ def start(request: Request, body: RecordingBody | None = None) -> RequestPublish
             str(refusal),
             "names as in vla-deploy record topics",
         ) from refusal
-    link.publish("recording_request", recording.document())
+    link.writer(topics.RECORDING_REQUEST).publish(recording.document())
     return RequestPublished()
 
 
@@ -148,7 +150,7 @@ def start(request: Request, body: RecordingBody | None = None) -> RequestPublish
 def stop(request: Request) -> RequestPublished:
     """Ask the recorder to end its recording."""
     link = request.app.state.link
-    link.publish("recording_request", {"act": STOP, "source": link.source})
+    link.writer(topics.RECORDING_REQUEST).publish({"act": STOP, "source": link.source})
     return RequestPublished()
 
 
@@ -159,13 +161,13 @@ def _folder(request: Request) -> RecordingFolder:
 @replay_router.post("/replay", dependencies=[_Operator])
 def replay(request: Request, body: ReplayBody) -> RequestPublished:
     """Ask the replay; 409 where a robot runs."""
-    link: Any = request.app.state.link
-    if link.document("replay_status", _STATUS_AGE_S) is None:
+    link: RobotLink = request.app.state.link
+    if link.document(topics.REPLAY_STATUS, _STATUS_AGE_S) is None:
         raise ApiError(
             HTTPStatus.CONFLICT,
             "no_replay",
             "nothing is replayed here",
             "begin one: vla-deploy replay FILE",
         )
-    link.publish("replay_request", body.model_dump())
+    link.writer(topics.REPLAY_REQUEST).publish({"act": body.act, "value": body.value})
     return RequestPublished()

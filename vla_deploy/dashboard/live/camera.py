@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.dashboard.live.message import Binary, LiveMessage, LookTime, binary_message
-from vla_deploy.ipc import Frame, SharedSpace
+from vla_deploy.ipc import Frame, SharedSpace, topics
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots import RobotDescription
@@ -37,9 +37,9 @@ class Detections:
     def __init__(self, space: SharedSpace, robot: RobotDescription, tree: KinematicTree) -> None:
         self._robot = robot
         self._tree = tree
-        self._scene = space.cell_reader("scene")
-        self._pose = space.cell_reader("pose")
-        self._joints = space.cell_reader("joint_state")
+        self._scene = space.cell_reader(topics.SCENE)
+        self._pose = space.cell_reader(topics.POSE)
+        self._joints = space.cell_reader(topics.JOINT_STATE)
 
     def in_frame(self, frame: Frame) -> list[dict[str, Any]]:
         """Return the detections in an image: names, confidence, and boxes in its pixels."""
@@ -116,8 +116,8 @@ class CameraFeed:
     period_s = 0.2
 
     def __init__(self, space: SharedSpace, detections: Detections) -> None:
-        self._pulse = space.pulse_reader("rgbd")
-        self._frames = space.frame_reader("rgbd")
+        self._pulse = space.pulse_reader(topics.RGBD)
+        self._frames = space.frame_reader(topics.RGBD)
         self._detections = detections
         self._picture: CameraImage | None = None
         self._sequence = 0

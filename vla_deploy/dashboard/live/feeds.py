@@ -27,6 +27,7 @@ from vla_deploy.ipc import (
     SharedSpace,
     Topic,
     TopicKind,
+    topics,
 )
 from vla_deploy.ipc.memory.layout import is_document
 
@@ -67,7 +68,7 @@ PACKINGS: Final[Mapping[str, Packing]] = {
 class CellFeed:
     """Send the newest value of a cell, once."""
 
-    def __init__(self, topic: Topic, cell: CellReader, extra: Mapping[str, Any]) -> None:
+    def __init__(self, topic: Topic[Any], cell: CellReader, extra: Mapping[str, Any]) -> None:
         """Take `extra`, which is added to every value of packed fields."""
         self.topic = topic.name
         self.period_s = period_s_of(topic)
@@ -97,7 +98,7 @@ class RingFeed:
 
     period_s = EVENTS_S
 
-    def __init__(self, topic: Topic, ring: RingReader) -> None:
+    def __init__(self, topic: Topic[Any], ring: RingReader) -> None:
         self.topic = topic.name
         self._ring = ring
 
@@ -121,7 +122,7 @@ class RingFeed:
 def topic_feeds(space: SharedSpace, joint_names: Sequence[str]) -> list[LiveFeed]:
     """Return a feed for each cell and each event ring of the schema table."""
     extra = {"joint_state": {"names": list(joint_names)}}
-    make: Mapping[TopicKind, Callable[[Topic], LiveFeed]] = {
+    make: Mapping[TopicKind, Callable[[Topic[Any]], LiveFeed]] = {
         TopicKind.CELL: lambda topic: CellFeed(
             topic, space.cell_reader(topic.name), extra.get(topic.name, {})
         ),
@@ -132,13 +133,13 @@ def topic_feeds(space: SharedSpace, joint_names: Sequence[str]) -> list[LiveFeed
     return [make[topic.kind](topic) for topic in TOPICS if topic.kind in make]
 
 
-def period_s_of(topic: Topic) -> float:
+def period_s_of(topic: Topic[Any]) -> float:
     """Return the shortest time between two messages of a cell."""
     own_s = 1.0 / topic.rate_hz if topic.rate_hz else ON_CHANGE_S
     return PERIODS_S.get(topic.name, max(FASTEST_S, own_s))
 
 
-def unpacked(sample: Sample, topic: Topic) -> dict[str, Any]:
+def unpacked(sample: Sample, topic: Topic[Any]) -> dict[str, Any]:
     """Return packed fields as JSON values: rounded, arrays cut to their used length."""
     packing = PACKINGS.get(topic.name, Packing())
     record = sample.data
@@ -202,7 +203,7 @@ class TopicTable:
         rows = [self._row(topic, counted, now) for topic, counted in self._counted]
         return (json_message(self.topic, now.run_ns, now, {"topics": rows}),)
 
-    def _row(self, topic: Topic, counted: _Counted, now: LookTime) -> dict[str, Any]:
+    def _row(self, topic: Topic[Any], counted: _Counted, now: LookTime) -> dict[str, Any]:
         beat = counted.pulse.latest()
         rate_hz = None if beat is None else counted.rate_hz(now.run_ns, beat.sequence)
         ring = self._rings.get(topic.name)
@@ -226,8 +227,8 @@ class PathFeed:
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
         self._clock = clock
         self._due_ns = 0
-        self._pose = space.cell_reader("pose")
-        self._executor = space.cell_reader("executor_status")
+        self._pose = space.cell_reader(topics.POSE)
+        self._executor = space.cell_reader(topics.EXECUTOR_STATUS)
         self._driven: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
         self._sent: tuple[int, int, object] | None = None
         self._points = 0

@@ -28,7 +28,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Operator
-from vla_deploy.ipc import RecordWriter
+from vla_deploy.ipc import RecordWriter, topics
 from vla_deploy.ipc.page_sound import NOTHING, RATES_HZ, PageSound, Samples, SoundStep
 
 LARGEST_S: Final = 1.0
@@ -140,7 +140,7 @@ class PageMicrophones:
         self.clock = MonotonicClock()
         """Real time, in which people speak, also where the robot runs in a twin's time."""
         self._link = link
-        self._records: RecordWriter = link.space.record_writer("page_sound")
+        self._records: RecordWriter = link.space.record_writer(topics.PAGE_SOUND)
 
     def check_speech(self) -> None:
         """Check that the speech process listens.
@@ -148,7 +148,7 @@ class PageMicrophones:
         Raises:
             SpeechTurnRefused: the speech process does not run.
         """
-        if self._link.fresh("speech_status", _STATUS_AGE_S) is None:
+        if self._link.fresh(topics.SPEECH_STATUS, _STATUS_AGE_S) is None:
             raise SpeechTurnRefused(1013, "the robot's speech process does not run")
 
     def publish(self, turn: "TurnConnection", step: SoundStep, samples: Samples = NOTHING) -> None:

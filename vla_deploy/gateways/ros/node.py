@@ -32,8 +32,8 @@ from vla_deploy.gateways.ros.outward.voice import VoiceTopics
 from vla_deploy.gateways.ros.parameters import handed_over_parameters
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
-from vla_deploy.ipc import CellWriter
-from vla_deploy.ipc.ros_goals import STATUS
+from vla_deploy.ipc import CellWriter, topics
+from vla_deploy.ipc.payloads.services import RosStatus
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts
 from vla_deploy.runtime.node import NodeContext
@@ -62,11 +62,11 @@ class RosGatewayNode:
         given, profile = handed_over_parameters(), load_profile(context.profile)
         self._parameters = holding(given, self._robot, profile)
         self._graph: GraphLink | None = None
-        self._status: CellWriter
+        self._status: CellWriter[RosStatus]
 
     def start(self) -> None:
         """Join the graph."""
-        self._status = self._link.space.cell_writer(STATUS)
+        self._status = self._link.space.cell_writer(topics.ROS_STATUS)
         for leftover in remove_leftovers():
             _log.info("removed %s, which a killed process of ROS has left", leftover.name)
         self._graph = GraphLink(self._parameters)

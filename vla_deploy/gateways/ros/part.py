@@ -8,6 +8,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.conversions import RosTime
 from vla_deploy.gateways.ros.graph import GraphLink, JsonTopic
+from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
 
@@ -30,7 +31,7 @@ class Gateway:
 
     def control_status(self) -> Mapping[str, Any] | None:
         """Return how control is, or None where it is silent."""
-        return self.link.document("control_status", _STATUS_AGE_S)
+        return self.link.document(topics.CONTROL_STATUS, _STATUS_AGE_S)
 
 
 class GatewayPart(Protocol):

@@ -1,8 +1,7 @@
 """Share the newest value of something: the writer never waits, the reader never blocks."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 
@@ -13,13 +12,13 @@ from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.ipc.memory.record import Scratch
 from vla_deploy.ipc.memory.segment import Segment
 from vla_deploy.ipc.memory.slot import SlotContent, SlotReader, SlotWriter
-from vla_deploy.ipc.topics import Topic
+from vla_deploy.ipc.topics import P, Topic
 
 _READ_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
+class Sample(Generic[P]):
     """Carry one whole value of a cell; its bytes are a private, read-only copy."""
 
     topic: str
@@ -41,7 +40,7 @@ class Sample:
         record: np.void = np.frombuffer(self.payload, self.dtype)[0]
         return record
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> P:
         """Return the JSON object.
 
         Raises:
@@ -49,17 +48,18 @@ class Sample:
         """
         if self.dtype is not None:
             raise BadPayload(f"topic {self.topic} carries packed fields: read data[name]")
-        return decode(self.payload)
+        document: P = decode(self.payload)
+        return document
 
     def age_s(self, now_ns: int) -> float:
         """Return how long ago the value was put."""
         return (now_ns - self.stamp_ns) / NS_PER_S
 
 
-class CellWriter:
+class CellWriter(Generic[P]):
     """Put values of one cell, one process at a time."""
 
-    def __init__(self, segment: Segment, topic: Topic, clock: Clock) -> None:
+    def __init__(self, segment: Segment, topic: Topic[P], clock: Clock) -> None:
         self._segment = segment
         self._topic = topic
         self._clock = clock
@@ -89,7 +89,7 @@ class CellWriter:
         scratch.fill(fields)
         self._publish(scratch.payload)
 
-    def put_document(self, document: Mapping[str, Any]) -> None:
+    def put_document(self, document: P) -> None:
         """Publish a JSON object.
 
         Raises:
@@ -116,18 +116,18 @@ class CellWriter:
         self._segment.newest = sequence
 
 
-class CellReader:
+class CellReader(Generic[P]):
     """Get the newest whole value of one cell; `torn` counts the slots that were not whole."""
 
-    def __init__(self, segment: Segment, topic: Topic) -> None:
+    def __init__(self, segment: Segment, topic: Topic[P]) -> None:
         self.torn = 0
         self._segment = segment
         self._topic = topic
         self._dtype = None if is_document(topic) else record_dtype(topic)
         self._slots = SlotReader(segment.memory, segment.layout, payload_crc=True)
-        self._last: Sample | None = None
+        self._last: Sample[P] | None = None
 
-    def latest(self) -> Sample | None:
+    def latest(self) -> Sample[P] | None:
         """Return the newest whole value, or None before the first one.
 
         A torn slot falls back to the one before it; should the writer come around during every
@@ -156,7 +156,7 @@ class CellReader:
             self.torn += 1
         return None
 
-    def _sample(self, content: SlotContent) -> Sample:
+    def _sample(self, content: SlotContent) -> Sample[P]:
         return Sample(
             topic=self._topic.name,
             payload=content.payload,

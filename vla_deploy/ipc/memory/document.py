@@ -9,7 +9,7 @@ from vla_deploy.ipc.topics import Topic
 _SHOWN_CHARACTERS = 80
 
 
-def encode(document: object, topic: Topic, limit_bytes: int) -> bytes:
+def encode(document: object, topic: Topic[Any], limit_bytes: int) -> bytes:
     """Return compact UTF-8 JSON.
 
     Raises:
@@ -31,7 +31,6 @@ def encode(document: object, topic: Topic, limit_bytes: int) -> bytes:
     return payload
 
 
-def decode(payload: bytes) -> dict[str, Any]:
+def decode(payload: bytes) -> Any:
     """Return the JSON object of a payload that its CRC has confirmed."""
-    document: dict[str, Any] = json.loads(payload)
-    return document
+    return json.loads(payload)

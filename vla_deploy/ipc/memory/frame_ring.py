@@ -1,6 +1,7 @@
 """Share the newest images: a reader copies one and checks that nobody wrote it meanwhile."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.errors import BadPayload
@@ -29,7 +30,7 @@ class Frame:
 class FrameWriter:
     """Put images of one topic; a single process owns it."""
 
-    def __init__(self, segment: Segment, topic: Topic) -> None:
+    def __init__(self, segment: Segment, topic: Topic[Any]) -> None:
         self.unheard = 0
         self._segment = segment
         self._topic = topic

@@ -2,6 +2,7 @@
 
 import zlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class SlotLayout:
         return self.offset(sequence) + self.stride_bytes - SLOT_TRAILER_BYTES
 
 
-def layout_of(topic: Topic) -> SlotLayout:
+def layout_of(topic: Topic[Any]) -> SlotLayout:
     """Lay out a topic: slot header, payload, trailer, rounded up to cache lines."""
     capacity = payload_capacity(topic)
     used = SLOT_HEADER_BYTES + capacity + SLOT_TRAILER_BYTES
@@ -50,7 +51,7 @@ def layout_of(topic: Topic) -> SlotLayout:
     return SlotLayout(slots=max(topic.slots, 3), capacity_bytes=capacity, stride_bytes=stride)
 
 
-def payload_capacity(topic: Topic) -> int:
+def payload_capacity(topic: Topic[Any]) -> int:
     """Return how many payload bytes one slot of the topic takes."""
     if topic.kind is not TopicKind.CELL:
         return topic.slot_bytes
@@ -59,12 +60,12 @@ def payload_capacity(topic: Topic) -> int:
     return record_dtype(topic).itemsize
 
 
-def is_document(topic: Topic) -> bool:
+def is_document(topic: Topic[Any]) -> bool:
     """Return whether a cell carries one bounded JSON text instead of packed fields."""
     return any(field.dtype == "json" for field in topic.fields)
 
 
-def record_dtype(topic: Topic) -> "np.dtype[np.void]":
+def record_dtype(topic: Topic[Any]) -> "np.dtype[np.void]":
     """Build the little-endian, aligned record of a packed cell."""
     columns = [
         (field.name, f"<{field.dtype}", (field.shape,) if field.shape > 1 else ())
@@ -73,13 +74,13 @@ def record_dtype(topic: Topic) -> "np.dtype[np.void]":
     return np.dtype(columns, align=True)
 
 
-def schema_hash(topic: Topic) -> int:
+def schema_hash(topic: Topic[Any]) -> int:
     """Sum up everything that decides the bytes; two processes must agree on it."""
     fields = ",".join(f"{field.name}:{field.dtype}:{field.shape}" for field in topic.fields)
     text = f"{VERSION}|{topic.name}|{topic.kind.name}|{topic.slots}|{topic.slot_bytes}|{fields}"
     return zlib.crc32(text.encode())
 
 
-def file_name(topic: Topic) -> str:
+def file_name(topic: Topic[Any]) -> str:
     """Name the topic's file inside the shared directory."""
     return f"{topic.name}.{_SUFFIX[topic.kind]}"

@@ -14,7 +14,7 @@ from vla_deploy.ipc.topics import Topic
 class Scratch:
     """Hold one record of a topic, its columns as views and its bytes, allocated once."""
 
-    def __init__(self, topic: Topic) -> None:
+    def __init__(self, topic: Topic[Any]) -> None:
         array = np.zeros(1, record_dtype(topic))
         self.record: np.void = array[0]
         self.payload = array.view(np.uint8).data

@@ -5,6 +5,7 @@ A record longer than a slot takes several; two words in each slot say which part
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from drivers.clock import Clock
 from vla_deploy.ipc.errors import BadPayload
@@ -26,7 +27,7 @@ class Record:
 class RecordWriter:
     """Append records of one topic; a single process owns it, and nobody is woken."""
 
-    def __init__(self, segment: Segment, topic: Topic, clock: Clock) -> None:
+    def __init__(self, segment: Segment, topic: Topic[Any], clock: Clock) -> None:
         self._segment = segment
         self._topic = topic
         self._clock = clock

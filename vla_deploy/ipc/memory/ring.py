@@ -1,41 +1,40 @@
 """Hand on events in order: bounded, and a slow reader is told how many it lost."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Generic
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.memory.document import decode, encode
 from vla_deploy.ipc.memory.doorbell import ring_bells
 from vla_deploy.ipc.memory.segment import Segment
 from vla_deploy.ipc.memory.slot import SlotReader, SlotWriter
-from vla_deploy.ipc.topics import Topic
+from vla_deploy.ipc.topics import P, Topic
 
 _PATIENCE_NS = NS_PER_S // 100  # writers hold a ring for microseconds
 _AHEAD = 8  # of a frozen writer, and of those that follow it once it goes on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
+class Event(Generic[P]):
     """Carry one event."""
 
-    payload: dict[str, Any]
+    payload: P
     stamp_ns: int
     sequence: int
     writer_pid: int
 
 
-class RingWriter:
+class RingWriter(Generic[P]):
     """Publish events of one topic; several processes may."""
 
-    def __init__(self, segment: Segment, topic: Topic, clock: Clock) -> None:
+    def __init__(self, segment: Segment, topic: Topic[P], clock: Clock) -> None:
         self.unheard = 0
         self._segment = segment
         self._topic = topic
         self._clock = clock
         self._slots = SlotWriter(segment.memory, segment.layout, payload_crc=True)
 
-    def publish(self, payload: Mapping[str, Any]) -> int:
+    def publish(self, payload: P) -> int:
         """Append one event, wake the listeners, and return its sequence.
 
         Raises:
@@ -46,7 +45,7 @@ class RingWriter:
             sequence = self._append(data)
         return self._announce(sequence)
 
-    def force(self, payload: Mapping[str, Any]) -> int:
+    def force(self, payload: P) -> int:
         """Publish as well where another writer holds the ring for long, as one that is frozen does.
 
         The slots that it and the next may be writing are left to them; readers count those as torn
@@ -84,7 +83,7 @@ class RingWriter:
         self._segment.close()
 
 
-class RingReader:
+class RingReader(Generic[P]):
     """Read events in order, each once; `lost` were overwritten unread, `torn` were not whole."""
 
     def __init__(self, segment: Segment, *, from_start: bool) -> None:
@@ -94,7 +93,7 @@ class RingReader:
         self._slots = SlotReader(segment.memory, segment.layout, payload_crc=True)
         self._position = 0 if from_start else segment.newest
 
-    def drain(self) -> list[Event]:
+    def drain(self) -> list[Event[P]]:
         """Return every event since the last call, oldest first."""
         newest = self._segment.newest
         if newest == self._position:
@@ -109,7 +108,7 @@ class RingReader:
         """Unmap the ring."""
         self._segment.close()
 
-    def _read(self, sequence: int) -> Event | None:
+    def _read(self, sequence: int) -> Event[P] | None:
         content = self._slots.read(sequence)
         if content is not None:
             return Event(

@@ -34,7 +34,7 @@ class Segment:
         SpaceUnavailable: the file cannot be opened or its memory cannot be reserved.
     """
 
-    def __init__(self, directory: Path, topic: Topic, *, writable: bool) -> None:
+    def __init__(self, directory: Path, topic: Topic[Any], *, writable: bool) -> None:
         self.path = directory / file_name(topic)
         self.layout = layout_of(topic)
         self._fd = _open(self.path)
@@ -111,13 +111,13 @@ def _open(path: Path) -> int:
         ) from error
 
 
-def _is_laid_out(fd: int, topic: Topic, layout: SlotLayout) -> bool:
+def _is_laid_out(fd: int, topic: Topic[Any], layout: SlotLayout) -> bool:
     """Return whether the file is as expected; its header is written last."""
     is_whole = os.fstat(fd).st_size == layout.file_bytes
     return is_whole and _header(fd) == _expected_header(topic, layout)
 
 
-def _expected_header(topic: Topic, layout: SlotLayout) -> tuple[object, ...]:
+def _expected_header(topic: Topic[Any], layout: SlotLayout) -> tuple[object, ...]:
     return (_MAGIC, VERSION, schema_hash(topic), layout.file_bytes, _boot_id())
 
 
@@ -125,7 +125,7 @@ def _header(fd: int) -> tuple[Any, ...]:
     return _HEADER.unpack(os.pread(fd, _HEADER.size, 0).ljust(_HEADER.size, b"\0"))
 
 
-def _create_or_check(fd: int, path: Path, topic: Topic, layout: SlotLayout) -> None:
+def _create_or_check(fd: int, path: Path, topic: Topic[Any], layout: SlotLayout) -> None:
     expected, found = _expected_header(topic, layout), _header(fd)
     # A blank header is a creator that was killed; another boot's file has no living writer.
     if found[0] == bytes(len(_MAGIC)) or found[4] != expected[4]:

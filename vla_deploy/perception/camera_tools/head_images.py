@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.perception.camera_tools.board import Image
 from vla_deploy.perception.camera_tools.errors import BadImages
@@ -59,11 +60,11 @@ def live_images(link: RobotLink, robot: RobotDescription, seconds: float) -> Ite
     joints, seen, clock = JointHistory(), -1, link.clock
     end_ns = clock.now_ns() + round(seconds * NS_PER_S)
     while clock.now_ns() < end_ns:
-        state = link.fresh("joint_state")
+        state = link.fresh(topics.JOINT_STATE)
         if state is not None:
             count = len(robot.joint_names)
             joints.add(state.stamp_ns, np.array(state.data["position"][:count], dtype=np.float64))
-        frame = link.frame("rgbd", _IMAGE_AGE_S)
+        frame = link.frame(topics.RGBD, _IMAGE_AGE_S)
         if frame is not None and frame.sequence != seen:
             seen = frame.sequence
             positions = _still_positions(joints, frame.stamp_ns)

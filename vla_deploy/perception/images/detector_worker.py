@@ -8,12 +8,13 @@ that would take away a detector at work is refused instead.
 import logging
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.ipc.payloads.scene import SightDocument
 from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detector
 from vla_deploy.perception.detectors.image_input import Image
 from vla_deploy.perception.images.network_view import NetworkView
@@ -130,7 +131,7 @@ class DetectorWorker:
         self._failures, self._trouble = 0, ""
         return DetectorAnswer(view=view)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> SightDocument:
         """Return how things are named at present, for the scene topic."""
         detector = self._loaded.detector
         return {

@@ -9,7 +9,7 @@ their own rules.
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final
+from typing import Final
 
 from vla_deploy.perception.images.frame_statistics import FrameStatistics
 
@@ -141,10 +141,6 @@ class ImageVerdict:
 
     use: ImageUse
     faults: tuple[str, ...]
-
-    def document(self) -> dict[str, Any]:
-        """Return the verdict for the scene topic."""
-        return {"use": self.use.name.lower(), "faults": list(self.faults)}
 
 
 def judge_frame(seen: FrameStatistics) -> ImageVerdict:

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
+from vla_deploy.ipc.payloads.scene import ImageStatus
 from vla_deploy.perception.geometry.cloud import Floats
 from vla_deploy.perception.images.frame_check import (
     STALE_COLOUR_RATIO,
@@ -107,13 +108,17 @@ class FrameMonitor:
         self._refused += self._verdict.use is ImageUse.NOTHING
         return self._verdict
 
-    def document(self, now_ns: int) -> dict[str, Any]:
+    def document(self, now_ns: int) -> ImageStatus:
         """Return the verdict on the last image, or that none arrives, for the scene topic."""
         if self._received_ns is None:
             self._received_ns = now_ns
         silence = judge_frame(FrameStatistics(silent_s=(now_ns - self._received_ns) / NS_PER_S))
         verdict = silence if silence.faults else self._verdict
-        return {**verdict.document(), "refused": self._refused}
+        return {
+            "use": verdict.use.name.lower(),
+            "faults": list(verdict.faults),
+            "refused": self._refused,
+        }
 
     def _unmoved_rad(self, signature: FrameSignature, view: CameraView) -> float:
         if self._unmoved is None or not signature.shows_the_same(self._unmoved[0]):

@@ -1,13 +1,14 @@
 """Process the camera's images: near obstacles at once, things once the detector has answered."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.client.place_state import PlaceState
+from vla_deploy.ipc.payloads.scene import RobotPlace, SceneDocument
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
@@ -87,19 +88,20 @@ class ImagePipeline:
         for hand in self._body.hands(positions, now_ns):
             self.scene.hold(hand.name, hand.hold, hand.grip, pose, now_ns)
 
-    def document(self, now_ns: int) -> dict[str, Any]:
-        """Return the scene topic's document, with how things are named, and how images are.
+    def document(self, now_ns: int, away: dict[str, str]) -> SceneDocument:
+        """Return the scene topic's document; `away` says why sensors give nothing.
 
         The robot's own pose is in it as long as it is not lost.
         """
         pose = self._localiser.pose
         is_lost = self._localiser.state is PlaceState.LOST
-        robot = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
+        robot: RobotPlace = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
         return {
             **self.scene.document(),
             "robot": None if is_lost else robot,
             "sight": self._worker.document(),
             "image": self._monitor.document(now_ns),
+            "away": away,
         }
 
     def _posed(self, frame: RgbdFrame, positions: Array, turn_rad_s: float) -> PosedImage:

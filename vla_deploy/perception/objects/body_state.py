@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellReader, Sample, SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace, topics
+from vla_deploy.ipc.payloads.scene import HandDocument
 from vla_deploy.perception.geometry.body_mask import BodyMask
 from vla_deploy.perception.naming.classes import OTHER
 from vla_deploy.robots import RobotDescription
@@ -86,9 +87,10 @@ class Hold:
         """Return whether the hand lost what it was to hold, rather than putting it down."""
         return not self.kind and self.touch.grip is Grip.LOST
 
-    def document(self) -> dict[str, Any]:
-        """Return it for the scene topic."""
+    def document(self, holding: str | None) -> HandDocument:
+        """Return it for the scene topic; `holding` is the id of what is held."""
         return {
+            "holding": holding,
             "class": self.kind or None,
             "told": self.reported or None,
             "felt": self.touch.grip.value,
@@ -158,8 +160,8 @@ class BodyState:
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics."""
-        self._joint_state: CellReader = space.cell_reader("joint_state")
-        self._executor_status: CellReader = space.cell_reader("executor_status")
+        self._joint_state = space.cell_reader(topics.JOINT_STATE)
+        self._executor_status = space.cell_reader(topics.EXECUTOR_STATUS)
 
     def read(self) -> None:
         """Take the newest joint state."""

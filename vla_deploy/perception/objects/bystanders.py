@@ -5,10 +5,11 @@ person's or a chair's size at all; a box for which it is not is dropped.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from vla_deploy.ipc.payloads.scene import BystanderDocument
 from vla_deploy.perception.geometry.cloud import Cloud, Floats
 from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.perception.naming.classes import BYSTANDERS, Range
@@ -37,7 +38,7 @@ class Bystander:
     top_m: float
     confidence: float
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> BystanderDocument:
         """Return the obstacle for the scene topic."""
         return {
             "class": self.class_name,

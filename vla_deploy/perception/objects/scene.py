@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vla_deploy.ipc.payloads.scene import HandDocument, KnownThings, SurfaceDocument, ThingDocument
 from vla_deploy.perception.geometry.cloud import Cloud, PosedImage, make_cloud
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.perception.geometry.placement import turned
@@ -54,9 +55,9 @@ class Scene:
         self._tracker = Tracker()
         self._book = SurfaceBook(furniture)
         self.stamp_ns = 0
-        self._surfaces: list[dict[str, Any]] = []
+        self._surfaces: list[SurfaceDocument] = []
         self._bystanders: list[Bystander] = []
-        self._hands: dict[str, dict[str, Any]] = {}
+        self._hands: dict[str, HandDocument] = {}
 
     def restore(self, document: Mapping[str, Any]) -> None:
         """Restore what an earlier instance in this run knew, as not in view now.
@@ -111,9 +112,9 @@ class Scene:
             self._tracker.release(hand)
             before.rests = self._rest_of(before, LET_GO)
         name = held.object_id if held is not None and hold.kind else None
-        self._hands[hand] = {"holding": name, **hold.document()}
+        self._hands[hand] = hold.document(name)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> KnownThings:
         """Return the scene topic's document."""
         lost = [track.document() for track in self._tracker.vanished[-MAX_LOST:]]
         known = [track.document() for track in self._tracker.objects]
@@ -130,7 +131,7 @@ class Scene:
         things = [one.thing for one in self._tracker.objects]
         return rest_of(track.thing, things, self._book.surfaces, begin)
 
-    def _surface(self, support: Support, base: Pose2D) -> dict[str, Any]:
+    def _surface(self, support: Support, base: Pose2D) -> SurfaceDocument:
         """Return a surface for the scene topic: the part in view, in the map frame."""
         x, y = (float(v) for v in support.outline.mean(axis=0))
         polygon_m = [base.outward(float(u), float(v)) for u, v in support.outline]
@@ -142,13 +143,13 @@ class Scene:
         }
 
 
-def _within(room_bytes: int, documents: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _within(room_bytes: int, documents: list[ThingDocument]) -> list[ThingDocument]:
     """Return as many of the first documents as there is room for."""
     sums = itertools.accumulate(_size([one]) for one in documents)
     return [one for one, total in zip(documents, sums, strict=True) if total <= room_bytes]
 
 
-def _size(documents: list[dict[str, Any]]) -> int:
+def _size(documents: list[ThingDocument]) -> int:
     return len(json.dumps(documents, separators=(",", ":")))
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vla_deploy.ipc.payloads.scene import ThingDocument
 from vla_deploy.perception.geometry.shapes import half_turn
 from vla_deploy.perception.images.detection import Detection, Vector
 from vla_deploy.perception.naming.class_fusion import NameEvidence
@@ -116,9 +117,9 @@ class Track:
             aliases=self.aliases,
         )
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> ThingDocument:
         """Return the thing for the scene topic."""
-        document: dict[str, Any] = {
+        document: ThingDocument = {
             "id": self.object_id,
             "class": self.class_name,
             "colour": self.colour,

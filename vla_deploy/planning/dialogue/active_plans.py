@@ -1,10 +1,11 @@
 """Remember what is under way: the command that is being planned, the plans that are carried out."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
+from vla_deploy.ipc.payloads.tasks import SetbackEvent
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult
@@ -64,7 +65,7 @@ class ActivePlans:
         known = self._active.get(command_id)
         return None if known is None else known[1]
 
-    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> UserCommand:
+    def set_back(self, command_id: str, setback: SetbackEvent) -> UserCommand:
         """Note that a plan failed, and return the command to plan anew.
 
         Raises:

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.ipc import Event
+from vla_deploy.ipc.payloads.tasks import PlanMessage, TaskEvent, Utterance
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.steering import awaiting, is_stop
@@ -80,24 +81,27 @@ class PlannedCommand:
         return self.command.awaits_word or (proposal is not None and proposal.awaits_word)
 
 
-def asks_to_stop(event: Event) -> bool:
+CommandEvent = Event[Utterance] | Event[TaskEvent] | Event[PlanMessage]
+
+
+def asks_to_stop(event: Event[Utterance]) -> bool:
     """Return whether the words of an utterance want what is under way to end."""
     return is_stop(str(event.payload.get("text", "")))
 
 
-def command_id_of(event: Event) -> str:
+def command_id_of(event: CommandEvent) -> str:
     """Return the id that answers to an utterance carry; one that is too long is cut."""
     return str(event.payload.get("command_id", ""))[:_ID_CHARACTERS]
 
 
-def read_command(event: Event) -> UserCommand:
+def read_command(event: Event[Utterance]) -> UserCommand:
     """Return the command that an utterance holds.
 
     Raises:
         CommandUnreadable: it holds none, or one that is too long.
         NotUnderstood: there are no words in it.
     """
-    given = event.payload
+    given: Mapping[str, Any] = event.payload
     plan = given.get("plan")
     text = _words(given) if plan is None else ""
     rest = awaiting(text)

@@ -2,14 +2,15 @@
 
 import logging
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from threading import Event
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import Clock
+from vla_deploy.ipc.payloads.tasks import MemoryStatus, PlannerStatus, SetbackEvent
 from vla_deploy.planning.dialogue.active_plans import ActivePlans, AsyncPlanner
 from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
 from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
@@ -150,7 +151,7 @@ class CommandManager:
         if self._active.end(command_id) is not None:
             self.dialogue.ended(command_id, False, error)
 
-    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> None:
+    def set_back(self, command_id: str, setback: SetbackEvent) -> None:
         """Plan a command anew whose plan has failed, before any other, or say that it ends."""
         try:
             self._queue.appendleft(self._active.set_back(command_id, setback))
@@ -168,8 +169,8 @@ class CommandManager:
             self._guarded(command, partial(self._begin, command))
             self._look_after_job()
 
-    def document(self) -> dict[str, Any]:
-        """Return which commands are in work, what was asked, and the counts."""
+    def document(self, memory: MemoryStatus | None) -> PlannerStatus:
+        """Return which commands are in work, what was asked, and the counts; and of `memory`."""
         pending, held = self.dialogue.pending, self.dialogue.held
         waiting = [one.command for one in (pending, held) if one is not None]
         in_work = (self._async.command, *waiting, *self._queue)
@@ -180,6 +181,7 @@ class CommandManager:
             "question": None if asked is None else asked.question.text,
             **self.planner.document(),
             "prohibitions": self._prohibitions.document(),
+            "memory": memory,
         }
 
     def _begin(self, command: UserCommand) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from drivers.clock import Clock
+from vla_deploy.ipc.payloads.tasks import PlannerCounts
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import (
@@ -57,9 +58,16 @@ class PlannerMetrics:
         for one in attempts:
             self.by_rung[one.back_end][one.outcome.value] += 1
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> PlannerCounts:
         """Return the counts as JSON takes them."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return {
+            "heard": self.heard,
+            "planned": self.planned,
+            "refused": self.refused,
+            "asked": self.asked,
+            "failed": self.failed,
+            "by_rung": self.by_rung,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

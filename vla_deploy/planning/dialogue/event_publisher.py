@@ -1,10 +1,11 @@
 """Publish what becomes of commands: as events, as plans for the executor, and aloud."""
 
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.announcer import Announcer
+from vla_deploy.ipc.payloads.tasks import AttemptDocument, PlanEvent, RejectedEvent
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.phrasing import Says, first_part
 from vla_deploy.planning.interfaces import PlanningResult
@@ -21,8 +22,8 @@ class PlannerEvents:
     """Publish the planner's side of every command."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
-        self._plans: RingWriter = space.ring_writer("plan")
-        self._events: RingWriter = space.ring_writer("task_event")
+        self._plans = space.ring_writer(topics.PLAN)
+        self._events = space.ring_writer(topics.TASK_EVENT)
         self._voice = Announcer(space, "planner", clock)
 
     def say(self, command: UserCommand, text: str) -> None:
@@ -43,11 +44,13 @@ class PlannerEvents:
 
     def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
         """Publish that a plan takes time, and which back ends are asked."""
-        self._publish(command, "planning", rungs=list(back_ends))
+        self._events.publish(
+            {"command_id": command.command_id, "event": "planning", "rungs": list(back_ends)}
+        )
 
     def queued(self, command: UserCommand, place: int) -> None:
         """Publish that others are planned first."""
-        self._publish(command, "queued", place=place)
+        self._events.publish({"command_id": command.command_id, "event": "queued", "place": place})
 
     def asked(
         self,
@@ -57,25 +60,36 @@ class PlannerEvents:
         choices: tuple[str, ...] = (),
     ) -> None:
         """Ask what only the person knows; `plan` is what a yes, or one of the choices, lets run."""
-        self._publish(
-            command,
-            "asked",
-            question=_bounded(question.text),
-            choices=[*choices, *(one.words for one in question.candidates)],
-            answer_within_s=question.limit_s,
-            plan=None if plan is None else plan.model_dump(mode="json"),
+        self._events.publish(
+            {
+                "command_id": command.command_id,
+                "event": "asked",
+                "question": _bounded(question.text),
+                "choices": [*choices, *(one.words for one in question.candidates)],
+                "answer_within_s": question.limit_s,
+                "plan": None if plan is None else plan.model_dump(mode="json"),
+            }
         )
         self.say(command, question.text)
 
     def answered(self, answer: UserCommand, asked: UserCommand) -> None:
         """Publish that an utterance answers a question; more events follow for that command."""
-        self._publish(answer, "answered", of=asked.command_id)
+        self._events.publish(
+            {"command_id": answer.command_id, "event": "answered", "of": asked.command_id}
+        )
 
     def refused(
         self, command: UserCommand, reason: str, answer: PlanningResult | None = None
     ) -> None:
         """Publish why nothing is done, and what every back end said."""
-        self._publish(command, "rejected", reason=_bounded(reason), **_attempts(answer))
+        event: RejectedEvent = {
+            "command_id": command.command_id,
+            "event": "rejected",
+            "reason": _bounded(reason),
+        }
+        if answer is not None and answer.attempts:
+            event["attempts"] = _attempts(answer)
+        self._events.publish(event)
 
     def gave_up(self, command_id: str, reason: str) -> None:
         """Let the executor end a command for which there is no other plan."""
@@ -95,12 +109,18 @@ class PlannerEvents:
         """Give a plan to the executor, and publish which back end made it."""
         document = plan.model_dump(mode="json")
         if not command.recovers:
-            self._publish(command, "accepted")
-        self._publish(command, "plan", plan=document, **_maker(answer), **_attempts(answer))
+            self._events.publish({"command_id": command.command_id, "event": "accepted"})
+        event: PlanEvent = {"command_id": command.command_id, "event": "plan", "plan": document}
+        proposal = answer.proposal
+        if proposal is not None:
+            event["rung"] = proposal.back_end
+            event["confidence"] = round(proposal.confidence, 3)
+            if proposal.origin:
+                event["origin"] = proposal.origin
+        if answer.attempts:
+            event["attempts"] = _attempts(answer)
+        self._events.publish(event)
         self._plans.publish({"command_id": command.command_id, "plan": document})
-
-    def _publish(self, command: UserCommand, event: str, **details: Any) -> None:
-        self._events.publish({"command_id": command.command_id, "event": event} | details)
 
 
 def _bounded(reason: str) -> str:
@@ -109,15 +129,5 @@ def _bounded(reason: str) -> str:
     return f"{reason[:_MOST_REASON_CHARACTERS]} ... (and more)"
 
 
-def _maker(answer: PlanningResult) -> dict[str, Any]:
-    proposal = answer.proposal
-    if proposal is None:
-        return {}
-    origin = {"origin": proposal.origin} if proposal.origin else {}
-    return {"rung": proposal.back_end, "confidence": round(proposal.confidence, 3), **origin}
-
-
-def _attempts(answer: PlanningResult | None) -> dict[str, Any]:
-    if answer is None or not answer.attempts:
-        return {}
-    return {"attempts": [one.document() for one in answer.attempts]}
+def _attempts(answer: PlanningResult) -> list[AttemptDocument]:
+    return [one.document() for one in answer.attempts]

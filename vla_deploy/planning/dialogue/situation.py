@@ -7,8 +7,9 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
+from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace, topics
 from vla_deploy.ipc.rgbd_image import colours
+from vla_deploy.ipc.topics import P
 from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
 from vla_deploy.memory.episode import sentence_of, unix_s
 from vla_deploy.model_servers.calls.picture import Image
@@ -50,12 +51,12 @@ class Situation:
         self._robot = robot
         self._memory = memory
         self._is_free = base_planner(robot).is_free
-        self._pose: CellReader = space.cell_reader("pose")
-        self._scene: CellReader = space.cell_reader("scene")
-        self._executor: CellReader = space.cell_reader("executor_status")
-        self._control: CellReader = space.cell_reader("control_status")
-        self._table: CellReader = space.cell_reader("process_table")
-        self._frames: FrameReader = space.frame_reader("rgbd")
+        self._pose = space.cell_reader(topics.POSE)
+        self._scene = space.cell_reader(topics.SCENE)
+        self._executor = space.cell_reader(topics.EXECUTOR_STATUS)
+        self._control = space.cell_reader(topics.CONTROL_STATUS)
+        self._table = space.cell_reader(topics.PROCESS_TABLE)
+        self._frames: FrameReader = space.frame_reader(topics.RGBD)
 
     def request(
         self,
@@ -96,7 +97,7 @@ class Situation:
         """
         table = self._table.latest()
         if table is not None and table.document().get("refusal"):
-            raise NotReadyToMove(str(table.document()["refusal"]))
+            raise NotReadyToMove(table.document()["refusal"])
         control = self._fresh(self._control, STATUS_AGE_S)
         refusal = refusal_of(control.document() if control is not None else None)
         if refusal:
@@ -107,10 +108,10 @@ class Situation:
         sample = self._fresh(self._executor, STATUS_AGE_S)
         if sample is None:
             return {}
-        held: Mapping[str, str | None] = sample.document().get("holding", {})
         hands = scene.hands if scene is not None else {}
         return {
-            name: None if is_denied(hands.get(name), kind) else kind for name, kind in held.items()
+            name: None if is_denied(hands.get(name), kind) else kind
+            for name, kind in sample.document().get("holding", {}).items()
         }
 
     def _here(self) -> Pose | None:
@@ -143,7 +144,7 @@ class Situation:
             _log.warning("%s", error)
             return None
 
-    def _fresh(self, reader: CellReader, age_limit_s: float) -> Sample | None:
+    def _fresh(self, reader: CellReader[P], age_limit_s: float) -> Sample[P] | None:
         sample = reader.latest()
         is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
         return sample if is_fresh else None

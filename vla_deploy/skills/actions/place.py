@@ -202,7 +202,8 @@ def _filled_m(context: SkillContext, container: Mapping[str, Any], held: Held) -
     tops_m = [
         float(one["position_m"][2]) + float(one["size_m"][2]) / 2
         for one in context.link.objects
-        if (one.get("rests") or {}).get("of") == container["id"]
+        if "rests" in one
+        and one["rests"]["of"] == container["id"]
         and (one["class"], one["colour"]) != (held.kind, held.colour)
     ]
     return max(tops_m) + ABOVE_CONTENTS_M - floor_m if tops_m else 0.0

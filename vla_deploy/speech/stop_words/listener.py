@@ -8,15 +8,16 @@ A form of such a word, as in "I have stopped", is no stop word and takes nothing
 
 import logging
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile, SpeechSettings
 from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.speech import StopWordsStatus
 from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.speech.sound import Playing, SoundBlock
@@ -80,7 +81,7 @@ class StopWords:
     def start(self, space: SharedSpace) -> None:
         """Open button and network; why it cannot be opened is told, and the robot goes on."""
         self._button = StopButton(space, self._source, self._clock)
-        self._heard = space.ring_writer("heard")
+        self._heard = space.ring_writer(topics.HEARD)
         try:
             self._spotter = self._open_spotter()
         except InferenceError as error:
@@ -124,7 +125,7 @@ class StopWords:
                 return f"{spotted.word!r} was heard in it: the robot has stopped"
         return ""
 
-    def document(self) -> Mapping[str, Any]:
+    def document(self) -> StopWordsStatus:
         """Return what `speech_status` tells under the listener's name."""
         return {
             "state": self.state,

@@ -12,7 +12,8 @@ from drivers.audio.base import AudioFormat
 from drivers.audio.espeak import ESPEAK, EspeakEngine
 from drivers.clock import NS_PER_S, Clock
 from drivers.errors import VoiceError
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.speech import VoiceEventName, VoiceStatus
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.devices import VoiceSettings
 from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
@@ -75,17 +76,17 @@ class RobotVoice:
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics, and look for the engine."""
-        self._orders = space.ring_reader("say", from_start=False)
-        self._operator = space.ring_reader("operator", from_start=False)
-        self._events = space.ring_writer("voice_event")
+        self._orders = space.ring_reader(topics.SAY, from_start=False)
+        self._operator = space.ring_reader(topics.OPERATOR, from_start=False)
+        self._events = space.ring_writer(topics.VOICE_EVENT)
         missing = self._engine.missing()
         if missing:
             _log.error("degraded: the robot has no voice: %s", missing)
 
     def step(self) -> None:
         """Take what is to be said, and hand the speaker what it has room for."""
-        for event in self._operator.drain():
-            if event.payload.get("act") == ESTOP:
+        for asked in self._operator.drain():
+            if asked.payload.get("act") == ESTOP:
                 self.fall_silent("the robot was stopped")
         for event in self._orders.drain():
             self._take(event.payload)
@@ -104,12 +105,15 @@ class RobotVoice:
         self._drop(self._waiting, reason)
         self._break_off(reason)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> VoiceStatus:
         """Return what `speech_status` tells under "voice"."""
         missing = self._engine.missing()
         why = missing or self._player.away
-        state = "missing" if missing else "away" if why else "ready"
-        return {"state": state, "why": why, "waiting": len(self._waiting)}
+        return {
+            "state": "missing" if missing else "away" if why else "ready",
+            "why": why,
+            "waiting": len(self._waiting),
+        }
 
     def close(self) -> None:
         """Fall silent and release everything; closing twice is allowed."""
@@ -182,12 +186,12 @@ class RobotVoice:
         if saying is not None:
             self._end(saying, "interrupted" if saying.has_begun else "dropped", reason)
 
-    def _end(self, saying: _Saying, event: str, reason: str) -> None:
+    def _end(self, saying: _Saying, event: VoiceEventName, reason: str) -> None:
         self._player.cut()
         self._saying = None
         self._publish(saying.say_id, event, reason)
 
-    def _publish(self, say_id: str, event: str, reason: str) -> None:
+    def _publish(self, say_id: str, event: VoiceEventName, reason: str) -> None:
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
 
 

@@ -3,11 +3,20 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep
 from platforms.probes import Reading
+from vla_deploy.ipc.payloads.supervision import (
+    BoardDocument,
+    BudgetRow,
+    EnforcementRow,
+    LadderStepDocument,
+    ResourceDirectives,
+    StepChange,
+    TakenStep,
+)
 from vla_deploy.supervisor.budgets.enforcement import Enforced
 from vla_deploy.supervisor.budgets.judge import BudgetFinding
 from vla_deploy.supervisor.budgets.ladder import LadderMove, Taken
@@ -17,7 +26,7 @@ _MOST_READINGS: Final = 128
 _OF_A_PROCESS: Final = "gpu_memory_used_bytes."
 
 
-def directives(taken: Iterable[Taken]) -> dict[str, Any]:
+def directives(taken: Iterable[Taken]) -> ResourceDirectives:
     """Return the `resource_directives` document, which the processes follow.
 
     A process with several slow steps in force keeps the smallest of their ratios; each
@@ -42,7 +51,7 @@ def stop_reason(taken: Iterable[Taken]) -> str:
     return stops[0] if stops else ""
 
 
-def rows(findings: Iterable[BudgetFinding], now_ns: int) -> list[dict[str, Any]]:
+def rows(findings: Iterable[BudgetFinding], now_ns: int) -> list[BudgetRow]:
     """Return each line with what was measured and how it stands."""
     return [
         {
@@ -60,7 +69,7 @@ def rows(findings: Iterable[BudgetFinding], now_ns: int) -> list[dict[str, Any]]
     ]
 
 
-def ladder_rows(taken: Iterable[Taken], now_ns: int) -> list[dict[str, Any]]:
+def ladder_rows(taken: Iterable[Taken], now_ns: int) -> list[TakenStep]:
     """Return the steps in force, in the order they were taken."""
     return [
         {**_step(one.step), "since_s": _age_s(one.since_ns, now_ns), "why": _short(one.why)}
@@ -68,7 +77,7 @@ def ladder_rows(taken: Iterable[Taken], now_ns: int) -> list[dict[str, Any]]:
     ]
 
 
-def history_rows(changes: Iterable[LadderMove], now_ns: int) -> list[dict[str, Any]]:
+def history_rows(changes: Iterable[LadderMove], now_ns: int) -> list[StepChange]:
     """Return the latest changes, oldest first."""
     return [
         {
@@ -81,7 +90,7 @@ def history_rows(changes: Iterable[LadderMove], now_ns: int) -> list[dict[str, A
     ]
 
 
-def board(readings: Iterable[Reading]) -> dict[str, Any]:
+def board(readings: Iterable[Reading]) -> BoardDocument:
     """Return what the probes read, or why not, without the readings of single processes."""
     values: dict[str, float] = {}
     missing: dict[str, str] = {}
@@ -93,7 +102,7 @@ def board(readings: Iterable[Reading]) -> dict[str, Any]:
     return {"readings": values, "missing": missing}
 
 
-def enforcement_rows(enforced: Mapping[str, Enforced]) -> list[dict[str, Any]]:
+def enforcement_rows(enforced: Mapping[str, Enforced]) -> list[EnforcementRow]:
     """Return for each process which limit is enforced how."""
     return [
         {"process": process, "memory": one.memory, "cpu": one.cpu}
@@ -101,7 +110,7 @@ def enforcement_rows(enforced: Mapping[str, Enforced]) -> list[dict[str, Any]]:
     ]
 
 
-def _step(step: LadderStep) -> dict[str, Any]:
+def _step(step: LadderStep) -> LadderStepDocument:
     return {"action": step.action.value, "process": step.process or None, "ratio": step.ratio}
 
 

@@ -12,7 +12,7 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import LadderAction, Profile
 from platforms.probes import ProbeSet, open_probes
-from vla_deploy.ipc import ClaimBook, SharedSpace
+from vla_deploy.ipc import ClaimBook, SharedSpace, topics
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.documents import (
     board,
@@ -77,10 +77,10 @@ class BudgetKeeper:
         self._emergencies = emergencies
         self._enforcer = enforcer
         self._measurer = Measurer()
-        self._directives = space.cell_writer("resource_directives")
-        self._cell = space.cell_writer("budget")
-        self._board = space.cell_writer("board")
-        self._stop_cell = space.cell_writer("budget_stop")
+        self._directives = space.cell_writer(topics.RESOURCE_DIRECTIVES)
+        self._cell = space.cell_writer(topics.BUDGET)
+        self._board = space.cell_writer(topics.BOARD)
+        self._stop_cell = space.cell_writer(topics.BUDGET_STOP)
         self._findings: dict[tuple[str, str], BudgetFinding] = {}
         self._ladder = LadderState()
         self._changes: deque[LadderMove] = deque(maxlen=KEPT_CHANGES)

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.supervision import ConcludedRequest, ProfileAnswer
 
 
 class ChangePhase(StrEnum):
@@ -83,7 +84,7 @@ class ProfileChange:
     phase: ChangePhase = ChangePhase.PREPARE
     deadline_ns: int = 0
     committed: bool = False
-    answers: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    answers: dict[str, ProfileAnswer] = field(default_factory=dict)
     restarts: dict[str, float] = field(default_factory=dict)
     """The processes to start again, each with the share of its rate that it reached before."""
     was_slow: bool = False
@@ -113,7 +114,7 @@ class ProfileChange:
         self.pids.update({name: pids[name] for name in restarted})
         return restarted
 
-    def note(self, answer: Mapping[str, Any]) -> None:
+    def note(self, answer: ProfileAnswer) -> None:
         """Note an answer to the present phase."""
         fits = answer["change_id"] == self.change_id and answer["phase"] == self.phase
         if fits and answer["process"] in self.pids.keys() - self.restarts.keys():
@@ -131,9 +132,9 @@ class ProfileReport:
     def __init__(self, space: SharedSpace, clock: Clock, begun_with: str) -> None:
         """Report throughout the run also the profile that it has `begun_with`."""
         self._begun_with = begun_with
-        self._cell = space.cell_writer("profile_status")
+        self._cell = space.cell_writer(topics.PROFILE_STATUS)
         self._clock = clock
-        self._last: dict[str, Any] = {}
+        self._last: ConcludedRequest = {}
         self._due_ns = 0
 
     def conclude(

@@ -4,7 +4,7 @@ import itertools
 import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from typing import Final
+from typing import Final, Literal
 
 import psutil
 
@@ -13,7 +13,7 @@ from platforms import Profile, ProfileError
 from platforms.power_switch import PowerSwitch
 from platforms.profile import profile_from
 from platforms.profile_source import read_source
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.supervisor.profiles.profile_change import (
     LIMITS_S,
     RESTART_S,
@@ -68,9 +68,9 @@ class ProfileSwitch:
         self._limits_s = {**LIMITS_S, ChangePhase.WATCH: watch_s}
         self._on_change = on_change
         self._power_set: Future[str] | None = None
-        self._requests = space.ring_reader("profile_request", from_start=False)
-        self._changes = space.ring_writer("profile_change")
-        self._answers = space.ring_reader("profile_answer", from_start=False)
+        self._requests = space.ring_reader(topics.PROFILE_REQUEST, from_start=False)
+        self._changes = space.ring_writer(topics.PROFILE_CHANGE)
+        self._answers = space.ring_reader(topics.PROFILE_ANSWER, from_start=False)
         self._report = ProfileReport(space, clock, begun_with=name)
         self._trial = ProfileTrial(space, clock)
         self._ids = itertools.count(1)
@@ -129,7 +129,15 @@ class ProfileSwitch:
             pids={name: member.pid for name, member in self._members.items()},
             began_ns=self._clock.now_ns(),
         )
-        self._enter(self._change, ChangePhase.PREPARE, values=source.values)
+        self._enter(self._change, ChangePhase.PREPARE)
+        self._changes.publish(
+            {
+                "change_id": self._change.change_id,
+                "phase": "prepare",
+                "profile": request.profile,
+                "values": source.values,
+            }
+        )
 
     def _refuse_if_busy(self, absent: Mapping[str, str]) -> None:
         if self._change is not None:
@@ -179,6 +187,7 @@ class ProfileSwitch:
         change.committed = True
         self._put_in_force(change.request.profile, change.target)
         self._enter(change, ChangePhase.COMMIT, RESTART_S if change.restarts else None)
+        self._publish(change, "commit")
 
     def _committing(self, change: ProfileChange) -> None:
         pids = {name: member.pid for name, member in self._members.items()}
@@ -192,11 +201,12 @@ class ProfileSwitch:
             return
         restarted = change.settle(pids)
         self._trial.begin()
-        self._enter(change, ChangePhase.WATCH, restarted=restarted, again=[])
+        self._watch(change, restarted, [])
 
     def _watching(self, change: ProfileChange) -> None:
         if self._is_late(change):
             self._enter(change, ChangePhase.VALIDATE)
+            self._publish(change, "validate")
 
     def _validating(self, change: ProfileChange) -> None:
         if self._is_waiting(change):
@@ -204,7 +214,7 @@ class ProfileSwitch:
         faults, slow = [*self._trial.faults(change.target)], change.refusals
         if slow and not (faults or change.was_slow or CONTROL in slow):
             change.was_slow = True
-            self._enter(change, ChangePhase.WATCH, restarted={}, again=[*slow])
+            self._watch(change, {}, [*slow])
             return
         faults += [_listed(slow)] if slow else []
         if faults:
@@ -251,6 +261,7 @@ class ProfileSwitch:
             else None
         )
         self._enter(change, ChangePhase.ROLLBACK)
+        self._publish(change, "rollback")
 
     def _put_in_force(self, name: str, profile: Profile) -> None:
         self.profile, self.in_force = name, profile
@@ -305,23 +316,30 @@ class ProfileSwitch:
     # --- publishing ---------------------------------------------------------------------------
 
     def _enter(
-        self,
-        change: ProfileChange,
-        phase: ChangePhase,
-        limit_s: float | None = None,
-        **more: object,
+        self, change: ProfileChange, phase: ChangePhase, limit_s: float | None = None
     ) -> None:
-        """Begin a phase, and publish it where the processes take part."""
         limit_s = self._limits_s[phase] if limit_s is None else limit_s
         change.enter(phase, self._clock.now_ns() + round(limit_s * NS_PER_S))
-        if phase is not ChangePhase.SET_POWER:
-            self._publish(change, phase.value, **more)
 
-    def _publish(self, change: ProfileChange, phase: str, **more: object) -> None:
-        profile = change.request.profile
+    def _watch(
+        self, change: ProfileChange, restarted: Mapping[str, float], again: list[str]
+    ) -> None:
+        self._enter(change, ChangePhase.WATCH)
         self._changes.publish(
-            {"change_id": change.change_id, "phase": phase, "profile": profile, **more}
+            {
+                "change_id": change.change_id,
+                "phase": "watch",
+                "profile": change.request.profile,
+                "restarted": restarted,
+                "again": again,
+            }
         )
+
+    def _publish(
+        self, change: ProfileChange, phase: Literal["commit", "validate", "keep", "rollback"]
+    ) -> None:
+        profile = change.request.profile
+        self._changes.publish({"change_id": change.change_id, "phase": phase, "profile": profile})
 
     def _end(self, change: ProfileChange, outcome: ChangeOutcome, reason: str) -> None:
         self._change = None

@@ -1,9 +1,9 @@
 """Declare what is measured of control: safety, ticks, buses, joints, the base."""
 
 from functools import partial
-from typing import Final
+from typing import Final, get_args
 
-from vla_deploy.control.modes.state_machine import CONTROL_STATES
+from vla_deploy.ipc.payloads.motion import ControlStateName
 from vla_deploy.safety import Cause, Reaction
 from vla_deploy.telemetry.metrics.metric import (
     Metric,
@@ -30,7 +30,7 @@ SAFETY: Final[tuple[Metric, ...]] = (
         "vla_control_state",
         "What control is doing about power and motion: 1 for its state, 0 for the others.",
         at("state"),
-        states=CONTROL_STATES,
+        states=get_args(ControlStateName),
     ),
     _status(
         "vla_estop_latched",

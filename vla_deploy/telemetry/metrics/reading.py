@@ -126,7 +126,7 @@ class _Rate:
         return measured
 
 
-def _latest(name: str, cell: CellReader, now_ns: int) -> TopicDocument:
+def _latest(name: str, cell: CellReader[Any], now_ns: int) -> TopicDocument:
     sample = cell.latest()
     if sample is None:
         return TopicDocument(document=None, reason=f"nobody has written {name} yet")
@@ -136,9 +136,10 @@ def _latest(name: str, cell: CellReader, now_ns: int) -> TopicDocument:
     return TopicDocument(document=_document(sample))
 
 
-def _document(sample: Sample) -> Document:
+def _document(sample: Sample[Any]) -> Document:
     if sample.dtype is None:
-        return sample.document()
+        document: Document = sample.document()
+        return document
     record = sample.data
     return {name: np.asarray(record[name]).tolist() for name in sample.dtype.names or ()}
 

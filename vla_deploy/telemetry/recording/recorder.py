@@ -8,7 +8,8 @@ from concurrent.futures import TimeoutError as NotInTime
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.recording import NoRecording, RecordingProgress, RecordingStatus
 from vla_deploy.runtime.executors import low_priority_thread
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.one_line import one_line
@@ -60,7 +61,7 @@ class RollingRecorder:
         self._request = RecordingRequest()
         self._ends_ns: int | None = None
         self._refused = ""
-        self._last: dict[str, Any] = {}
+        self._last: RecordingProgress | NoRecording = {}
         self._status_due_ns = 0
         self._acts: Mapping[Any, Callable[[Mapping[str, Any]], None]] = {
             START: self._on_start,
@@ -69,8 +70,8 @@ class RollingRecorder:
 
     def start(self) -> None:
         """Open the topics, and begin the recording that the settings ask for."""
-        self._requests = self._space.ring_reader("recording_request", from_start=False)
-        self._status = self._space.cell_writer("recording_status")
+        self._requests = self._space.ring_reader(topics.RECORDING_REQUEST, from_start=False)
+        self._status = self._space.cell_writer(topics.RECORDING_STATUS)
         self._begin(self._always)
 
     def step(
@@ -107,7 +108,7 @@ class RollingRecorder:
             _log.warning("the disk is too slow to finish the recording; the next run recovers it")
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    def document(self, now_ns: int) -> dict[str, Any]:
+    def document(self, now_ns: int) -> RecordingStatus:
         """Return the document of `recording_status`."""
         if self._queue is None:
             return {"state": _OFF, "refused": self._refused, "last": self._last}
@@ -218,7 +219,7 @@ class WriteQueue:
         """Return how much waits to be written."""
         return sum(size_bytes for _, size_bytes in self._backlog)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> RecordingProgress:
         """Return the state of the recording; `lost` counts values that are in no file."""
         report = self._writer.report
         return {

@@ -3,10 +3,11 @@
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any, Final
 
+from vla_deploy.ipc.payloads.recording import RecordingStart
 from vla_deploy.telemetry.errors import RecordingRefused
 
 EVERYTHING: Final = ("*",)
@@ -79,9 +80,16 @@ class RecordingRequest:
         """Return the choice of channels."""
         return ChannelSelection(topics=self.topics, without=self.without)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> RecordingStart:
         """Return the document for the topic `recording_request`."""
-        return {"act": START, **asdict(self)}
+        return {
+            "act": START,
+            "topics": self.topics,
+            "without": self.without,
+            "duration_s": self.duration_s,
+            "label": self.label,
+            "source": self.source,
+        }
 
 
 def parse_request(document: Mapping[str, Any]) -> RecordingRequest:

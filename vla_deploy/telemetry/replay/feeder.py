@@ -38,7 +38,7 @@ LASTING: Final = (TopicKind.CELL, TopicKind.FRAME)
 _log = logging.getLogger(__name__)
 
 
-def fed_topics() -> tuple[Topic, ...]:
+def fed_topics() -> tuple[Topic[Any], ...]:
     """Return the topics to be fed from a file: not those of processes that run now."""
     return tuple(
         topic
@@ -84,7 +84,7 @@ class TopicFeeder:
                 _log.warning("%s: left out: %s", message.channel, error)
             self.unfit += 1
 
-    def _put(self, topic: Topic, message: RecordedMessage) -> None:
+    def _put(self, topic: Topic[Any], message: RecordedMessage) -> None:
         writer = self._writer(topic)
         match topic.kind:
             case TopicKind.CELL if is_document(topic):
@@ -98,7 +98,7 @@ class TopicFeeder:
             case TopicKind.FRAME:
                 self._put_image(topic.name, writer, message)
 
-    def _writer(self, topic: Topic) -> Any:
+    def _writer(self, topic: Topic[Any]) -> Any:
         """Return the writer of a topic, opened when first needed."""
         if topic.name not in self._writers:
             openers: Mapping[TopicKind, Callable[[str], Any]] = {
@@ -145,7 +145,7 @@ class TopicFeeder:
                 log.write(json.dumps(written) + "\n")
 
 
-def fields_of(topic: Topic, document: Mapping[str, Any]) -> dict[str, Any]:
+def fields_of(topic: Topic[Any], document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a packed cell; what another version did not record is zero."""
     return {field.name: _value(field, document.get(field.name)) for field in topic.fields}
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import SharedSpace, topics
+from vla_deploy.ipc.payloads.recording import ReplayStatus
 from vla_deploy.ipc.replay_mark import mark_replay
 from vla_deploy.runtime.logs import LOGS_DIR
 from vla_deploy.runtime.one_line import one_line
@@ -106,8 +107,8 @@ class ReplayNode:
 
     def start(self) -> None:
         """Open the topics, and write the values of the replay's beginning."""
-        self._requests = self._space.ring_reader("replay_request", from_start=False)
-        self._status = self._space.cell_writer("replay_status")
+        self._requests = self._space.ring_reader(topics.REPLAY_REQUEST, from_start=False)
+        self._status = self._space.cell_writer(topics.REPLAY_STATUS)
         self._show_from(self.playback.position_ns(self._clock.now_ns()))
 
     def step(self) -> None:
@@ -141,16 +142,17 @@ class ReplayNode:
         """
         self._show_from(self.playback.seek(now_ns, at_s))
 
-    def document(self, now_ns: int) -> dict[str, Any]:
+    def document(self, now_ns: int) -> ReplayStatus:
         """Return the document of `replay_status`."""
         playback, file = self.playback, self._file
-        state = "paused" if playback.is_paused else "ended" if self._next is None else "playing"
         return {
             "file": file.path.name,
             "kind": file.kind,
             "robot": file.robot,
             "run_id": file.run_id,
-            "state": state,
+            "state": (
+                "paused" if playback.is_paused else "ended" if self._next is None else "playing"
+            ),
             "position_s": round((playback.position_ns(now_ns) - playback.began_ns) / NS_PER_S, 3),
             "duration_s": round((playback.ended_ns - playback.began_ns) / NS_PER_S, 3),
             "began_s": round(playback.began_ns / NS_PER_S, 3),

@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture
 def on_desktop(dashboard):
-    dashboard.robot.shows("profile_status", profile="desktop", phase="", target="", last={})
+    dashboard.robot.shows("profile_status", profile="desktop", begun_with="desktop")
     return dashboard
 
 
@@ -32,7 +32,7 @@ def test_without_a_supervisor_nothing_is_compared(dashboard):
 
 def test_a_profile_in_force_whose_file_is_gone_is_told(dashboard):
     gone = "/etc/vla-deploy/gone.toml"
-    dashboard.robot.shows("profile_status", profile=gone, phase="", target="", last={})
+    dashboard.robot.shows("profile_status", profile=gone, begun_with="desktop")
     error = dashboard.get("profile/desktop/difference", status=409)["error"]
     assert (error["code"], gone in error["what"]) == ("profile_unreadable", True)
 

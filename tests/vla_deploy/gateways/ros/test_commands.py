@@ -15,7 +15,7 @@ class Robot:
 
     def tell(self, command_id, event, **details):
         told = {"command_id": command_id, "event": event} | details
-        self.link.publish("task_event", told)
+        self.link.writer("task_event").publish(told)
         self.commands.step(self.clock.now_ns())
 
     def plan(self, command_id, *skills):

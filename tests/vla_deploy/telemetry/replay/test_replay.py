@@ -81,8 +81,8 @@ def test_nobody_can_ask_anything_of_a_replay(shown: Shown) -> None:
         lambda: shown.link.utter(text="go to the kitchen"),
         lambda: shown.link.space.cell_writer("base_command"),
         lambda: shown.link.space.shared_document("claims"),
-        lambda: shown.link.publish("profile_request", {}),
-        lambda: shown.link.publish("recording_request", {}),
+        lambda: shown.link.writer("profile_request").publish({}),
+        lambda: shown.link.writer("recording_request").publish({}),
     ):
         with pytest.raises(ReplayOnly, match="this is a replay of estop_while_driving"):
             act()

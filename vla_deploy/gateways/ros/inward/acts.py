@@ -17,6 +17,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.acts import REACHED, why_not
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.stop_button import ESTOP
 
 EMERGENCY_STOP: Final = "/emergency_stop"
@@ -26,7 +27,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Asked:
-    act: str
+    act: OperatorActName
     service: str
     answer: Future
     deadline_ns: int
@@ -35,7 +36,7 @@ class _Asked:
 class Acts(GatewayPart):
     """Hand acts to control, and answer when control shows them."""
 
-    def __init__(self, gateway: Gateway, acts: tuple[str, ...]) -> None:
+    def __init__(self, gateway: Gateway, acts: tuple[OperatorActName, ...]) -> None:
         graph, link = gateway.graph, gateway.link
         self._gateway = gateway
         # Of the graph's thread alone: what a thread writes with is its own.
@@ -67,7 +68,7 @@ class Acts(GatewayPart):
         self._asked.clear()
         self._presses.close()
 
-    def _handler(self, act: str, service: str) -> Callable[[Any], Future]:
+    def _handler(self, act: OperatorActName, service: str) -> Callable[[Any], Future]:
         def handle(_request: Any) -> Future:
             answer = self._gateway.graph.future()
             if act == ESTOP:

@@ -1,13 +1,11 @@
 """Serve NavigateToPose: the pose becomes a plan of one action, judged and driven as any other."""
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 from nav2_msgs.action import NavigateToPose
 from rclpy.duration import Duration
 
-from vla_deploy.client.following import Event
 from vla_deploy.gateways.ros.conversions import fill_pose, yaw_of
 from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.inward.action_server import (
@@ -17,8 +15,14 @@ from vla_deploy.gateways.ros.inward.action_server import (
     GoalRefused,
     require_armed,
 )
-from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
+from vla_deploy.gateways.ros.inward.orders import (
+    CommandOrder,
+    CommandOrders,
+    error_of,
+)
 from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway
+from vla_deploy.ipc import topics
+from vla_deploy.ipc.payloads.tasks import ExecutorStatus, TaskEvent
 from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME
 
@@ -76,7 +80,7 @@ class NavigationAction:
         if frame in ("", MAP):
             return ORIGIN
         link = self._gateway.link
-        pose, base = link.fresh("pose", _AGE_S), link.fresh("base_state", _AGE_S)
+        pose, base = link.fresh(topics.POSE, _AGE_S), link.fresh(topics.BASE_STATE, _AGE_S)
         if pose is None or base is None:
             words = f"the robot does not know its place now, by which {frame} is known"
             raise GoalRefused(FAILED, words)
@@ -121,16 +125,16 @@ class Driving:
         self._order.cancel()
         return self._given_up(reason) if superseded else None
 
-    def _note(self, event: Event) -> None:
+    def _note(self, event: TaskEvent) -> None:
         if event["event"] == "setback":
             self._retries += 1
         if event["event"] == "action":
-            self._retries = max(self._retries, int(event.get("retries") or 0))
+            self._retries = max(self._retries, event["retries"])
         if event["event"] == "asked":  # nobody can answer here
-            self._cancelled = f"it needs a person's word: {event.get('question')}"
+            self._cancelled = f"it needs a person's word: {event['question']}"
             self._order.cancel()
 
-    def _finish(self, last: Event) -> GoalOutcome:
+    def _finish(self, last: TaskEvent) -> GoalOutcome:
         why = error_of(last)
         if self._cancelled:
             return self._given_up(self._cancelled)
@@ -145,11 +149,11 @@ class Driving:
 
     def _report(self, now_ns: int) -> None:
         link = self._gateway.link
-        sample = link.fresh("pose", _AGE_S)
+        sample = link.fresh(topics.POSE, _AGE_S)
         if sample is None:
             return
         here = pose_of(sample)
-        left_m = self._left_m((here.x_m, here.y_m), link.document("executor_status", 1.0) or {})
+        left_m = self._left_m((here.x_m, here.y_m), link.document(topics.EXECUTOR_STATUS, 1.0))
         seconds = left_m / self._gateway.robot.base.max_speed_m_s
         message = NavigateToPose.Feedback(
             number_of_recoveries=self._retries,
@@ -162,9 +166,9 @@ class Driving:
         fill_pose(message.current_pose.pose, here)
         self._feedback(message)
 
-    def _left_m(self, here: tuple[float, float], executor: Mapping[str, Any]) -> float:
+    def _left_m(self, here: tuple[float, float], executor: ExecutorStatus | None) -> float:
         """Return the length of the way that is left: of the planned one from the nearest point."""
-        way = executor.get("way_m") or [(self._target.x_m, self._target.y_m)]
+        way = (executor and executor["way_m"]) or [[self._target.x_m, self._target.y_m]]
         nearest = min(range(len(way)), key=lambda i: math.dist(way[i], here))
         rest = way[nearest:]
         return math.dist(here, rest[0]) + sum(map(math.dist, rest, rest[1:]))

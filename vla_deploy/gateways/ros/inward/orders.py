@@ -3,10 +3,12 @@
 from collections import deque
 from typing import Any, Final
 
-from vla_deploy.client.following import ANSWER_TIMEOUT_S, Event, Following
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.inward.words import OrderInvalid
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.errors import BadPayload
+from vla_deploy.ipc.payloads.tasks import TaskEvent, UtteranceContent
 
 _STATUS_AGE_S: Final = 2.0
 
@@ -16,13 +18,13 @@ class CommandOrder:
 
     def __init__(self, link: RobotLink, command_id: str) -> None:
         self.command_id = command_id
-        self.news: deque[Event] = deque()
-        self.last: Event | None = None
+        self.news: deque[TaskEvent] = deque()
+        self.last: TaskEvent | None = None
         self._link = link
         self._following = Following(
             command_id,
-            lambda: link.fresh("planner_status", _STATUS_AGE_S),
-            lambda: link.fresh("executor_status", _STATUS_AGE_S),
+            lambda: link.fresh(topics.PLANNER_STATUS, _STATUS_AGE_S),
+            lambda: link.fresh(topics.EXECUTOR_STATUS, _STATUS_AGE_S),
             link.clock,
         )
 
@@ -30,7 +32,7 @@ class CommandOrder:
         """Ask for its end; its last event follows."""
         self._link.utter(command_id=self._following.command_id, cancel=True)
 
-    def take(self, events: list[Event]) -> None:
+    def take(self, events: list[TaskEvent]) -> None:
         """Take what came since the last step, and find out whether nobody works on it."""
         if self.last is not None:
             return
@@ -55,7 +57,7 @@ class CommandOrders:
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
-        self._events = link.events("task_event")
+        self._events = link.events(topics.TASK_EVENT)
         self._orders: list[CommandOrder] = []
 
     def give(
@@ -69,13 +71,11 @@ class CommandOrders:
         Raises:
             OrderInvalid: it is longer than the planner takes.
         """
-        utterance: dict[str, Any] = {"text": text} if plan is None else {"plan": plan}
-        if source:
-            utterance["source"] = source
+        content: UtteranceContent = {"text": text} if plan is None else {"plan": plan}
         if is_answer:
-            utterance["answer"] = True
+            content["answer"] = True
         try:
-            order = CommandOrder(self._link, self._link.utter(**utterance))
+            order = CommandOrder(self._link, self._link.utter(source=source, **content))
         except BadPayload as error:
             raise OrderInvalid(f"too long for a command: {error}") from error
         self._orders.append(order)
@@ -96,8 +96,10 @@ class CommandOrders:
         self._events.close()
 
 
-def error_of(last: Event) -> str:
+def error_of(last: TaskEvent) -> str:
     """Return in words why a command failed; "" where it did not."""
     if last["event"] == "rejected":
-        return str(last.get("reason") or "rejected")
-    return "" if last.get("success") else str(last.get("error") or "failed")
+        return last["reason"] or "rejected"
+    if last["event"] == "finished" and last["success"]:
+        return ""
+    return str(last.get("error") or "failed")

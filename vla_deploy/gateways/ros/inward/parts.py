@@ -1,6 +1,6 @@
 """List what the gateway takes from the graph, as far as the robot file permits it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Final
 
@@ -16,10 +16,14 @@ from vla_deploy.gateways.ros.inward.text_topics import CommandTopics, SayTopic
 from vla_deploy.gateways.ros.inward.trajectories import TrajectoryAction
 from vla_deploy.gateways.ros.outgoing.lending import Borrowed, Lending
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.ros_settings import Accepts
 
-ACTS: Final = {Accepts.STOP: (ESTOP,), Accepts.ALL: (ESTOP, "reset", "arm", "disarm")}
+ACTS: Final[Mapping[Accepts, tuple[OperatorActName, ...]]] = {
+    Accepts.STOP: (ESTOP,),
+    Accepts.ALL: (ESTOP, "reset", "arm", "disarm"),
+}
 WHOLE_BODY: Final = "joint_trajectory_controller"
 OWN: Final = "/vla_deploy"
 """Before the names of the robot's own servers where servers beyond it have theirs."""

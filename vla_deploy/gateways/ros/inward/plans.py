@@ -1,12 +1,12 @@
 """Serve ExecutePlan: a command in words, or a plan, carried out as one from anybody else."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy_msgs.action import ExecutePlan
 
-from vla_deploy.client.following import Event
 from vla_deploy.gateways.ros.graph import named
 from vla_deploy.gateways.ros.inward.action_server import (
     Feedback,
@@ -18,6 +18,7 @@ from vla_deploy.gateways.ros.inward.action_server import (
 from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
 from vla_deploy.gateways.ros.inward.words import OrderInvalid, parsed_plan, shown
 from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.ipc.payloads.tasks import TaskEvent
 
 Result: Final = ExecutePlan.Result
 News: Final = ExecutePlan.Feedback
@@ -107,7 +108,7 @@ class Carrying:
         result = Result(error_code=Result.CANCELLED, error=reason)
         return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
-    def _message(self, state: str, event: Event) -> Any:
+    def _message(self, state: str, event: Mapping[str, Any]) -> Any:
         action_id = str(event.get("action_id") or "")
         return News(
             state=state,
@@ -120,8 +121,8 @@ class Carrying:
             choices=[str(one) for one in event.get("choices") or ()],
         )
 
-    def _finish(self, last: Event) -> GoalOutcome:
-        why, actions = error_of(last), list(last.get("actions") or ())
+    def _finish(self, last: TaskEvent) -> GoalOutcome:
+        why, actions = error_of(last), last["actions"] if last["event"] == "finished" else []
         succeeded = sum(one["status"] == "succeeded" for one in actions)
         total = len(actions)
         result = Result(
@@ -140,7 +141,7 @@ class Carrying:
             ending=GoalEnding.ABORTED if why else GoalEnding.SUCCEEDED, result=result
         )
 
-    def _code(self, last: Event, why: str) -> int:
+    def _code(self, last: TaskEvent, why: str) -> int:
         if self._cancelled or why.endswith("cancelled on request"):
             return int(Result.CANCELLED)
         if not why:

@@ -18,7 +18,7 @@ from vla_deploy.client.motions import Claimed, Motions
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.outgoing.lending import Borrowed
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
-from vla_deploy.ipc import CellWriter
+from vla_deploy.ipc import CellWriter, topics
 
 CMD_VEL: Final = "/cmd_vel"
 HOLDS_S: Final = 0.2
@@ -42,7 +42,7 @@ class Velocity(GatewayPart):
     def __init__(self, gateway: Gateway, claim: Claimed | Borrowed) -> None:
         self._gateway = gateway
         self._clock = gateway.link.clock
-        self._command: CellWriter = gateway.link.space.cell_writer("remote_base_command")
+        self._command: CellWriter = gateway.link.space.cell_writer(topics.REMOTE_BASE_COMMAND)
         self._claim = claim
         self._last_ns = self._stamp_ns = 0
         self._refusals = _Refusals(CMD_VEL, gateway.link.clock)

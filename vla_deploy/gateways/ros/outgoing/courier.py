@@ -10,9 +10,8 @@ from vla_deploy.gateways.ros.outgoing.goal import GoalExchange, OutgoingGoal
 from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outgoing.messages import ACTIONS, goal_of
 from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.ros_goals import (
-    ANSWER,
-    REQUEST,
     GoalAct,
     GoalAnswer,
     GoalKind,
@@ -32,7 +31,7 @@ class Courier:
     def __init__(self, gateway: Gateway, lending: Lending) -> None:
         self._gateway = gateway
         self._lending = lending
-        self._requests = gateway.link.events(REQUEST)
+        self._requests = gateway.link.events(topics.ROS_REQUEST)
         self._clients: dict[tuple[GoalKind, str], ActionClient] = {}
         self._goals: dict[str, OutgoingGoal] = {}
 
@@ -103,4 +102,4 @@ class Courier:
     def _answer(self, answer: GoalAnswer) -> None:
         if answer.text:
             _log.info("goal %s %s: %s", answer.request_id, answer.state.value, answer.text)
-        self._gateway.link.publish(ANSWER, answer.document())
+        self._gateway.link.writer(topics.ROS_ANSWER).publish(answer.document())

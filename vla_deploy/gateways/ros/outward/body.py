@@ -17,7 +17,7 @@ from vla_deploy.gateways.ros.conversions import fill_pose, quaternion_of
 from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.part import MAP, ODOM, Due, Gateway, GatewayPart
-from vla_deploy.ipc import Sample
+from vla_deploy.ipc import Sample, topics
 from vla_deploy.robots.floor_pose import ORIGIN, Pose2D
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, FrameTransform, FrameTree
 from vla_deploy.robots.kinematics.urdf import urdf_of
@@ -98,14 +98,16 @@ class BodyTopics(GatewayPart):
         link = self._gateway.link
         joints_due = self._joints_due.is_now(now_ns)
         odometry_due = self._odometry_due.is_now(now_ns)
-        joints = link.fresh("joint_state", _JOINT_AGE_S) if joints_due or odometry_due else None
+        joints = (
+            link.fresh(topics.JOINT_STATE, _JOINT_AGE_S) if joints_due or odometry_due else None
+        )
         if joints_due and joints is not None:
             self._publish_joints(joints)
         if odometry_due:
-            base = link.fresh("base_state", _POSE_AGE_S)
+            base = link.fresh(topics.BASE_STATE, _POSE_AGE_S)
             if base is not None:
                 self._publish_odometry(base)
-            self._frames.publish(joints, base, link.fresh("pose", _POSE_AGE_S))
+            self._frames.publish(joints, base, link.fresh(topics.POSE, _POSE_AGE_S))
 
     def _publish_joints(self, sample: Sample) -> None:
         count, data = len(self._names), sample.data

@@ -10,6 +10,7 @@ from vla_deploy.gateways.ros.outward.activity import Activity, activity_of
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.outward.scene import Locator, described, latest_last
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
+from vla_deploy.ipc import topics
 from vla_deploy.robots.maps.map_file import MapFile
 
 STATE: Final = "/robot/state"
@@ -65,9 +66,9 @@ class ContextTopics(GatewayPart):
         link, commands = self._gateway.link, self._gateway.commands
         return activity_of(
             self._gateway.control_status(),
-            link.document("executor_status", _AGE_S),
-            link.document("planner_status", _STATUS_AGE_S),
-            link.document("speech_status", _STATUS_AGE_S),
+            link.document(topics.EXECUTOR_STATUS, _AGE_S),
+            link.document(topics.PLANNER_STATUS, _STATUS_AGE_S),
+            link.document(topics.SPEECH_STATUS, _STATUS_AGE_S),
             has_succeeded=commands.has_succeeded,
             ended_s=commands.ended_s,
         )
@@ -88,9 +89,9 @@ class ContextTopics(GatewayPart):
 
     def _brief(self) -> dict[str, Any]:
         """Return the state that goes with a plan: place, gripper, what is held, battery."""
-        sample = self._gateway.link.fresh("pose", _AGE_S)
-        executor = self._gateway.link.document("executor_status", _AGE_S) or {}
-        held = [one for one in (executor.get("holding") or {}).values() if one]
+        sample = self._gateway.link.fresh(topics.POSE, _AGE_S)
+        executor = self._gateway.link.document(topics.EXECUTOR_STATUS, _AGE_S)
+        held = [one for one in executor["holding"].values() if one] if executor else []
         pose = None if sample is None else pose_of(sample)
         place = "" if pose is None else self._locator.place_at(pose.x_m, pose.y_m)
         return {
@@ -129,7 +130,7 @@ class ContextTopics(GatewayPart):
 
     def _place(self) -> tuple[list[float] | None, list[float] | None]:
         """Return x, y, z in m of the map and a quaternion x, y, z, w; None for a lost robot."""
-        sample = self._gateway.link.fresh("pose", _AGE_S)
+        sample = self._gateway.link.fresh(topics.POSE, _AGE_S)
         if sample is None or int(sample.data["state"]) >= _LOST:
             return None, None
         pose = pose_of(sample)

@@ -34,6 +34,7 @@ from vla_deploy.gateways.ros.geometry import (
 from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.outward.markers import marker_at
 from vla_deploy.gateways.ros.part import MAP, Due, Gateway, GatewayPart
+from vla_deploy.ipc import topics
 from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.robots.errors import MapInvalid
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
@@ -115,7 +116,7 @@ class EnvironmentMap(GatewayPart):
 
     def _note_stance(self) -> None:
         link = self._gateway.link
-        pose, joints = link.fresh("pose", _AGE_S), link.fresh("joint_state", _AGE_S)
+        pose, joints = link.fresh(topics.POSE, _AGE_S), link.fresh(topics.JOINT_STATE, _AGE_S)
         if pose is None or joints is None or int(pose.data["state"]) > _TRACKING:
             self._stances.clear()  # a robot that is not sure where it is knows nothing of the map
             return
@@ -164,7 +165,7 @@ class EnvironmentMap(GatewayPart):
 
     def _seen_by_camera(self) -> Floats:
         """Return what the depth image shows, without the robot's own arms, in the map."""
-        frame = self._gateway.link.frame("rgbd", _IMAGE_AGE_S)
+        frame = self._gateway.link.frame(topics.RGBD, _IMAGE_AGE_S)
         lens = self._gateway.robot.camera.intrinsics
         if frame is None or (frame.width, frame.height) != (lens.width, lens.height):
             return np.empty((0, 3))
@@ -176,7 +177,7 @@ class EnvironmentMap(GatewayPart):
 
     def _near(self) -> Floats:
         """Return what perception has found to stand up from the floor nearby, in the map."""
-        sample = self._gateway.link.fresh("near_obstacles", 1.0)
+        sample = self._gateway.link.fresh(topics.NEAR_OBSTACLES, 1.0)
         if sample is None:
             return np.empty((0, 3))
         count = int(sample.data["count"])
@@ -184,7 +185,7 @@ class EnvironmentMap(GatewayPart):
         return moved(np.column_stack(columns), self._stances[-1].map_from_base)
 
     def _seen_by_lidar(self) -> Floats:
-        sample = self._gateway.link.fresh("scan", _AGE_S)
+        sample = self._gateway.link.fresh(topics.SCAN, _AGE_S)
         if sample is None:
             return np.empty((0, 3))
         stance = min(self._stances, key=lambda one: abs(one.stamp_ns - sample.stamp_ns))

@@ -12,6 +12,7 @@ from vla_deploy.gateways.ros.conversions import quaternion_of
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.outward.scene import Locator
 from vla_deploy.gateways.ros.part import MAP, Due, Gateway, GatewayPart
+from vla_deploy.ipc import topics
 
 TOPICS: Final = ("/vla_deploy/markers", "/llm_planner/visualization")
 RATE_HZ: Final = 2.0
@@ -71,8 +72,8 @@ class SceneMarkers(GatewayPart):
             yield _text(f"{thing['id']} {thing['confidence']:.2f}", above)
 
     def _way(self) -> Iterator[Marker]:
-        executor = self._gateway.link.document("executor_status", 1.0) or {}
-        way = executor.get("way_m") or ()
+        executor = self._gateway.link.document(topics.EXECUTOR_STATUS, 1.0)
+        way = [] if executor is None else executor["way_m"]
         if len(way) < 2:
             return
         marker = marker_at("way", Marker.LINE_STRIP, _WAY_COLOUR, (0.0, 0.0, 0.0))

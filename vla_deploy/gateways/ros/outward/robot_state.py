@@ -16,6 +16,7 @@ from vla_deploy_msgs.msg import RobotEvent, RobotState
 from vla_deploy.gateways.ros.graph import LATCHED, SENSOR
 from vla_deploy.gateways.ros.outward.health import TOPICS, PartHealth, health_of
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
+from vla_deploy.ipc import RingReader, topics
 
 STATE_HZ: Final = 2.0
 LOOK_HZ: Final = 10.0
@@ -55,7 +56,7 @@ class StateTopic(GatewayPart):
         if not self._look_due.is_now(now_ns):
             return
         control = self._gateway.control_status()
-        executor = self._gateway.link.document("executor_status", _EXECUTOR_AGE_S)
+        executor = self._gateway.link.document(topics.EXECUTOR_STATUS, _EXECUTOR_AGE_S)
         key = _what_changes(control or {}, executor or {})
         if key != self._published or self._due.is_now(now_ns):
             self._published = key
@@ -69,7 +70,7 @@ class StateTopic(GatewayPart):
         self, control: Mapping[str, Any] | None, executor: Mapping[str, Any]
     ) -> RobotState:
         gateway, known = self._gateway, control or {}
-        pose = gateway.link.fresh("pose", _POSE_AGE_S)
+        pose = gateway.link.fresh(topics.POSE, _POSE_AGE_S)
         return RobotState(
             stamp=gateway.time.now(),
             robot=gateway.robot.name,
@@ -168,7 +169,9 @@ class EventsTopic(GatewayPart):
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._events = gateway.graph.publisher(RobotEvent, "/vla_deploy/events")
-        self._rings = {source: gateway.link.events(source) for source in EVENT_SOURCES}
+        self._rings: dict[str, RingReader[dict[str, Any]]] = {
+            source: gateway.link.events(source) for source in EVENT_SOURCES
+        }
 
     def step(self, now_ns: int) -> None:
         """Publish what is new."""

@@ -22,6 +22,7 @@ from vla_deploy.gateways.ros.geometry import (
 )
 from vla_deploy.gateways.ros.graph import JsonTopic
 from vla_deploy.gateways.ros.part import MAP, Due, Gateway, GatewayPart
+from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.frame_tree import OPTICAL_FRAME
@@ -83,7 +84,7 @@ class Locator:
 
     def scene(self) -> Mapping[str, Any] | None:
         """Return the scene's document, None where perception is silent."""
-        return self._link.document("scene", SCENE_AGE_S)
+        return self._link.document(topics.SCENE, SCENE_AGE_S)
 
     def place_at(self, x_m: float, y_m: float) -> str:
         """Return the named place that is nearest, "" where none is near."""
@@ -118,7 +119,7 @@ class SceneObjects(GatewayPart):
         wants_typed = self._typed.get_subscription_count() > 0
         if not (self._json.is_wanted or wants_typed) or not self._due.is_now(now_ns):
             return
-        sample = self._gateway.link.fresh("scene", SCENE_AGE_S)
+        sample = self._gateway.link.fresh(topics.SCENE, SCENE_AGE_S)
         if sample is None or sample.sequence == self._sequence:
             return
         self._sequence = sample.sequence
@@ -156,7 +157,10 @@ class SceneObjects(GatewayPart):
 
     def _camera_from_map(self) -> Floats | None:
         link = self._gateway.link
-        pose, joints = link.fresh("pose", SCENE_AGE_S), link.fresh("joint_state", SCENE_AGE_S)
+        pose, joints = (
+            link.fresh(topics.POSE, SCENE_AGE_S),
+            link.fresh(topics.JOINT_STATE, SCENE_AGE_S),
+        )
         if pose is None or joints is None:
             return None
         camera = self._frames.poses(np.asarray(joints.data["position"]))[OPTICAL_FRAME]

@@ -12,7 +12,7 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.gateways.ros.conversions import quaternion_of
 from vla_deploy.gateways.ros.graph import SENSOR
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
-from vla_deploy.ipc import Frame, Sample
+from vla_deploy.ipc import Frame, Sample, topics
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.ipc.topics import SCAN_BEAMS
 from vla_deploy.robots.kinematics.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
@@ -36,7 +36,7 @@ class Scans(GatewayPart):
 
     def step(self, now_ns: int) -> None:
         """Publish a scan that is new."""
-        sample = self._gateway.link.fresh("scan", 0.5)
+        sample = self._gateway.link.fresh(topics.SCAN, 0.5)
         if sample is None or sample.sequence == self._sequence:
             return
         self._sequence = sample.sequence
@@ -76,7 +76,7 @@ class Inertia(GatewayPart):
         """Publish a measurement that is new."""
         if not self._due.is_now(now_ns):
             return
-        sample = self._gateway.link.fresh("imu", 0.2)
+        sample = self._gateway.link.fresh(topics.IMU, 0.2)
         if sample is None or sample.sequence == self._sequence:
             return
         self._sequence = sample.sequence
@@ -113,7 +113,7 @@ class Images(GatewayPart):
         """Publish an image that is new."""
         if not self._due.is_now(now_ns):
             return
-        frame = self._gateway.link.frame("rgbd", 1.0)
+        frame = self._gateway.link.frame(topics.RGBD, 1.0)
         if frame is None or frame.stamp_ns == self._stamp_ns:
             return
         self._stamp_ns = frame.stamp_ns

@@ -11,6 +11,7 @@ from vla_deploy.client.command_record import Kind
 from vla_deploy.gateways.ros.commands import CommandNews
 from vla_deploy.gateways.ros.graph import NODE_NAME, PUBLISHED_BY, JsonTopic
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.ipc import topics
 
 PARSED: Final = "/voice_command/parsed"
 SAID: Final = "/tts/say"
@@ -27,18 +28,18 @@ class VoiceTopics(GatewayPart):
         self._gateway = gateway
         self._parsed = JsonTopic(graph, PARSED)
         self._said = JsonTopic(graph, SAID)
-        self._say = link.events("say")
-        self._heard = link.events("heard")
+        self._say = link.events(topics.SAY)
+        self._heard = link.events(topics.HEARD)
         self._confidence: dict[str, float | None] = {}
 
     def step(self, now_ns: int) -> None:
         """Publish what is new."""
         for event in self._say.drain():
-            text = str(event.payload.get("text") or "")
-            if text and not event.payload.get("cancel"):
-                self._said.publish_text(text)
-        for event in self._heard.drain():
-            self._note(event.payload)
+            said = event.payload
+            if "cancel" not in said and said["text"]:
+                self._said.publish_text(said["text"])
+        for heard in self._heard.drain():
+            self._note(heard.payload)
         for news in self._gateway.commands.news:
             record = news.record
             if record.source == VOICE and record.kind is Kind.COMMAND:

@@ -1,0 +1,108 @@
+"""Type what moves the robot and what control reports."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NotRequired, TypedDict
+
+OperatorActName = Literal["estop", "reset", "arm", "disarm"]
+MotionStatusName = Literal["done", "touched", "cancelled", "refused", "stopped"]
+ControlStateName = Literal["disarmed", "armed", "stopping", "protective_stop", "stopped", "fault"]
+
+
+class OperatorRequest(TypedDict):
+    """Ask control for an act; `source` is shown as who asked."""
+
+    act: OperatorActName
+    source: str
+    reason: str
+
+
+class GoalMotion(TypedDict):
+    """Bring joints to targets (rad, or m for a finger): time-optimal, jerk-limited, together.
+
+    Like a trajectory it takes over the joints that it names; a motion that loses any of its joints
+    ends as cancelled. Ratios are above 0 and at most 1, the effort's by joint.
+    """
+
+    kind: Literal["goal"]
+    motion_id: int
+    targets: dict[str, float]
+    speed_ratio: float
+    effort_ratio: NotRequired[dict[str, float]]
+
+
+class TrajectoryMotion(TypedDict):
+    """Pass timed positions (times, joints), cubic in between, from the present setpoint on.
+
+    With a `contact_ratio` it feels its way: a torque that grows by this share of a joint's contact
+    limit since it began ends it as touched, and its joints ramp to rest.
+    """
+
+    kind: Literal["trajectory"]
+    motion_id: int
+    joints: list[str]
+    times_s: list[float]
+    positions: list[list[float]]
+    contact_ratio: NotRequired[float]
+
+
+class CancelMotion(TypedDict):
+    """Ramp a motion to rest."""
+
+    kind: Literal["cancel"]
+    motion_id: int
+
+
+MotionCommand = GoalMotion | TrajectoryMotion | CancelMotion
+
+
+class MotionEnd(TypedDict):
+    """Say how a motion ended, and why."""
+
+    motion_id: int
+    status: MotionStatusName
+    reason: str
+
+
+class VerdictFields(TypedDict):
+    """Say who stops or slows the robot and by which numbers; null where none applies."""
+
+    cause: str
+    reaction: str
+    subject: str
+    measured: float | None
+    limit: float | None
+    age_s: float | None
+    speed_ratio: float
+    blocked: list[str]
+
+
+class TickPeriodCounts(TypedDict):
+    """Count tick periods over the nominal one; the last count is beyond all bounds in `le`."""
+
+    le: Sequence[float]
+    counts: list[int]
+    sum: float
+
+
+class JointReadings(TypedDict):
+    """Hold what servos report slowly, in joint order; null was not read yet."""
+
+    temperature_c: list[float | None]
+    voltage_v: list[float | None]
+
+
+class ControlStatus(VerdictFields):
+    """Hold control's state, the verdict in force, tick statistics, each bus' counters."""
+
+    state: ControlStateName
+    estop_latched: bool
+    detail: str
+    tick: int
+    judged_tick: int
+    late_ticks: int
+    period_s: float
+    nominal_period_s: float
+    period_ratio: TickPeriodCounts
+    buses: dict[str, Mapping[str, Any]]
+    joints: JointReadings
+    active_motions: list[int]
