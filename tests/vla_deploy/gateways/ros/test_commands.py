@@ -23,7 +23,8 @@ class Robot:
         self.tell(command_id, "plan", plan={"goal": "do it", "actions": actions})
 
     def action(self, command_id, skill, status):
-        told = {"skill": skill, "parameters": {}, "execution_time_s": 1.0, "error": None}
+        told = {"skill": skill, "parameters": {}, "execution_time_s": 1.0}
+        told |= {"error": None, "retries": 0, "note": None}
         self.tell(command_id, "action", action_id=skill, status=status, **told)
 
 
