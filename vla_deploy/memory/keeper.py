@@ -204,10 +204,10 @@ def _after(told: TaskEvent, episode: Episode) -> Episode | None:
         rung = told.get("rung", "")
         return replace(episode, goal=goal, reasoning=reasoning, plan=plan, rung=rung)
     if told["event"] == "rejected":
-        return replace(episode, outcome=EpisodeOutcome.REFUSED, error=told["reason"])
+        return replace(episode, outcome=EpisodeOutcome.REFUSED, error=told.get("reason") or "")
     if told["event"] == "finished":
-        outcome = EpisodeOutcome.SUCCEEDED if told["success"] else EpisodeOutcome.FAILED
-        return replace(episode, outcome=outcome, error=told["error"] or "")
+        outcome = EpisodeOutcome.SUCCEEDED if told.get("success") else EpisodeOutcome.FAILED
+        return replace(episode, outcome=outcome, error=told.get("error") or "")
     if told["event"] == "answered":  # It answered a question: what came of it is told of that.
         return replace(episode, outcome=EpisodeOutcome.SUCCEEDED)
     return None

@@ -9,6 +9,7 @@ from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.harness.robot import RobotFailed, RobotUnderTest
 from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc import Topic, topics
 
 STARTING_S = 2.0
 NEXT = {
@@ -34,8 +35,8 @@ class ScriptedRobot(RobotUnderTest):
         self._state = state
         self._obeys = obeys
 
-    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
-        assert topic == "control_status"
+    def document(self, topic: Topic[Any] | str, age_limit_s: float | None = None) -> dict[str, Any]:
+        assert topic is topics.CONTROL_STATUS
         if self.clock.now_ns() >= (1 + STARTING_S) * NS_PER_S:
             self._state = {"silent": "disarmed", "arming": "armed"}.get(self._state, self._state)
         return {} if self._state == "silent" else {"state": self._state}
