@@ -141,9 +141,9 @@ def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:
             "skill": event["skill"],
             "parameters": event["parameters"],
             "status": event["status"],
-            "execution_time_s": event["execution_time_s"],
-            "error": event["error"],
-            "retries": event["retries"],
+            "execution_time_s": event.get("execution_time_s", 0.0),
+            "error": event.get("error"),
+            "retries": event.get("retries", 0),
             "note": event.get("note"),
         }
 
