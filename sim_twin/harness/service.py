@@ -182,7 +182,7 @@ class RobotService(RunningRobot):
     def _started(self) -> ServiceRunner:
         words = ("--runtime-base", str(self.base), "run", "--devices-dir", str(self._devices_dir))
         rules = ServiceRules(watchdog_s=watchdog_s(), restart_s=RESTART_S)
-        runner = ServiceRunner([*VLA_DEPLOY, *words], os.environ, rules)
+        runner = ServiceRunner([*VLA_DEPLOY, *words], os.environ, rules, self.clock)
         runner.start()
         return runner
 

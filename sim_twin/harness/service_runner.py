@@ -21,7 +21,7 @@ from typing import Final
 
 import psutil
 
-from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from sim_twin.harness.robot import end_process, marked
 
 MARK: Final = "SERVICE_RUNNER_MARK"
@@ -78,11 +78,16 @@ class ServiceRunner:
         command: Sequence[str],
         env: Mapping[str, str],
         rules: ServiceRules,
+        clock: Clock | None = None,
     ) -> None:
+        """Judge start, watchdog and stop by `clock`; systemd does by the wall clock, the default.
+
+        A service that lives on the twin's time is judged by it: a busy computer is no hang.
+        """
         self.rules = rules
         self.report = ServiceReport()
         self._command = list(command)
-        self._clock = MonotonicClock()
+        self._clock: Clock = clock or MonotonicClock()
         self._mark = secrets.token_hex(8)
         self._folder = tempfile.TemporaryDirectory(prefix="service-")
         self._socket = _listen(f"{self._folder.name}/notify")

@@ -10,6 +10,7 @@ import psutil
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.contracts.scripted import ManualClock
 from sim_twin.harness.service_runner import RunnerState, ServiceRules, ServiceRunner
 
 # A service whose words are those of the product's own notifier.
@@ -50,8 +51,10 @@ pytestmark = pytest.mark.stack
 def launch() -> Iterator[Launch]:
     runners = []
 
-    def start(mode: str, rules: ServiceRules = QUICK) -> ServiceRunner:
-        runner = ServiceRunner([sys.executable, "-c", SERVICE, mode], os.environ, rules)
+    def start(
+        mode: str, rules: ServiceRules = QUICK, clock: ManualClock | None = None
+    ) -> ServiceRunner:
+        runner = ServiceRunner([sys.executable, "-c", SERVICE, mode], os.environ, rules, clock)
         runners.append(runner)
         runner.start()
         return runner
@@ -89,6 +92,16 @@ def test_a_killed_or_frozen_service_is_started_again(launch: Launch) -> None:
 
 def test_a_service_in_trouble_does_not_feed_and_is_started_again(launch: Launch) -> None:
     runner = launch("in trouble")
+    assert runner.wait_for(RunnerState.RESTARTING, 20)
+    assert runner.report.watchdog_kills == 1
+
+
+def test_a_service_on_the_twins_time_is_judged_by_it(launch: Launch) -> None:
+    clock = ManualClock()
+    runner = launch("in trouble", clock=clock)  # it feeds for 0.4 s of the wall clock
+    assert runner.wait_for(RunnerState.READY, 20)
+    assert not runner.wait_for(RunnerState.RESTARTING, 2)
+    clock.ns += 1_100_000_000
     assert runner.wait_for(RunnerState.RESTARTING, 20)
     assert runner.report.watchdog_kills == 1
 
