@@ -44,7 +44,7 @@ class CommandTalk:
             if said["command_id"] != self._now:
                 continue
             self._answer_by_ns = None
-            if said.get("event") in LAST_EVENTS:
+            if said["event"] in LAST_EVENTS:
                 self._now = ""
                 success = said["event"] == "finished" and said["success"]
                 self.done += success

@@ -51,9 +51,11 @@ def test_a_command_goes_on_until_its_own_end(room: Room) -> None:
     assert (room.talk.done, room.talk.failed) == (1, 0)
 
 
-@pytest.mark.parametrize("event", ["finished", "rejected"])
-def test_what_did_not_succeed_counts_as_failed(room: Room, event: str) -> None:
-    room.answer(room.say("look left"), event)
+@pytest.mark.parametrize(("event", "more"), [("finished", {"success": False}), ("rejected", {})])
+def test_what_did_not_succeed_counts_as_failed(
+    room: Room, event: str, more: dict[str, bool]
+) -> None:
+    room.answer(room.say("look left"), event, **more)
     assert not room.talk.is_busy
     assert (room.talk.done, room.talk.failed) == (0, 1)
 
