@@ -17,12 +17,11 @@ from vla_deploy.supervisor.runs.runtime import PROCESS_VARIABLE
 
 pytestmark = pytest.mark.stack
 RUN = "20260101-120000-1"
-ROW = """
+# The child says itself that it runs: until its interpreter has begun its environment reads empty.
+CHILD = "import os, sys; print(os.getpid(), flush=True); sys.stdin.read()"
+ROW = f"""
 import subprocess, sys
-child = subprocess.Popen(
-    [sys.executable, "-c", "import sys; sys.stdin.read()"], start_new_session=bool(int(sys.argv[1]))
-)
-print(child.pid, flush=True)
+subprocess.Popen([sys.executable, "-c", {CHILD!r}], start_new_session=bool(int(sys.argv[1])))
 if int(sys.argv[2]):
     sys.stdin.read()
 """
