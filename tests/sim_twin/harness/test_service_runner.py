@@ -30,7 +30,11 @@ clock, stop, troubles = MonotonicClock(), [], ()
 notifier = Notifier(own_target(), clock)
 signal.signal(signal.SIGTERM, lambda *_: stop.append(1))
 if mode == "child":
-    subprocess.Popen(["sleep", "60"], start_new_session=True)
+    # Until its interpreter has begun a child's environment reads empty.
+    begun = "import time; print(flush=True); time.sleep(60)"
+    command = [sys.executable, "-c", begun]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+    child.stdout.readline()
 begin_ns = clock.now_ns()
 while not stop:
     if mode == "in trouble" and clock.now_ns() - begin_ns > 4e8:
