@@ -18,15 +18,13 @@ import pytest
 
 from platforms import ModelChoice
 from tests.vla_deploy.hub import Hub, served
+from tests.vla_deploy.image_inputs import letterboxed
 from vla_deploy.inference.manifest import (
     DetectionOutputs,
     EncoderContext,
-    Fit,
-    ImageInput,
     Manifest,
     ModelFile,
     Tensor,
-    TensorLayout,
     Variant,
     Whisper,
 )
@@ -253,19 +251,12 @@ def cpu_choice() -> Callable[..., ModelChoice]:
 @pytest.fixture(scope="session")
 def blob_manifest() -> Manifest:
     """Describe the raw blob detector; its files are empty yet."""
-    image = ImageInput(
-        width_px=WIDTH_PX,
-        height_px=HEIGHT_PX,
-        layout=TensorLayout.NCHW,
-        colour="rgb",
-        fit=Fit.LETTERBOX,
-        fill=114,
-        scale=1 / 255,
-        mean=(0.0, 0.0, 0.0),
-        std=(1.0, 1.0, 1.0),
-    )
     detection = DetectionOutputs(
-        adapter="yolo", classes=CLASSES, score_threshold=0.25, iou_threshold=0.3, image=image
+        adapter="yolo",
+        classes=CLASSES,
+        score_threshold=0.25,
+        iou_threshold=0.3,
+        image=letterboxed(WIDTH_PX, HEIGHT_PX),
     )
     return Manifest(
         name="blobs",

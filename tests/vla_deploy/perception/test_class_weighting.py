@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from tests.vla_deploy.image_inputs import letterboxed
 from vla_deploy.inference.manifest import (
     ClassMeasured,
     DetectionOutputs,
-    Fit,
-    ImageInput,
     Measured,
-    TensorLayout,
 )
 from vla_deploy.perception.naming.class_fusion import (
     ClassVote,
@@ -27,23 +25,12 @@ from vla_deploy.perception.naming.class_weighting import (
 )
 from vla_deploy.perception.naming.classes import FURNITURE, OTHER, POSSIBLE, Form
 
-IMAGE = ImageInput(
-    width_px=640,
-    height_px=640,
-    layout=TensorLayout.NCHW,
-    colour="rgb",
-    fit=Fit.LETTERBOX,
-    fill=114,
-    scale=1 / 255,
-    mean=(0.0, 0.0, 0.0),
-    std=(1.0, 1.0, 1.0),
-)
 COCO = DetectionOutputs(
     adapter="yolo",
     classes=("cell phone", "sports ball", "dining table", "teddy bear"),
     score_threshold=0.25,
     iou_threshold=0.45,
-    image=IMAGE,
+    image=letterboxed(640, 640),
 )
 PHONE = Form(name="phone", fits=frozenset({"phone"}), impossible=frozenset({FURNITURE}))
 SHAPELESS = Form(name=OTHER, fits=frozenset(), impossible=frozenset({FURNITURE}))

@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vla_deploy.inference.manifest import DetectionOutputs, Fit, ImageInput, Tensor, TensorLayout
+from tests.vla_deploy.image_inputs import letterboxed
+from vla_deploy.inference.manifest import DetectionOutputs, Tensor
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.centre_net import decode, faults, read
 
@@ -14,17 +15,7 @@ DETECTION = DetectionOutputs(
     classes=("cup", "can", "bowl"),
     score_threshold=SCORE,
     iou_threshold=0.5,
-    image=ImageInput(
-        width_px=64,
-        height_px=48,
-        layout=TensorLayout.NCHW,
-        colour="rgb",
-        fit=Fit.LETTERBOX,
-        fill=114,
-        scale=1 / 255,
-        mean=(0.0, 0.0, 0.0),
-        std=(1.0, 1.0, 1.0),
-    ),
+    image=letterboxed(64, 48),
 )
 
 
