@@ -123,11 +123,11 @@ class LockstepControl(RobotUnderTest):
         return self.lockstep.run_until(condition, timeout_s)
 
     def pause(self, duration_s: float) -> None:
-        """Let simulated time pass, in which every node runs."""
+        """Run every node for a simulated time."""
         self.lockstep.run_for(duration_s)
 
     def speak(self, text: str, talker: Talker | None = None, snr_db: float | None = None) -> Spoken:
-        """Let somebody in the room say a text; return when the words begin and end.
+        """Play a text as said by a person in the room; return when the words begin and end.
 
         Raises:
             VoiceError: the talker's words do not become sound.

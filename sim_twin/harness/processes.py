@@ -141,7 +141,7 @@ class ProcessStack(RunningRobot, RemoteReferee):
         return document
 
     def speak(self, text: str, voice: str = "en-gb", snr_db: float | None = None) -> dict[str, Any]:
-        """Let somebody in the room say a text; return when the words begin and end, host's time.
+        """Play a text as said by a person in the room; return its begin and end, host's time.
 
         Raises:
             TwinError: the twin does not answer, or the robot has no microphone.

@@ -122,7 +122,7 @@ class RobotUnderTest(ABC):
         return True
 
     def pause(self, duration_s: float) -> None:
-        """Let time pass."""
+        """Wait for a time of the robot's clock."""
         self.clock.sleep_until(self.clock.now_ns() + round(duration_s * NS_PER_S))
 
     def since_s(self, began_ns: int) -> float:
@@ -223,7 +223,7 @@ class RunningRobot(RobotUnderTest):
         self.send_signal(name, signal.SIGKILL)
 
     def freeze(self, name: str) -> None:
-        """Let a process neither run nor end, as a machine that hangs would.
+        """Freeze a process: it neither runs nor ends, as on a machine that hangs.
 
         Raises:
             RobotFailed: it does not run.
@@ -231,7 +231,7 @@ class RunningRobot(RobotUnderTest):
         self.send_signal(name, signal.SIGSTOP)
 
     def thaw(self, name: str) -> None:
-        """Let a frozen process go on.
+        """Resume a frozen process.
 
         Raises:
             RobotFailed: it does not run.

@@ -120,7 +120,7 @@ class RobotService(RunningRobot):
         self.arm(_ARM_S)
 
     def has_ended(self) -> bool:
-        """Return whether the service has ended as a person wanted: nobody starts it again."""
+        """Return whether the service has ended as a person wanted, and is not started again."""
         return self._runner.state is RunnerState.INACTIVE
 
     def skill(self) -> str:

@@ -228,7 +228,7 @@ class ServiceRunner:
         end_process(process, self.rules.stop_timeout_s)
 
     def _end_members(self) -> None:
-        """Let children come to rest, then kill what is left (KillMode=mixed)."""
+        """Wait for children to come to rest, then kill what is left (KillMode=mixed)."""
         left = self.members()
         _, left = psutil.wait_procs(left, timeout=self.rules.settle_s)
         for process in left:

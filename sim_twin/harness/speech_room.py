@@ -47,7 +47,7 @@ class SpeechRoom:
         return self.clock.ns / NS_PER_S
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
+        """Run for a simulated time."""
         for _ in range(round(seconds * NS_PER_S / STEP_NS)):
             self.clock.ns += STEP_NS
             self.node.step()
@@ -66,7 +66,7 @@ class SpeechRoom:
         return None
 
     def person_says(self, text: str, talker: Talker, snr_db: float | None = None) -> float:
-        """Let somebody begin to speak now; return for how many seconds words arrive."""
+        """Begin to play a person's words now; return for how many seconds words arrive."""
         room = self.ear.room
         heard = arrival(text, talker, room.rate_hz, room.acoustics, snr_db=snr_db)
         room.lay(heard.sound.wave, room.row_at(self.clock.ns))
