@@ -220,4 +220,4 @@ def ros_graph(
             process.kill()
             process.communicate()
     if any(process.returncode for process in graph.started):
-        remove_leftovers(young_s=0.0)
+        remove_leftovers()  # young ones stay: they may be a process's of another test that starts
