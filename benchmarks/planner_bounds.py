@@ -60,7 +60,10 @@ def moves(plan: Mapping[str, Any]) -> bool:
 def _order_faults(actions: Sequence[Mapping[str, Any]]) -> list[str]:
     ids = [action.get("id") for action in actions]
     faults = [] if len(set(ids)) == len(ids) else ["an id stands twice"]
-    left = {action.get("id"): set(action.get("depends_on", ())) for action in actions}
+    left = {
+        action.get("id"): {*action.get("depends_on", ()), *action.get("after", ())}
+        for action in actions
+    }
     while ready := [name for name, needs in left.items() if not needs & set(left)]:
         for name in ready:
             del left[name]

@@ -54,7 +54,11 @@ def in_order(actions: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """
     waiting, done, ordered = list(actions), set[str](), list[Mapping[str, Any]]()
     while waiting:
-        ready = [one for one in waiting if done.issuperset(one.get("depends_on", ()))]
+        ready = [
+            one
+            for one in waiting
+            if done.issuperset((*one.get("depends_on", ()), *one.get("after", ())))
+        ]
         if not ready:
             raise ActionFails(f"{waiting[0]['id']} waits for what never comes")
         ordered.append(ready[0])

@@ -31,7 +31,8 @@ ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "id": ("id", "action_id", "step"),
     "skill": ("skill", "action", "action_type", "name", "type"),
     "parameters": ("parameters", "params", "args", "arguments"),
-    "depends_on": ("depends_on", "dependencies", "after"),
+    "depends_on": ("depends_on", "dependencies"),
+    "after": ("after",),
     "description": ("description", "reason"),
     "priority": ("priority",),
     "estimated_duration_s": ("estimated_duration_s", "estimated_duration", "duration"),
@@ -44,7 +45,7 @@ _KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for ali
 # The typed dialect's `type` is a category next to `action`; it is dropped when a skill is named.
 CATEGORIES = frozenset({"navigation", "manipulation", "interaction", "perception", "movement"})
 PLAN_TEXTS = ("summary", "reasoning", "feasible", "safety_concerns", "success_criteria")
-PRIORITIES = {0: "high", 1: "high", 2: "medium", 3: "low", "critical": "high", "normal": "medium"}
+PRIORITIES = {"critical": "high", "normal": "medium"}
 
 ParameterMap = Callable[[Json], Json]
 
@@ -181,7 +182,7 @@ def _canonical_action(action: Any, number: int, previous: str | None) -> Json:
     elif "depends_on" not in canonical and previous is not None:
         canonical["depends_on"] = [previous]
     priority = canonical.get("priority")
-    if isinstance(priority, str | int):
+    if isinstance(priority, str):
         canonical["priority"] = PRIORITIES.get(priority, priority)
     skill = str(canonical.get("skill", "")).strip().lower().replace(" ", "_")
     parameters = canonical.get("parameters", {})

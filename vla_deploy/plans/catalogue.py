@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from types import MappingProxyType
 
 from vla_deploy.world.relations import NEXT_TO
@@ -12,11 +12,29 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 ARMS = ("left", "right")
 GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
 RELATIONS = (IN, ON, NEXT_TO)
-NAVIGATION_TIMEOUT_S = 300.0
-MANIPULATION_TIMEOUT_S = 120.0
-DEFAULT_TIMEOUT_S = 60.0
 # These skills move nothing.
 MOTIONLESS = frozenset({"speak", "wait", "stop"})
+
+
+class SkillKind(StrEnum):
+    """Name the kinds of skill by what they do; time-outs go by them."""
+
+    NAVIGATION = "navigation"
+    MANIPULATION = "manipulation"
+    INTERACTION = "interaction"
+    PERCEPTION = "perception"
+    MOVEMENT = "movement"
+
+
+DEFAULT_TIMEOUT_S = 60.0
+NAVIGATION_TIMEOUT_S = 300.0
+TIMEOUTS_S = MappingProxyType(
+    {
+        **dict.fromkeys(SkillKind, DEFAULT_TIMEOUT_S),
+        SkillKind.NAVIGATION: NAVIGATION_TIMEOUT_S,
+        SkillKind.MANIPULATION: 120.0,
+    }
+)
 
 
 class Type(Enum):
@@ -49,12 +67,18 @@ class SkillSpec:
     """
 
     summary: str
+    kind: SkillKind
     parameters: dict[str, SkillParameter]
     one_of: tuple[tuple[str, ...], ...] = ()
     resources: tuple[str, ...] = ()
-    timeout_s: float = DEFAULT_TIMEOUT_S
+    own_timeout_s: float | None = None
     estimated_duration_s: float = 1.0
     retryable: bool = False
+
+    @property
+    def timeout_s(self) -> float:
+        """Return how long an action may take: its own time-out, or that of its kind."""
+        return TIMEOUTS_S[self.kind] if self.own_timeout_s is None else self.own_timeout_s
 
 
 def _number(minimum: float, maximum: float, *, required: bool = True) -> SkillParameter:
@@ -74,6 +98,7 @@ _SPEED = _number(0.05, 2.0, required=False)
 SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
     {
         "navigate_to": SkillSpec(
+            kind=SkillKind.NAVIGATION,
             summary="drive to a named place, to where an object can be reached, or to a point",
             parameters={
                 "place": SkillParameter(type=Type.PLACE, required=False),
@@ -85,23 +110,25 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
             resources=("base", "head", "camera", "arms"),
-            timeout_s=NAVIGATION_TIMEOUT_S,
             estimated_duration_s=15.0,
             retryable=True,
         ),
         "move": SkillSpec(
+            kind=SkillKind.MOVEMENT,
             summary="drive straight, forward or (negative) backward",
             parameters={"distance_m": _number(-3, 3), "speed_m_s": _SPEED},
             resources=("base",),
             estimated_duration_s=4.0,
         ),
         "turn": SkillSpec(
+            kind=SkillKind.MOVEMENT,
             summary="turn on the spot, counter-clockwise positive",
             parameters={"angle_rad": _number(-2 * math.pi, 2 * math.pi)},
             resources=("base",),
             estimated_duration_s=4.0,
         ),
         "look_at": SkillSpec(
+            kind=SkillKind.PERCEPTION,
             summary="turn the head to an object or a direction",
             parameters={
                 "object": _OBJECT_OR_ELSE,
@@ -112,22 +139,24 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             estimated_duration_s=2.0,
         ),
         "find_object": SkillSpec(
+            kind=SkillKind.PERCEPTION,
             summary="look for an object, from here and then from each viewpoint",
             parameters={"object": _OBJECT},
             resources=("base", "head", "camera", "arms"),
-            timeout_s=NAVIGATION_TIMEOUT_S,
+            own_timeout_s=NAVIGATION_TIMEOUT_S,  # it drives from one viewpoint to the next
             estimated_duration_s=10.0,
             retryable=True,
         ),
         "pick_up": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="grasp an object within reach and verify the grasp",
             parameters={"object": _OBJECT, "arm": _ARM},
             resources=("base", "head", "camera", "arms"),
-            timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=15.0,
             retryable=True,
         ),
         "place": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="put what is held in, on or next to something within reach",
             parameters={
                 "destination": SkillParameter(type=Type.DESTINATION),
@@ -135,48 +164,53 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 "arm": _ARM,
             },
             resources=("base", "head", "camera", "arms"),
-            timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=12.0,
             retryable=True,
         ),
         "hand_over": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="give a person what a hand holds: it opens when it feels a pull",
             parameters={"arm": _ARM},
             resources=("base", "arms", "speaker"),
-            timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=15.0,
         ),
         "open_gripper": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="open a gripper, letting go of what it holds",
             parameters={"arm": _ARM},
             resources=("arm",),
             estimated_duration_s=2.0,
         ),
         "close_gripper": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="close a gripper until it is shut or holds something",
             parameters={"arm": _ARM},
             resources=("arm",),
             estimated_duration_s=2.0,
         ),
         "move_arm": SkillSpec(
+            kind=SkillKind.MANIPULATION,
             summary="bring the arms to a named pose of the robot file",
             parameters={"pose": SkillParameter(type=Type.TEXT), "arm": _ARM},
             resources=("arm",),
             estimated_duration_s=4.0,
         ),
         "speak": SkillSpec(
+            kind=SkillKind.INTERACTION,
             summary="say a sentence",
             parameters={"text": SkillParameter(type=Type.TEXT)},
             resources=("speaker",),
             estimated_duration_s=1.0,
         ),
         "wait": SkillSpec(
+            kind=SkillKind.INTERACTION,
             summary="do nothing for a while",
             parameters={"duration_s": _number(0, 600)},
-            timeout_s=660.0,
+            own_timeout_s=660.0,
             estimated_duration_s=5.0,
         ),
         "stop": SkillSpec(
+            kind=SkillKind.MOVEMENT,
             summary="bring the base and the arms to rest",
             parameters={},
             resources=("base", "head", "arms"),

@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from graphlib import CycleError, TopologicalSorter
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from vla_deploy.plans.catalogue import SkillKind
 
 MOST_ACTIONS: Final = 100
 PUT_IN: Final = "put in"
@@ -16,16 +18,39 @@ Skill = tuple[str, Mapping[str, Any]]
 """The name of a skill, and its parameters."""
 
 
-class ActionPriority(StrEnum):
-    """Rank actions whose dependencies allow either order."""
+PRIORITIES: Final[Mapping[str, int]] = {"high": 1, "medium": 2, "low": 3}
+"""What the words for priorities are as numbers; the least number comes first."""
 
-    HIGH = "high"
-    MEDIUM = "medium"
-    LOW = "low"
+
+def _number_of(priority: Any) -> Any:
+    return PRIORITIES.get(priority, priority) if isinstance(priority, str) else priority
+
+
+Priority = Annotated[int, BeforeValidator(_number_of)]
+
+
+class ExecutionOptions(BaseModel):
+    """Say how a plan goes on where actions fail, and how long they may take.
+
+    With `continue_on_error` only what depends on a failed action is cancelled. `max_retries` is
+    for each action that may be tried again, `timeouts_s` (s) for each kind of skill.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    continue_on_error: bool = False
+    max_retries: int = Field(default=1, ge=0, le=10)
+    safety_check: Literal[True] = True
+    timeouts_s: dict[SkillKind, Annotated[float, Field(gt=0.0, le=3600.0)]] = Field(
+        default_factory=dict
+    )
 
 
 class Action(BaseModel):
-    """Name one skill with its parameters and what must come before it."""
+    """Name one skill with its parameters and what must come before it.
+
+    What it depends on must have succeeded, what it comes `after` must only have ended.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -33,13 +58,19 @@ class Action(BaseModel):
     skill: str = Field(min_length=1, max_length=64)
     parameters: dict[str, Any] = Field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
-    priority: ActionPriority = ActionPriority.MEDIUM
+    after: tuple[str, ...] = ()
+    priority: Priority = PRIORITIES["medium"]
     description: str = ""
     estimated_duration_s: float = Field(default=0.0, ge=0.0)
     feasibility_score: float = Field(default=1.0, ge=0.0, le=1.0)
     resources: tuple[str, ...] = ()
     preconditions: tuple[str, ...] = ()
     effects: tuple[str, ...] = ()
+
+    @property
+    def earlier(self) -> tuple[str, ...]:
+        """Return the actions that must have ended before this one begins."""
+        return (*self.depends_on, *self.after)
 
 
 class Plan(BaseModel):
@@ -58,6 +89,7 @@ class Plan(BaseModel):
     safety_concerns: tuple[str, ...] = ()
     success_criteria: tuple[str, ...] = ()
     keeps_out: tuple[str, ...] = ()
+    options: ExecutionOptions = ExecutionOptions()
 
 
 class FailureCause(StrEnum):
@@ -73,9 +105,6 @@ def plan_schema() -> dict[str, Any]:
     return Plan.model_json_schema()
 
 
-_RANK: Final = {ActionPriority.HIGH: 0, ActionPriority.MEDIUM: 1, ActionPriority.LOW: 2}
-
-
 def dependency_faults(actions: Sequence[Action]) -> list[str]:
     """Return every duplicate id, unknown dependency and cycle."""
     ids = [action.id for action in actions]
@@ -85,11 +114,11 @@ def dependency_faults(actions: Sequence[Action]) -> list[str]:
     faults += [
         f'action "{action.id}" depends on "{needed}", which is not in the plan'
         for action in actions
-        for needed in action.depends_on
+        for needed in action.earlier
         if needed not in ids
     ]
     try:
-        TopologicalSorter({action.id: action.depends_on for action in actions}).prepare()
+        TopologicalSorter({action.id: action.earlier for action in actions}).prepare()
     except CycleError as error:
         faults.append("the dependencies form a cycle: " + " -> ".join(reversed(error.args[1])))
     return faults
@@ -105,10 +134,10 @@ def execution_order(actions: Sequence[Action]) -> list[Action]:
     finished: set[str] = set()
     ordered: list[Action] = []
     while waiting:
-        ready = [action for action in waiting if finished.issuperset(action.depends_on)]
+        ready = [action for action in waiting if finished.issuperset(action.earlier)]
         if not ready:
             raise ValueError("; ".join(dependency_faults(actions)))
-        chosen = min(ready, key=lambda action: _RANK[action.priority])
+        chosen = min(ready, key=lambda action: action.priority)
         waiting.remove(chosen)
         finished.add(chosen.id)
         ordered.append(chosen)

@@ -22,7 +22,7 @@ from vla_deploy.skills.errors import (
     SkillFailed,
     TryAgain,
 )
-from vla_deploy.skills.resources import PRIORITIES, WAIT_LIMIT_S, needs_of
+from vla_deploy.skills.resources import WAIT_LIMIT_S, needs_of
 from vla_deploy.skills.table import SKILL_FUNCTIONS
 from vla_deploy.skills.world_check import WorldCheck
 
@@ -184,10 +184,13 @@ class PlanExecution:
 
     def _start_ready(self, now_ns: int) -> None:
         done = {one.action.id for one in self.records if one.status is ActionStatus.SUCCEEDED}
+        ended = {one.action.id for one in self.records if one.status in FINAL}
         ready = [
             one
             for one in self.records
-            if one.status is ActionStatus.PENDING and done.issuperset(one.action.depends_on)
+            if one.status is ActionStatus.PENDING
+            and done.issuperset(one.action.depends_on)
+            and ended.issuperset(one.action.after)
         ]
         for record in ready:
             self._ask_once(record)
@@ -205,7 +208,7 @@ class PlanExecution:
             self._context.claims.ask(
                 self._holder(action),
                 needs_of(action, self._context.robot),
-                priority=PRIORITIES[action.priority],
+                priority=-action.priority,  # claims know the greatest as the first
                 timeout_s=WAIT_LIMIT_S,
             )
         except ClaimRefused as error:

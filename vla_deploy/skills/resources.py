@@ -1,10 +1,9 @@
 """Say which parts of the robot an action needs, and how much of each there is."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from vla_deploy.plans.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
-from vla_deploy.plans.plan import Action, ActionPriority
+from vla_deploy.plans.plan import Action
 from vla_deploy.robots import RobotDescription
 
 ARMS: Final = "arms"
@@ -12,11 +11,6 @@ ONE_ARM: Final = "arm"
 SENSES: Final = ("camera", "speaker")
 # Whoever waits longer than the longest skill takes waits for something that will not end.
 WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
-PRIORITIES: Final[Mapping[ActionPriority, int]] = {
-    ActionPriority.HIGH: 2,
-    ActionPriority.MEDIUM: 1,
-    ActionPriority.LOW: 0,
-}
 
 
 def body_of(robot: RobotDescription) -> dict[str, int]:

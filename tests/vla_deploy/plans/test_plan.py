@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from vla_deploy.plans.plan import (
     Action,
-    ActionPriority,
     Plan,
     dependency_faults,
     execution_order,
@@ -48,8 +47,8 @@ def test_a_plan_either_has_an_order_or_a_cycle_that_really_is_one(
 
 def test_dependencies_come_first_and_priority_second() -> None:
     actions = [
-        Action(id="low", skill="stop", priority=ActionPriority.LOW),
-        Action(id="high", skill="stop", priority=ActionPriority.HIGH, depends_on=("low",)),
+        Action(id="low", skill="stop", priority="low"),
+        Action(id="high", skill="stop", priority=1, depends_on=("low",)),
         Action(id="medium", skill="stop"),
     ]
     assert [action.id for action in execution_order(actions)] == ["medium", "low", "high"]

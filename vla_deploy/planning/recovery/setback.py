@@ -100,7 +100,11 @@ def numbered(plan: Plan, number: int) -> Plan:
     names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
     actions = tuple(
         one.model_copy(
-            update={"id": names[one.id], "depends_on": tuple(names[it] for it in one.depends_on)}
+            update={
+                "id": names[one.id],
+                "depends_on": tuple(names[it] for it in one.depends_on),
+                "after": tuple(names[it] for it in one.after),
+            }
         )
         for one in plan.actions
     )

@@ -128,6 +128,6 @@ def _in_turn(steps: Steps) -> tuple[Action, ...]:
     """Return the actions with each waiting for the one before it."""
     needed = [(), *((one.id,) for one in steps)]
     return tuple(
-        one.model_copy(update={"depends_on": before})
+        one.model_copy(update={"depends_on": before, "after": ()})
         for one, before in zip(steps, needed, strict=False)
     )

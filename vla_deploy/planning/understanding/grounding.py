@@ -89,9 +89,8 @@ class _Grounder:
 
     def add(self, action: Action) -> None:
         """Ground an action, with what must come before it, into none, one or several."""
-        needed = tuple(
-            dict.fromkeys(name for one in action.depends_on for name in self._last.get(one, (one,)))
-        )
+        needed, earlier = self._now_called(action.depends_on), self._now_called(action.after)
+        action = action.model_copy(update={"after": earlier})
         for skill, parameters in self._steps(action):
             step = _made(action, skill, parameters, "")
             if skill == action.skill:
@@ -103,6 +102,10 @@ class _Grounder:
                     needed = self._append(_made(step, *missing), needed)
             needed = self._append(step, needed)
         self._last[action.id] = needed
+
+    def _now_called(self, ids: tuple[str, ...]) -> tuple[str, ...]:
+        """Return what actions of the proposal have become."""
+        return tuple(dict.fromkeys(name for one in ids for name in self._last.get(one, (one,))))
 
     def _with_hand(self, step: Action) -> Action:
         """Name the hands when a second thing is taken: who puts down must know which is where."""
@@ -281,6 +284,7 @@ def _made(
         id=f"{action.id[:40]}_{skill}",
         skill=skill,
         parameters=dict(parameters),
+        after=action.after,
         priority=action.priority,
         description=description,
     )

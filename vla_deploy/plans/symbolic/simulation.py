@@ -88,7 +88,7 @@ def in_turn(actions: Sequence[Action]) -> tuple[Action, ...]:
     ordered: list[Action] = []
     for action in execution_order(actions):
         known: set[str] = set()
-        for needed in action.depends_on:
+        for needed in action.earlier:
             known |= {needed, *before.get(needed, ())}
         added: list[str] = []
         for one in reversed(ordered):
@@ -96,8 +96,7 @@ def in_turn(actions: Sequence[Action]) -> tuple[Action, ...]:
                 added.append(one.id)
                 known |= {one.id, *before[one.id]}
         before[action.id] = known
-        depends_on = (*action.depends_on, *added)
-        ordered.append(action.model_copy(update={"depends_on": depends_on}))
+        ordered.append(action.model_copy(update={"after": (*action.after, *added)}))
     return tuple(ordered)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.ipc.ros_goals import MOST_POINTS, GoalKind, GoalRequest, GoalState
-from vla_deploy.plans.catalogue import MANIPULATION_TIMEOUT_S, NAVIGATION_TIMEOUT_S
+from vla_deploy.plans.catalogue import TIMEOUTS_S, SkillKind
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import Skill, SkillContext
@@ -103,7 +103,7 @@ def navigation_request(
         server=NAVIGATION_SERVER,
         holder=context.holder,
         parts=(BASE,),
-        timeout_s=NAVIGATION_TIMEOUT_S,
+        timeout_s=TIMEOUTS_S[SkillKind.NAVIGATION],
         pose=(float(target.x_m), float(target.y_m), float(target.yaw_rad)),
         most_m_s=speed_m_s or 0.0,
     )
@@ -132,7 +132,7 @@ def trajectory_requests(
                 server=server,
                 holder=context.holder,
                 parts=tuple(parts),
-                timeout_s=MANIPULATION_TIMEOUT_S,
+                timeout_s=TIMEOUTS_S[SkillKind.MANIPULATION],
                 joints=joints,
                 times_s=tuple(np.round(times_s[1:], 6).tolist()),
                 positions=tuple(map(tuple, np.round(positions[1:], 6).tolist())),

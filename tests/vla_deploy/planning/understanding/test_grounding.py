@@ -178,7 +178,7 @@ def test_actions_that_share_a_part_come_in_turn(home: "Home") -> None:
                Action(id="b", skill="move", parameters={"distance_m": 0.2}),
                Action(id="s", skill="speak", parameters={"text": "hello"}))  # fmt: skip
     found = ground_plan(Plan(goal="x", actions=actions), home.ask())
-    assert {one.id: one.depends_on for one in found.actions} == {
+    assert {one.id: one.earlier for one in found.actions} == {
         "a": (),
         "b": ("a",),
         "s": (),

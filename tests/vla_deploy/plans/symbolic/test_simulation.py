@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.knowledge import World, world_of
-from vla_deploy.plans.plan import Action, ActionPriority
+from vla_deploy.plans.plan import Action
 from vla_deploy.plans.symbolic.simulation import (
     bounds_faults,
     end_state,
@@ -233,7 +233,7 @@ def action(name: str, skill: str, *after: str, **changes: object) -> Action:
 
 
 def ordered(*actions: Action) -> dict[str, tuple[str, ...]]:
-    return {one.id: one.depends_on for one in in_turn(actions)}
+    return {one.id: one.earlier for one in in_turn(actions)}
 
 
 def test_what_shares_nothing_runs_side_by_side() -> None:
@@ -253,7 +253,7 @@ def test_unordered_actions_are_put_in_turn_by_priority() -> None:
     actions = (
         action("a", "turn"),
         action("b", "move"),
-        action("c", "stop", priority=ActionPriority.HIGH),
+        action("c", "stop", priority=1),
         action("s", "speak"),
     )
     assert ordered(*actions) == {

@@ -39,10 +39,14 @@ function Step({ action }) {
         </p>
         ${action.error && html`<p class="step-why">${action.error}</p>`}
         ${action.note && html`<p class="quiet small">${action.note}</p>`}
-        ${action.depends_on?.length > 1 && html`<p class="quiet small">after ${action.depends_on.join(", ")}</p>`}
+        ${earlier(action).length > 1 && html`<p class="quiet small">after ${earlier(action).join(", ")}</p>`}
       </div>
     </li>
   `;
+}
+
+function earlier(action) {
+  return [...(action.depends_on ?? []), ...(action.after ?? [])];
 }
 
 function retries(count) {

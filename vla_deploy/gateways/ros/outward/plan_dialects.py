@@ -88,7 +88,8 @@ def _depths(actions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     depths = {str(action["id"]): 1 for action in actions}
     for _ in actions:  # a validated plan has no cycles, but need not be in order
         for action in actions:
-            before = [depths[name] for name in action.get("depends_on", ()) if name in depths]
+            earlier = (*action.get("depends_on", ()), *action.get("after", ()))
+            before = [depths[name] for name in earlier if name in depths]
             depths[action["id"]] = 1 + max(before, default=0)
     return depths
 
