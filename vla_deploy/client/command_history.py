@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.action_status import summary_of
 from vla_deploy.client.command_record import CommandRecord, Kind, record_of
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
@@ -143,5 +144,6 @@ def _unanswered(command_id: str) -> FinishedEvent:
         "event": "finished",
         "success": False,
         "error": _UNANSWERED,
+        "summary": summary_of(()),
         "actions": [],
     }
