@@ -156,6 +156,10 @@ class PlannerNode:
             return
         try:
             self._check_age(event)
+            if "pause" in event.payload:
+                command = UserCommand(command_id=command_id_of(event), told_ns=event.stamp_ns)
+                self._manager.pause(command, pause=bool(event.payload["pause"]))
+                return
             self._manager.take(read_command(event))
         except PlanError as error:
             self._manager.metrics.refused += 1

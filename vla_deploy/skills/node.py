@@ -163,7 +163,7 @@ class ExecutorNode:
         command_id = message["command_id"]
         job = self._jobs.get(command_id)
         if "pause" in message:
-            self._pause(pause=message["pause"])
+            self._pause(command_id, pause=message["pause"])
         elif "cancel" in message:
             self._cancel(command_id, message.get("of"))
         elif "give_up" in message:
@@ -192,7 +192,8 @@ class ExecutorNode:
         )
         self._jobs[command_id] = job
 
-    def _pause(self, *, pause: bool) -> None:
+    def _pause(self, command_id: str, *, pause: bool) -> None:
+        """Come to rest with all that goes on, or go on with it, and answer."""
         link, ros = self._skills.link, self._skills.ros
         if not pause:
             link.resume()
@@ -200,6 +201,20 @@ class ExecutorNode:
             link.pause()
             if ros is not None:
                 ros.pause()
+        self._answer(command_id, "" if self._jobs else "nothing is under way")
+
+    def _answer(self, command_id: str, error: str = "") -> None:
+        """Say that what was asked for is done, or why not."""
+        self._events.publish(
+            {
+                "command_id": command_id,
+                "event": "finished",
+                "success": not error,
+                "error": error or None,
+                "summary": summary_of(()),
+                "actions": [],
+            }
+        )
 
     def _cancel(self, command_id: str, of: str | None) -> None:
         """End one command, or all; what else this executor moves comes to rest with the last."""
@@ -208,16 +223,7 @@ class ExecutorNode:
         if of is None:
             self._skills.link.halt()
             self._skills.link.resume()
-        self._events.publish(
-            {
-                "command_id": command_id,
-                "event": "finished",
-                "success": True,
-                "error": None,
-                "summary": summary_of(()),
-                "actions": [],
-            }
-        )
+        self._answer(command_id)
 
     def _advance(self, job: _Job) -> None:
         if job.execution is not None:

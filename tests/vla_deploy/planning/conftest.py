@@ -145,7 +145,9 @@ class Desk:
 
     def executor_is(self, state: str, **holding: str | None) -> None:
         """Let the executor tell what it does, and what the hands hold."""
-        self._executor_status.put_document({"state": state, "holding": holding})
+        commands = [] if state == "idle" else ["another"]
+        document = {"state": state, "commands": commands, "holding": holding}
+        self._executor_status.put_document(document)
 
     def sees(self, *names: str) -> None:
         """Let perception tell of things such as "red cup_1", in a row on the coffee table."""
@@ -170,6 +172,10 @@ class Desk:
 
     def executor_tells(self, **event: object) -> None:
         self._executor.publish(event)
+
+    def ends(self, command_id: str) -> None:
+        """Let the executor tell that a command has succeeded."""
+        self.executor_tells(command_id=command_id, event="finished", success=True, error=None)
 
     def answers_to(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
         """Give an utterance, and return the events of the planner's next step."""

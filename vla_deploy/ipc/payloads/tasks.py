@@ -34,7 +34,7 @@ class HeardEvidence(HeardDoubt):
 
 
 class UtteranceContent(TypedDict, total=False):
-    """Give a command in words or as a plan, cancel all, or answer what was asked and nothing else.
+    """Give a command in words or as a plan, cancel or pause all, or answer what was asked alone.
 
     `heard` comes with the source "voice".
     """
@@ -42,6 +42,7 @@ class UtteranceContent(TypedDict, total=False):
     text: str
     plan: PlanDocument
     cancel: bool
+    pause: bool
     answer: bool
     heard: HeardEvidence
 

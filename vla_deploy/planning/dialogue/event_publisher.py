@@ -42,6 +42,10 @@ class PlannerEvents:
         """Let the executor end what it does."""
         self._plans.publish({"command_id": command_id, "cancel": True})
 
+    def paused(self, command_id: str, *, pause: bool) -> None:
+        """Let the executor come to rest with all that it does, or go on."""
+        self._plans.publish({"command_id": command_id, "pause": pause})
+
     def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
         """Publish that a plan takes time, and which back ends are asked."""
         self._events.publish(

@@ -86,8 +86,19 @@ class Situation:
     @property
     def is_executing(self) -> bool:
         """Return whether the executor says that it carries out a plan, from any source."""
+        return bool(self.executing)
+
+    @property
+    def executing(self) -> frozenset[str] | None:
+        """Return the commands that the executor says it carries out, None while it is silent."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
-        return sample is not None and sample.document().get("state", "idle") != "idle"
+        return None if sample is None else frozenset(sample.document()["commands"])
+
+    @property
+    def is_paused(self) -> bool:
+        """Return whether the executor says that it has paused."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        return sample is not None and sample.document()["state"] == "paused"
 
     def check_ready(self) -> None:
         """Accept that the robot moves now.
