@@ -80,7 +80,7 @@ class CommandHistory:
     def _hear(self, event: Event[Utterance]) -> None:
         record = record_of(event.payload, self._wall_s(event.stamp_ns))
         self._keep(record)
-        if record.kind is not Kind.CANCEL:
+        if record.kind in (Kind.COMMAND, Kind.ANSWER):
             link = self._link
             self._open[record.command_id] = Following(
                 record.command_id,
