@@ -16,6 +16,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
+from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.node import PlannerNode
@@ -122,6 +123,7 @@ class Desk:
         )
         self._slow = slow
         self._given = 0
+        self.carried_out = ["another"]
         self._utterances = self._space.ring_writer("utterance")
         self._events = self._space.ring_reader("task_event", from_start=True)
         self._plans = self._space.ring_reader("plan", from_start=True)
@@ -136,16 +138,34 @@ class Desk:
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
         planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
-        self.planner = PlannerNode(self._context, butler(), planner, self.executor, self.memory)
+        self.planner = PlannerNode(
+            self._context,
+            butler(),
+            planner,
+            self.executor,
+            self.memory,
+            missions=MissionStore(self._context.run_dir / "missions.json"),
+            wall_s=self.wall_s,
+        )
         self.planner.start()
         return self.planner
+
+    def wall_s(self) -> float:
+        """Return Unix seconds, which go by the desk's clock."""
+        return 1_750_000_000.0 + self.clock.now_ns() / NS_PER_S
+
+    def missions(self) -> list[dict[str, Any]]:
+        """Return the missions as the planner shows them, the newest first."""
+        sample = self._space.cell_reader("missions").latest()
+        assert sample is not None
+        return sample.document()["missions"]
 
     def control(self, state: str) -> None:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
 
     def executor_is(self, state: str, **holding: str | None) -> None:
         """Let the executor tell what it does, and what the hands hold."""
-        commands = [] if state == "idle" else ["another"]
+        commands = [] if state == "idle" else self.carried_out
         document = {"state": state, "commands": commands, "holding": holding}
         self._executor_status.put_document(document)
 

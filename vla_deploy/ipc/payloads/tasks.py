@@ -33,8 +33,16 @@ class HeardEvidence(HeardDoubt):
     others: list[OtherWords]
 
 
+class MissionAct(TypedDict):
+    """Cancel a mission, one that waits for its time among them."""
+
+    cancel: str
+
+
 class UtteranceContent(TypedDict, total=False):
     """Give a command in words or as a plan, cancel or pause all, or answer what was asked alone.
+
+    `mission` is one as a document, or an act about one that was given.
 
     `heard` comes with the source "voice".
     """
@@ -43,6 +51,8 @@ class UtteranceContent(TypedDict, total=False):
     plan: PlanDocument
     cancel: bool
     pause: bool
+    mission: dict[str, Any] | list[Any]
+    mission_act: MissionAct
     answer: bool
     heard: HeardEvidence
 
@@ -227,6 +237,18 @@ class CommandSummary(TypedDict):
     success_rate: float
 
 
+class ObjectiveEvent(TypedDict):
+    """An objective of a mission, or one of its subtasks, stands otherwise than before."""
+
+    command_id: str
+    event: Literal["objective"]
+    part: str
+    words: str
+    state: str
+    error: str | None
+    note: str | None
+
+
 class FinishedEvent(TypedDict):
     """The command has ended; `actions` are those of all its plans.
 
@@ -252,6 +274,7 @@ TaskEvent = (
     | ActionEvent
     | SetbackEvent
     | SaidEvent
+    | ObjectiveEvent
     | FinishedEvent
 )
 
@@ -315,3 +338,13 @@ class PlannerStatus(PlannerCounts, BackEndsStatus):
     question: str | None
     prohibitions: list[str]
     memory: MemoryStatus | None
+
+
+class MissionsDocument(TypedDict):
+    """Hold the newest missions, the newest first, as `vla_deploy/missions/progress.py` has them.
+
+    `trouble` says why missions are not kept over a restart, "" where they are.
+    """
+
+    missions: list[dict[str, Any]]
+    trouble: str

@@ -166,11 +166,27 @@ class CommandManager:
         stop = UserCommand(command_id=command_id, told_ns=self._clock.now_ns(), text="stop")
         self.dialogue.remember(stop, TurnOutcome.CANCELLED)
 
+    def take_part(self, command: UserCommand) -> None:
+        """Take a subtask of a mission: no answer, no word, no objection."""
+        self._queue.append(command)
+
+    def drop(self, command_id: str) -> None:
+        """End one command, wherever it is."""
+        asked = self.dialogue.pending
+        if asked is not None and asked.command.command_id == command_id:
+            self.dialogue.settle()
+        if self._async.command is not None and self._async.command.command_id == command_id:
+            self._async.call_off()
+        self._queue = deque(one for one in self._queue if one.command_id != command_id)
+        self._turns.drop(command_id)
+        if self._active.end(command_id) is not None:
+            self._events.cancelled(f"{command_id}-cancel", command_id)
+
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command."""
         ended = self._active.end(command_id)
         self.dialogue.ended(command_id, success, error)
-        if ended is not None:
+        if ended is not None and not ended[0].mission:
             self._events.ended(*ended, success, error)
 
     def turned_away(self, command_id: str, error: str) -> None:
@@ -283,7 +299,9 @@ class CommandManager:
             return
         executing = self._situation.executing
         for command_id in self._active.lost(executing or (), self._clock.now_ns()):
-            self.has_ended(command_id, False, "the executor does not know of it any more")
+            why = "the executor does not know of it any more"
+            self.has_ended(command_id, False, why)
+            self._events.lost(command_id, why)
         for turn in self._turns.take_due(self._under_way):
             self._guarded(turn.command, turn.go_on)
 

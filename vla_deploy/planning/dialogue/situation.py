@@ -12,6 +12,7 @@ from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.ipc.topics import P
 from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
 from vla_deploy.memory.episode import sentence_of, unix_s
+from vla_deploy.missions.criteria import Facts
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
@@ -82,6 +83,13 @@ class Situation:
             recollections=recollections,
             last_seen=last_seen,
         )
+
+    def facts(self) -> Facts:
+        """Return what is known now, for criteria to be judged by."""
+        here = self._here()
+        scene = self._snapshot(here)
+        world = world_of(self._robot, self._holding(scene), self._is_free)
+        return Facts(world=world, scene=scene, here=here)
 
     @property
     def is_executing(self) -> bool:

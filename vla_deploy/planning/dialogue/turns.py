@@ -84,6 +84,10 @@ class Turns:
         due, self.waiting = self.waiting, []
         return iter(due)
 
+    def drop(self, command_id: str) -> None:
+        """Take out one command."""
+        self.waiting = [one for one in self.waiting if one.command.command_id != command_id]
+
     def clear(self) -> list[UserCommand]:
         """Take out all commands."""
         due, self.waiting = self.waiting, []
