@@ -14,6 +14,7 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.keeper import MemoryKeeper
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
+from vla_deploy.planning.dialogue.battery_watch import BatteryWatch
 from vla_deploy.planning.dialogue.command import (
     UserCommand,
     asks_to_stop,
@@ -63,6 +64,7 @@ class PlannerNode:
         self._memory = memory
         self._prohibitions = prohibitions
         self._keeper: MemoryKeeper | None = None
+        self._battery: BatteryWatch | None = None
         self._status_due_ns = 0
         self._is_stopped = False
         self._manager: CommandManager
@@ -88,15 +90,20 @@ class PlannerNode:
                 places=furniture_points(self._robot.places),
                 wall_s=unix_s,
             )
+        situation = Situation(self._space, self._clock, self._robot, self._memory)
         self._manager = CommandManager(
             self._planner,
-            Situation(self._space, self._clock, self._robot, self._memory),
+            situation,
             self._publisher,
             self._executor,
             self._clock,
             self._robot.planning.further_plans,
             self._prohibitions,
         )
+        if self._robot.battery is not None:
+            self._battery = BatteryWatch(
+                self._robot.battery, situation, self._manager, self._space, self._clock
+            )
         self._status = self._space.cell_writer(topics.PLANNER_STATUS)
         for command_id in before.in_work:
             self._refuse(command_id, AWAY)
@@ -112,6 +119,8 @@ class PlannerNode:
         for event in self._events.drain():
             self._note(event)
         self._manager.advance()
+        if self._battery is not None:
+            self._battery.step()
         if self._keeper is not None:
             self._keeper.step()
         now_ns = self._clock.now_ns()

@@ -33,6 +33,11 @@ class ActivePlans:
         """Return whether any plan is carried out."""
         return bool(self._active)
 
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """Return the plans that are carried out."""
+        return tuple(carried.plan for _, carried in self._active.values())
+
     def add(
         self,
         command: UserCommand,
