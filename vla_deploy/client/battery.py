@@ -43,7 +43,7 @@ def battery_sentences(battery: Mapping[str, Any]) -> str:
 
 
 def _why(battery: Mapping[str, Any], key: str) -> str:
-    reason = str(battery["reasons"].get(key, "")).removeprefix("missing, because ")
+    reason = str(battery["missing"].get(key, "")).removeprefix("missing, because ")
     return reason or SILENT
 
 

@@ -229,7 +229,7 @@ class ProfileStatus(TypedDict):
 
 
 class BatteryDocument(TypedDict):
-    """Describe the battery; what is not known is null, and `reasons` says why by its key.
+    """Describe the battery; what is not known is null, and `missing` says why by its key.
 
     `current_a` is positive into the battery. A charge that `is_estimate` was read off the voltage.
     `low` and `critical` follow the robot file's ratios, and stay while the charge is not known.
@@ -244,4 +244,4 @@ class BatteryDocument(TypedDict):
     is_charging: bool | None
     low: bool
     critical: bool
-    reasons: dict[str, str]
+    missing: dict[str, str]

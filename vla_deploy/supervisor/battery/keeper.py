@@ -83,9 +83,9 @@ class BatteryKeeper:
             "is_charging": reading.is_charging,
             "low": self._state.level >= BatteryLevel.LOW,
             "critical": self._state.level >= BatteryLevel.CRITICAL,
-            "reasons": {
+            "missing": {
                 key: why[:_REASON_CHARACTERS]
-                for key, why in reading.reasons.items()
+                for key, why in reading.missing.items()
                 if key not in known
             },
         }

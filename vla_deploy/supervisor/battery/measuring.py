@@ -1,5 +1,6 @@
 """Measure the battery by what the robot file names: the kernel's gauge, or the servos."""
 
+import logging
 import statistics
 from collections import deque
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from platforms.probes.reading import Reading
 from platforms.tree import Tree
 from vla_deploy.ipc import SharedSpace, topics
 
+_log = logging.getLogger(__name__)
 SILENT_NS: Final = 5 * NS_PER_S
 """A gauge that has not answered for so long has failed."""
 WINDOW_NS: Final = 30 * NS_PER_S
@@ -25,14 +27,14 @@ _SILENT: Final = "missing, because the gauge has not answered for {seconds:.0f} 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryReading:
-    """Hold what was measured at `stamp_ns`; `reasons` say by key why something is missing."""
+    """Hold what was measured at `stamp_ns`; `missing` say by key why something is missing."""
 
     stamp_ns: int
     voltage_v: float | None = None
     charge_ratio: float | None = None
     current_a: float | None = None
     is_charging: bool | None = None
-    reasons: Mapping[str, str] = field(default_factory=dict)
+    missing: Mapping[str, str] = field(default_factory=dict)
 
 
 class BatteryMeter(Protocol):
@@ -64,13 +66,22 @@ class GaugeMeter:
         if self._asked is None:
             self._ask(now_ns)
         if self._asked is not None and self._asked.done():
-            self._newest, self._asked = self._asked.result(), None
+            self._newest, self._asked = self._answer(self._asked, now_ns), None
         newest = self._newest
         heard_ns = self._asked_ns if newest is None else newest.stamp_ns
         if newest is None or now_ns - newest.stamp_ns > SILENT_NS:
             why = _SILENT.format(seconds=(now_ns - heard_ns) / NS_PER_S)
-            return BatteryReading(stamp_ns=now_ns, reasons=dict.fromkeys(_KEYS.values(), why))
+            return BatteryReading(stamp_ns=now_ns, missing=dict.fromkeys(_KEYS.values(), why))
         return newest
+
+    def _answer(self, asked: "Future[BatteryReading]", now_ns: int) -> BatteryReading:
+        """Return what came; a fault of the reading itself must not end the supervisor."""
+        error = asked.exception()
+        if error is None:
+            return asked.result()
+        _log.error("the battery's gauge could not be read", exc_info=error)
+        why = f"missing, because reading the gauge failed: {error!r}"
+        return BatteryReading(stamp_ns=now_ns, missing=dict.fromkeys(_KEYS.values(), why))
 
     def close(self) -> None:
         """Ask no more; a gauge that hangs is left behind."""
@@ -98,14 +109,14 @@ class ServoMeter:
         now_ns = self._clock.now_ns()
         while self._kept and now_ns - self._kept[0][0] > WINDOW_NS:
             self._kept.popleft()
-        reasons = dict.fromkeys(("charge_ratio", "current_a", "is_charging"), _VOLTAGE_ONLY)
+        missing = dict.fromkeys(("charge_ratio", "current_a", "is_charging"), _VOLTAGE_ONLY)
         volts = self._volts()
         if volts is None:
             why = "missing, because control tells no voltage of the servos"
-            return BatteryReading(stamp_ns=now_ns, reasons={**reasons, "voltage_v": why})
+            return BatteryReading(stamp_ns=now_ns, missing={**missing, "voltage_v": why})
         self._kept.append((now_ns, volts))
         mean_v = statistics.fmean(volts for _, volts in self._kept)
-        return BatteryReading(stamp_ns=now_ns, voltage_v=mean_v, reasons=reasons)
+        return BatteryReading(stamp_ns=now_ns, voltage_v=mean_v, missing=missing)
 
     def close(self) -> None:
         """Unmap the topic."""
@@ -137,7 +148,7 @@ def reading_of(readings: Mapping[str, Reading], stamp_ns: int) -> BatteryReading
         charge_ratio=readings[CHARGE].value,
         current_a=readings[CURRENT].value,
         is_charging=None if charging is None else bool(charging),
-        reasons={
+        missing={
             key: readings[name].reason
             for name, key in _KEYS.items()
             if readings[name].value is None
