@@ -6,7 +6,9 @@ current takes. Its gauge is a folder of files as the kernel has them (sysfs-clas
 
 import itertools
 import math
+import shutil
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 from typing import Final
 
@@ -42,6 +44,15 @@ _S_PER_H: Final = 3600.0
 _MICRO: Final = 1e6
 
 
+class GaugeFault(Enum):
+    """Name what is wrong with the gauge."""
+
+    NONE = "none"
+    GONE = "gone"
+    STUCK = "stuck"
+    GARBAGE = "garbage"
+
+
 class TwinBattery:
     """Hold the charge of one pack; `drawn_w` and `is_docked` say what acts on it."""
 
@@ -60,6 +71,7 @@ class TwinBattery:
         """Positive into the pack."""
         self.voltage_v = 0.0
         self.is_charging = False
+        self.gauge_fault = GaugeFault.NONE
         self.due_ns = 0
         self._drawn_w, self._is_docked, self._feed = drawn_w, is_docked, feed
         self._stepped_ns: int | None = None
@@ -124,12 +136,23 @@ class PowerSupplyFiles:
 
     def __init__(self, root: Path, name: str) -> None:
         self.folder = root / "sys/class/power_supply" / name
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._put("type", "Battery")
-        self._put("present", "1")
 
     def write(self, pack: TwinBattery) -> None:
         """Write what the gauge measures; its percentage is whole, as the kernel's is."""
+        match pack.gauge_fault:
+            case GaugeFault.NONE:
+                self._write(pack)
+            case GaugeFault.GONE:
+                shutil.rmtree(self.folder, ignore_errors=True)
+            case GaugeFault.GARBAGE:
+                for name in ("capacity", "energy_now", "voltage_now", "current_now", "status"):
+                    self._put(name, "?")
+            case GaugeFault.STUCK:
+                return
+
+    def _write(self, pack: TwinBattery) -> None:
+        self._put("type", "Battery")
+        self._put("present", "1")
         self._put("status", pack.status)
         self._put("capacity", str(round(100 * pack.charge_ratio)))
         self._put("voltage_now", str(round(pack.voltage_v * _MICRO)))
@@ -139,6 +162,7 @@ class PowerSupplyFiles:
 
     def _put(self, name: str, text: str) -> None:
         """Replace a file at once: a reader sees the old text or the new one."""
+        self.folder.mkdir(parents=True, exist_ok=True)
         written = self.folder / f".{name}"
         written.write_text(f"{text}\n", encoding="ascii")
         written.replace(self.folder / name)

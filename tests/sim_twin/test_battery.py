@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
+from platforms.probes.battery import CHARGE, PowerSupplySource
+from platforms.probes.reading import Reading
+from platforms.tree import Tree
 from sim_twin.battery import BASE_LOAD_W, CHARGER_W, TwinBattery
+from sim_twin.errors import FaultRefused
 from sim_twin.twin import Twin
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.battery_settings import BatterySettings, BatterySource
@@ -132,3 +136,36 @@ def test_it_charges_where_the_station_is_and_nowhere_else(twin: Twin) -> None:
         twin.engine.place("base", x_m, 2.55, 0.0, yaw_rad)
         step_for(twin, 0.15)
         assert battery.is_charging is charges, (x_m, yaw_rad)
+
+
+def test_its_gauge_fails_as_others_do_and_comes_back(
+    butler: RobotDescription, tmp_path: Path
+) -> None:
+    with closing(Twin(butler)) as twin:
+        battery, source = twin.battery, PowerSupplySource(Tree(tmp_path))
+        assert battery is not None
+        battery.serve(tmp_path)
+
+        def charge() -> Reading:
+            step_for(twin, 1.1)
+            return next(one for one in source.readings() if one.name == CHARGE)
+
+        assert charge().value == pytest.approx(0.8, abs=0.01)
+        twin.faults.inject("battery", None, "brown_out", charge_ratio=0.3)
+        assert charge().value == pytest.approx(0.3, abs=0.01)
+        for fault, why in (("unplug", "no battery is in"), ("garbage", "expected a number")):
+            handle = twin.faults.inject("battery", None, fault)
+            assert why in charge().reason
+            handle.clear()
+            assert charge().value == pytest.approx(0.3, abs=0.01)
+        twin.faults.inject("battery", None, "stuck")
+        battery.charge_ratio = 0.9
+        assert charge().value == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_robot_without_a_battery_has_none_of_its_faults(butler: RobotDescription) -> None:
+    with (
+        closing(Twin(replace(butler, battery=None))) as twin,
+        pytest.raises(FaultRefused, match=r"has no \[battery\]"),
+    ):
+        twin.faults.inject("battery", None, "unplug")
