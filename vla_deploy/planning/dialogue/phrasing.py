@@ -37,7 +37,7 @@ class Says(StrEnum):
     HEARD_BADLY = "Sorry, I did not understand that. Please say it again."
     NOT_UNDERSTOOD = "Sorry, I did not understand that."
     NOT_READY = "Sorry, I may not move now."
-    BATTERY_LOW = "Sorry, my battery is low: I only go to charge."
+    BATTERY_LOW = "Sorry, my battery is too low for that."
     REFUSED = "Sorry, I cannot do that: {reason}."
     MANY_WAIT = "Sorry, too many commands wait already."
     DONE = "Done."

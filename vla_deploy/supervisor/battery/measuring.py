@@ -63,10 +63,11 @@ class GaugeMeter:
     def measure(self) -> BatteryReading:
         """Return the newest reading, and ask for the next one."""
         now_ns = self._clock.now_ns()
+        self._take(now_ns)
         if self._asked is None:
-            self._ask(now_ns)
-        if self._asked is not None and self._asked.done():
-            self._newest, self._asked = self._answer(self._asked, now_ns), None
+            self._asked_ns = now_ns
+            self._asked = self._executor.submit(self._read)
+            self._take(now_ns)  # an executor may do it at once
         newest = self._newest
         heard_ns = self._asked_ns if newest is None else newest.stamp_ns
         if newest is None or now_ns - newest.stamp_ns > SILENT_NS:
@@ -87,9 +88,9 @@ class GaugeMeter:
         """Ask no more; a gauge that hangs is left behind."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    def _ask(self, now_ns: int) -> None:
-        self._asked_ns = now_ns
-        self._asked = self._executor.submit(self._read)
+    def _take(self, now_ns: int) -> None:
+        if self._asked is not None and self._asked.done():
+            self._newest, self._asked = self._answer(self._asked, now_ns), None
 
     def _read(self) -> BatteryReading:
         readings = {one.name: one for one in self._source.readings()}
@@ -126,7 +127,7 @@ class ServoMeter:
         sample = self._status.latest()
         if sample is None or sample.age_s(self._clock.now_ns()) > _STATUS_AGE_S:
             return None
-        told = sample.document()["joints"]["voltage_v"]
+        told = sample.document().get("joints", {}).get("voltage_v", ())
         measured = [volts for volts in told if volts is not None]
         return statistics.median(measured) if measured else None
 

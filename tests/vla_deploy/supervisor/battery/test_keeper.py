@@ -127,9 +127,10 @@ def test_a_gauge_that_hangs_holds_nothing_up_and_is_taken_up_again(tmp_path: Pat
     told = battery.after(9)
     assert len(executor.waiting) == 1, "a gauge that hangs is not asked again"
     assert told["missing"]["charge_ratio"].endswith("the gauge has not answered for 8 s")
-    executor.hangs = False
     executor.waiting[0].set_exception(OSError("the bus was reset"))
     assert "failed: OSError('the bus was reset')" in battery.after()["missing"]["charge_ratio"]
+    executor.hangs = False
+    executor.waiting[1].set_exception(OSError("the bus was reset"))
     assert battery.after()["charge_ratio"] == 0.63
 
 
