@@ -22,14 +22,14 @@ from vla_deploy.supervisor.battery.measuring import (
     ServoMeter,
 )
 
-PERIOD_NS: Final = NS_PER_S
+PERIOD_NS: Final = NS_PER_S // 2
 _DIGITS: Final = 3
 _REASON_CHARACTERS: Final = 200
 _log = logging.getLogger(__name__)
 
 
 class BatteryKeeper:
-    """Measure once a second, judge and publish; `step` never waits."""
+    """Measure twice a second, judge and publish; `step` never waits."""
 
     def __init__(
         self, settings: BatterySettings, meter: BatteryMeter, space: SharedSpace, clock: Clock
