@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from typing import Any, Protocol
 
+from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.ipc.payloads.tasks import AttemptDocument
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.calls.picture import Image
@@ -73,6 +74,7 @@ class PlanRequest:
     of the words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now,
     where a back end can use it. `failed` describes plans for this command that were tried before,
     and what went wrong. `prohibitions` are what people have forbidden for good.
+    `battery` is None where nothing tells of it.
     """
 
     command_id: str
@@ -87,6 +89,7 @@ class PlanRequest:
     image: Image | None = field(default=None, compare=False, repr=False)
     failed: tuple[str, ...] = ()
     prohibitions: tuple[Prohibition, ...] = ()
+    battery: BatteryDocument | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ const DEADLINES_S = {
   process_table: 4,
   profile_status: 4,
   budget: 4,
+  battery: 5,
   topics: 4,
   path: 4,
   alarms: Infinity, // told on change

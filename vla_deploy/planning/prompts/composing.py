@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
+from vla_deploy.client.battery import battery_words
 from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.interfaces import PlanRequest
@@ -101,6 +102,7 @@ def situation_of(request: PlanRequest) -> dict[str, Any]:
             plain(hand): what and plain(what) for hand, what in request.world.holding.items()
         },
         "places": sorted({plain(place) for place in request.world.places.values()}),
+        "battery": None if request.battery is None else plain(battery_words(request.battery)),
         "said_before": [_turn(one) for one in reversed(request.conversation.turns)],
         "remembered": [
             plain(one, SENTENCE_CHARACTERS) for one in request.recollections[:MOST_RECOLLECTIONS]

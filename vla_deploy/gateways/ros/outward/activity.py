@@ -37,7 +37,9 @@ class PlanState(StrEnum):
 _AT_REST: Final = frozenset({"", "disarmed", "stopping", "stopped", "fault"})
 _UNDER_WAY: Final = frozenset({"executing", "recovering"})
 _BY_SKILL: Final[Mapping[str, CapstoneState]] = {
-    **dict.fromkeys(("navigate_to", "move", "turn", "find_object"), CapstoneState.NAVIGATING),
+    **dict.fromkeys(
+        ("navigate_to", "charge", "move", "turn", "find_object"), CapstoneState.NAVIGATING
+    ),
     **dict.fromkeys(
         ("pick_up", "place", "hand_over", "open_gripper", "close_gripper", "move_arm"),
         CapstoneState.MANIPULATING,
