@@ -44,8 +44,12 @@ class DependsOnView(UnknownObject):
 
 
 class PlanInvalid(PlanError):
-    """Say everything that is wrong with a plan, in one line."""
+    """Say everything that is wrong with a plan, in one line.
 
-    def __init__(self, faults: Sequence[str]) -> None:
-        self.faults = tuple(faults)
+    `dependency_faults` are those of `faults` that are about the order of its actions.
+    """
+
+    def __init__(self, faults: Sequence[str], dependency_faults: Sequence[str] = ()) -> None:
+        self.faults = (*faults, *dependency_faults)
+        self.dependency_faults = tuple(dependency_faults)
         super().__init__("the plan was refused: " + "; ".join(self.faults))

@@ -10,9 +10,9 @@ from platforms import load_profile
 from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.operation.say import read_json
-from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.planner import checked
+from vla_deploy.plans.dialects import parse_plan
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot

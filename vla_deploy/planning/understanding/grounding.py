@@ -62,7 +62,7 @@ def ground_plan(plan: Plan, request: PlanRequest) -> Plan:
     """
     faults = dependency_faults(plan.actions)
     if faults:
-        raise PlanInvalid(faults)
+        raise PlanInvalid([], faults)
     grounder = _Grounder(request)
     for action in execution_order(plan.actions):
         grounder.add(action)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.planning.dialects import parse_plan
+from vla_deploy.plans.dialects import parse_plan
 from vla_deploy.plans.errors import PlanInvalid
 
 TYPED = {
@@ -69,7 +69,7 @@ def test_text_made_to_cost_time_or_stack_is_refused(text: str, fault: str) -> No
         ({"action": "turn_right", "params": {"degrees": 90}}, "turn", {"angle_rad": -math.pi / 2}),
         ({"action": "move_backward", "params": {"distance": 1}}, "move", {"distance_m": -1.0}),
         (
-            {"action": "navigate_to", "params": {"position": [1, 2, 0.5]}},
+            {"action": "navigate_to", "params": {"pose": [1, 2, 0.5]}},
             "navigate_to",
             {"x_m": 1, "y_m": 2, "yaw_rad": 0.5},
         ),
