@@ -18,8 +18,12 @@ class PlanNote:
     text: str
 
     def __str__(self) -> str:
-        where = f"{self.action_id}: " if self.action_id else ""
-        return f"{where}{self.key} {self.value}".rstrip() + f": {self.text}"
+        return f"{self.action_id}: {self.line}" if self.action_id else self.line
+
+    @property
+    def line(self) -> str:
+        """Return what became of the key, without the action's name."""
+        return f"{self.key} {self.value}".rstrip() + f": {self.text}"
 
     def document(self) -> dict[str, str]:
         """Return it as JSON takes it."""
