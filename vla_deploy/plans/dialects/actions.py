@@ -106,8 +106,10 @@ def _name_of(action: Json, action_id: str, findings: Findings) -> str | None:
 def _kinds_of(form: ActionForm) -> tuple[str, ...]:
     """Return which kinds of action documents count it among."""
     spec = SKILLS.get(form.skill)
-    kind = "" if spec is None else spec.kind.value
-    return (kind, SkillKind.NAVIGATION) if kind == SkillKind.MOVEMENT else (kind,)
+    if spec is None:  # of a skill that another robot may have, any kind may be right
+        return tuple(SkillKind)
+    is_way = spec.kind is SkillKind.MOVEMENT
+    return (spec.kind, SkillKind.NAVIGATION) if is_way else (spec.kind,)
 
 
 # --- its parameters -----------------------------------------------------------------------------
