@@ -15,7 +15,7 @@ from vla_deploy.plans.dialects.fields import (
 )
 from vla_deploy.plans.dialects.findings import Findings, shown
 from vla_deploy.plans.dialects.forms import DESCRIPTOR, REFUSED, ActionForm, form_of
-from vla_deploy.plans.dialects.values import POINT, Json, Taken
+from vla_deploy.plans.dialects.values import POINT, Json, ValueReading
 from vla_deploy.plans.plan import Skill
 
 CATEGORIES: Final = frozenset(SkillKind)
@@ -180,7 +180,7 @@ def _read_parameters(
         if row is None:
             own.setdefault(key, value)  # the validator says what the skill takes
             continue
-        taken = findings.read(action_id, key, value, row.read) or Taken()
+        taken = findings.read(action_id, key, value, row.read) or ValueReading()
         into = way if row.of_way else own
         for name, one in taken.parameters.items():
             if into.get(name, one) != one:

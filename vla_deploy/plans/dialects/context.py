@@ -103,8 +103,8 @@ def _within(world: World, value: Any, findings: Findings) -> World:
     return replace(world, bounds=replace(world.bounds, map_bounds_m=both))
 
 
-def _four_numbers(value: Any) -> values.Taken:
+def _four_numbers(value: Any) -> values.ValueReading:
     expected = "[min x, min y, max x, max y] in m"
     if not isinstance(value, list) or len(value) != 4:
         raise NotMeant(expected)
-    return values.Taken({"bounds": [values.number_of(one, expected) for one in value]})
+    return values.ValueReading({"bounds": [values.number_of(one, expected) for one in value]})

@@ -7,7 +7,7 @@ from typing import Any, Final
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.dialects import values
 from vla_deploy.plans.dialects.findings import Findings
-from vla_deploy.plans.dialects.values import Json, NotMeant, Taken
+from vla_deploy.plans.dialects.values import Json, NotMeant, ValueReading
 from vla_deploy.plans.plan import PRIORITIES
 
 KEYS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -72,46 +72,46 @@ def canonical_fields(action: Json, action_id: str, skill: str, findings: Finding
     return fields
 
 
-def _priority(value: Any) -> Taken:
+def _priority(value: Any) -> ValueReading:
     expected = "a whole number, 1 first, or high, medium, low"
     if isinstance(value, str) and value.strip().lower() in WORDS_FOR_PRIORITIES:
-        return Taken({"priority": WORDS_FOR_PRIORITIES[value.strip().lower()]})
+        return ValueReading({"priority": WORDS_FOR_PRIORITIES[value.strip().lower()]})
     if isinstance(value, int) and not isinstance(value, bool):
-        return Taken({"priority": value})
+        return ValueReading({"priority": value})
     found = values.number_of(value, expected)
     if found != int(found):
         raise NotMeant(expected)
-    return Taken({"priority": int(found)})
+    return ValueReading({"priority": int(found)})
 
 
-def _score(value: Any) -> Taken:
+def _score(value: Any) -> ValueReading:
     found = values.number_of(value, "a number from 0 to 1")
     if not 0.0 <= found <= 1.0:
         raise NotMeant("a number from 0 to 1")
-    return Taken({"feasibility_score": found})
+    return ValueReading({"feasibility_score": found})
 
 
-def _how_long(value: Any) -> Taken:
+def _how_long(value: Any) -> ValueReading:
     found = values.number_of(value, "a number of s, 0 or more", values.DURATIONS_S)
     if found < 0.0:
         raise NotMeant("a number of s, 0 or more")
-    return Taken({"estimated_duration_s": found})
+    return ValueReading({"estimated_duration_s": found})
 
 
 def _texts(name: str) -> values.Read:
-    def read(value: Any) -> Taken:
+    def read(value: Any) -> ValueReading:
         listed = [value] if isinstance(value, str) else value
         if not isinstance(listed, list) or not all(isinstance(one, str) for one in listed):
             raise NotMeant("a text, or a list of texts")
-        return Taken({name: tuple(listed)})
+        return ValueReading({name: tuple(listed)})
 
     return read
 
 
-def _description(value: Any) -> Taken:
+def _description(value: Any) -> ValueReading:
     if not isinstance(value, str):
         raise NotMeant("a text")
-    return Taken({"description": value})
+    return ValueReading({"description": value})
 
 
 _FIELDS: Final[Mapping[str, values.Read]] = MappingProxyType(
@@ -134,10 +134,10 @@ def named_ids(
     return None if taken is None else tuple(taken.parameters["ids"])
 
 
-def _named_actions(value: Any) -> Taken:
+def _named_actions(value: Any) -> ValueReading:
     listed = [value] if isinstance(value, str | int) else value
     if not isinstance(listed, list) or not all(
         isinstance(one, str | int) and not isinstance(one, bool) for one in listed
     ):
         raise NotMeant('a list of ids, such as ["nav_001"]')
-    return Taken({"ids": tuple(str(one).strip() for one in listed)})
+    return ValueReading({"ids": tuple(str(one).strip() for one in listed)})

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from vla_deploy.plans.dialects.values import NotMeant, Read, Taken
+from vla_deploy.plans.dialects.values import NotMeant, Read, ValueReading
 
 _VALUE_CHARACTERS: Final = 60
 
@@ -50,7 +50,7 @@ class Findings:
         """Say what is wrong with an action, or with the plan itself where the id is ""."""
         self.faults.append(f'action "{action_id}": {text}' if action_id else text)
 
-    def read(self, action_id: str, key: str, value: Any, read: Read) -> Taken | None:
+    def read(self, action_id: str, key: str, value: Any, read: Read) -> ValueReading | None:
         """Return what a value means, None where that is a fault."""
         try:
             taken = read(value)

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from vla_deploy.plans.catalogue import RELATIONS
 from vla_deploy.plans.dialects import values
-from vla_deploy.plans.dialects.values import NotMeant, Read, Taken, unused
+from vla_deploy.plans.dialects.values import NotMeant, Read, ValueReading, unused
 
 DESCRIPTOR: Final = "(descriptor)"
 """The parameter under which words about a thing are kept until its name is known."""
@@ -59,32 +59,32 @@ class ActionForm:
         return next((one for one in self.parameters if name in one.names), None)
 
 
-def _search_area(value: Any) -> Taken:
+def _search_area(value: Any) -> ValueReading:
     """Read where to look first; the rest of the home is looked at after that."""
     everywhere = "looked at first, then every other viewpoint"
     taken = values.goal("place")(value)
     if str(taken.parameters.get("place", "")).lower() in _VIEWS:
-        return Taken({}, everywhere)
-    return Taken(taken.parameters, taken.note or everywhere)
+        return ValueReading({}, everywhere)
+    return ValueReading(taken.parameters, taken.note or everywhere)
 
 
-def _looked_at(value: Any) -> Taken:
+def _looked_at(value: Any) -> ValueReading:
     said = values.spoken(value, "a thing or one of ahead, left, right, up, down; not a point")
     direction = DIRECTIONS.get(said.lower())
-    return Taken({"object": said} if direction is None else {"direction": direction})
+    return ValueReading({"object": said} if direction is None else {"direction": direction})
 
 
-def _placement(value: Any) -> Taken:
+def _placement(value: Any) -> ValueReading:
     said = values.spoken(value, "a text such as on, in, next to")
     if said in RELATIONS:
-        return Taken({"relation": said})
-    return Taken({}, "not used, what is put down is lowered by feel onto free room")
+        return ValueReading({"relation": said})
+    return ValueReading({}, "not used, what is put down is lowered by feel onto free room")
 
 
-def _inspection(value: Any) -> Taken:
+def _inspection(value: Any) -> ValueReading:
     if values.words(value).lower() not in ("visual", "camera"):
         raise NotMeant('"visual": this robot inspects things with its camera only')
-    return Taken({}, "is how it looks at things")
+    return ValueReading({}, "is how it looks at things")
 
 
 _Form = ParameterForm

@@ -18,14 +18,14 @@ class NotMeant(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class ValueReading:
     """Hold what a value became, and what of it is not used, "" where all is."""
 
     parameters: Mapping[str, Any] = field(default_factory=dict)
     note: str = ""
 
 
-Read = Callable[[Any], Taken]
+Read = Callable[[Any], ValueReading]
 """Return what a value means, or raise NotMeant."""
 
 POINT: Final = "(point)"
@@ -70,12 +70,12 @@ def _factor(unit: str, units: Mapping[str, float]) -> float | None:
 
 def number(name: str, expected: str, units: Mapping[str, float] | None = None) -> Read:
     """Return what reads a number."""
-    return lambda value: Taken({name: number_of(value, expected, units)})
+    return lambda value: ValueReading({name: number_of(value, expected, units)})
 
 
-def distance(value: Any) -> Taken:
+def distance(value: Any) -> ValueReading:
     """Read how far to drive, forward or (negative) backward."""
-    return Taken(
+    return ValueReading(
         {"distance_m": number_of(value, 'a number of m, such as 1.5 or "50 cm"', LENGTHS_M)}
     )
 
@@ -83,26 +83,28 @@ def distance(value: Any) -> Taken:
 def distance_ahead(sign: float, opposite: str) -> Read:
     """Return what reads how far to drive in a direction that the action names."""
     expected = f"more than 0 m; the other way is {opposite}"
-    return lambda value: Taken({"distance_m": sign * _above_zero(value, expected, LENGTHS_M)})
+    return lambda value: ValueReading(
+        {"distance_m": sign * _above_zero(value, expected, LENGTHS_M)}
+    )
 
 
-def angle(value: Any) -> Taken:
+def angle(value: Any) -> ValueReading:
     """Read by how many degrees to turn, counter-clockwise."""
     degrees = number_of(value, "a number of degrees, such as 90; radians are angle_rad", DEGREES)
-    return Taken({"angle_rad": math.radians(degrees)})
+    return ValueReading({"angle_rad": math.radians(degrees)})
 
 
 def angle_towards(sign: float, opposite: str) -> Read:
     """Return what reads by how many degrees to turn to the side that the action names."""
     expected = f"more than 0 degrees; the other way is {opposite}"
-    return lambda value: Taken(
+    return lambda value: ValueReading(
         {"angle_rad": sign * math.radians(_above_zero(value, expected, DEGREES))}
     )
 
 
 def radians(sign: float = 1.0) -> Read:
     """Return what reads an angle in rad."""
-    return lambda value: Taken({"angle_rad": sign * number_of(value, "a number of rad")})
+    return lambda value: ValueReading({"angle_rad": sign * number_of(value, "a number of rad")})
 
 
 def _above_zero(value: Any, expected: str, units: Mapping[str, float]) -> float:
@@ -112,27 +114,27 @@ def _above_zero(value: Any, expected: str, units: Mapping[str, float]) -> float:
     return found
 
 
-def yaw(value: Any) -> Taken:
+def yaw(value: Any) -> ValueReading:
     """Read a heading in rad, of any number of turns."""
-    return Taken({"yaw_rad": math.remainder(number_of(value, "a heading in rad"), math.tau)})
+    return ValueReading({"yaw_rad": math.remainder(number_of(value, "a heading in rad"), math.tau)})
 
 
-def duration(value: Any) -> Taken:
+def duration(value: Any) -> ValueReading:
     """Read for how long."""
-    return Taken(
+    return ValueReading(
         {"duration_s": number_of(value, 'a number of s, such as 5 or "2 min"', DURATIONS_S)}
     )
 
 
-def speed(value: Any) -> Taken:
+def speed(value: Any) -> ValueReading:
     """Read a speed in m/s, or in words."""
     word = value.strip().lower() if isinstance(value, str) else ""
     if word in ("slow", "slowly"):
-        return Taken({"speed_m_s": SLOW_M_S}, f"{SLOW_M_S:g} m/s")
+        return ValueReading({"speed_m_s": SLOW_M_S}, f"{SLOW_M_S:g} m/s")
     if word in _CRUISE:
-        return Taken({}, "as fast as the base cruises by its robot file")
+        return ValueReading({}, "as fast as the base cruises by its robot file")
     expected = 'a number of m/s, or "slow", "normal", "fast"'
-    return Taken({"speed_m_s": _above_zero(value, expected, SPEEDS_M_S)})
+    return ValueReading({"speed_m_s": _above_zero(value, expected, SPEEDS_M_S)})
 
 
 # --- names --------------------------------------------------------------------------------------
@@ -151,7 +153,7 @@ def words(value: Any, expected: str = "a text") -> str:
 
 def text(name: str) -> Read:
     """Return what reads a text as it is written."""
-    return lambda value: Taken({name: words(value)})
+    return lambda value: ValueReading({name: words(value)})
 
 
 def spoken(value: Any, expected: str) -> str:
@@ -163,22 +165,22 @@ def spoken(value: Any, expected: str) -> str:
 def thing(name: str = "object") -> Read:
     """Return what reads the name of a thing."""
     expected = 'the name of one thing, such as "red cup"'
-    return lambda value: Taken({name: spoken(value, expected)})
+    return lambda value: ValueReading({name: spoken(value, expected)})
 
 
 def goal(name: str) -> Read:
     """Return what reads a name or a point."""
     expected = 'a name such as "kitchen", or a point [x, y] or [x, y, 0] in m of the map'
 
-    def read(value: Any) -> Taken:
+    def read(value: Any) -> ValueReading:
         if isinstance(value, list | Mapping):
             return point(value)
-        return Taken({name: spoken(value, expected)})
+        return ValueReading({name: spoken(value, expected)})
 
     return read
 
 
-def point(value: Any) -> Taken:
+def point(value: Any) -> ValueReading:
     """Read a point of the map: [x, y], [x, y, z] in m, or x, y, z and yaw by their names."""
     expected = 'a point [x, y] or [x, y, z], or {"x": ..., "y": ...}, in m of the map'
     if isinstance(value, Mapping):
@@ -193,10 +195,10 @@ def point(value: Any) -> Taken:
         named = dict(zip(("x_m", "y_m", "z_m"), axes, strict=False))
     if "yaw_rad" in named:
         named["yaw_rad"] = math.remainder(named["yaw_rad"], math.tau)
-    return Taken({POINT: named})
+    return ValueReading({POINT: named})
 
 
-def pose(value: Any) -> Taken:
+def pose(value: Any) -> ValueReading:
     """Read a pose on the floor: [x, y] or [x, y, yaw], in m and rad."""
     if isinstance(value, Mapping):
         return point(value)
@@ -211,11 +213,11 @@ def pose(value: Any) -> Taken:
 
 def unused(why: str) -> Read:
     """Return what takes any value, and says why it changes nothing."""
-    return lambda _: Taken({}, f"not used, {why}")
+    return lambda _: ValueReading({}, f"not used, {why}")
 
 
-def margin(value: Any) -> Taken:
+def margin(value: Any) -> ValueReading:
     """Read a distance to keep; whatever it is, the robot's own stay in force."""
     if number_of(value, "a number of m, 0 or more", LENGTHS_M) < 0.0:
         raise NotMeant("a number of m, 0 or more")
-    return Taken({}, "not taken, the clearances of the robot file stay in force")
+    return ValueReading({}, "not taken, the clearances of the robot file stay in force")
