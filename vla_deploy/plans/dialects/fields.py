@@ -9,6 +9,7 @@ from vla_deploy.plans.dialects import values
 from vla_deploy.plans.dialects.findings import Findings
 from vla_deploy.plans.dialects.values import Json, NotMeant, ValueReading
 from vla_deploy.plans.plan import PRIORITIES
+from vla_deploy.plans.symbolic.table import LOGIC
 
 KEYS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
@@ -65,11 +66,21 @@ def canonical_fields(action: Json, action_id: str, skill: str, findings: Finding
     for key, why in UNUSED.items():
         if key in action:
             findings.note(action_id, key, action[key], why)
-    spec, parts = SKILLS.get(skill), fields.get("resources", ())
-    if spec is not None and not {*parts} <= {*spec.resources}:
-        used = f"not used, {skill} takes: {', '.join(spec.resources) or 'nothing'}"
-        findings.note(action_id, "resources", list(fields.pop("resources")), used)
+    for name, own in _own_words(skill).items():
+        if not {*fields.get(name, ())} <= {*own}:
+            key = next(one for one in KEYS[name] if one in action)
+            del fields[name]
+            known = ", ".join(own) or "verified as the robot knows it"
+            findings.note(action_id, key, action[key], f"not used, of {skill} it is: {known}")
     return fields
+
+
+def _own_words(skill: str) -> Mapping[str, tuple[str, ...]]:
+    """Return what the tables say of a skill, which is what is checked, whatever its author says."""
+    spec, logic = SKILLS.get(skill), LOGIC.get(skill)
+    if spec is None or logic is None:
+        return {}
+    return {"resources": spec.resources, "preconditions": (*logic.needs,), "effects": ()}
 
 
 def _priority(value: Any) -> ValueReading:

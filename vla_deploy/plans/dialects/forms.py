@@ -105,7 +105,7 @@ _GRASP: Final = _Form(
     unused("the grasp is chosen by the kind, size and place of the thing as it is seen"),
 )
 _CAREFUL: Final = _Form(
-    ("careful",), unused("the hands always go down by feel, and stop at a touch")
+    ("careful",), unused("the hands always go down by feel, and rest at a touch")
 )
 _FORCE: Final = _Form(("force",), unused("the grip is as firm as the table of grasps says"))
 _DURATION: Final = _Form(("duration_s", "duration", "seconds", "time", "timeout"), values.duration)

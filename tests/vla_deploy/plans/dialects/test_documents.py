@@ -126,6 +126,12 @@ ROWS: list[tuple[Json, list[tuple[str, Json]], str]] = [
     (terse("move_arm", pose="tuck", speed=0.5), [("move_arm", {"pose": "tuck"})], "speed"),
     (terse("wait", duration=3.0), [("wait", {"duration_s": 3.0})], ""),
     (terse("speak", message="Done"), [("speak", {"text": "Done"})], ""),
+    ({"action_type": "pick", "parameters": {"object": "cup"}, "estimated_duration": 5.0,
+      "preconditions": ["gripper_empty"], "effects": ["holding(object)"], "status": "pending"},
+     [("pick_up", {"object": "cup"})], "status preconditions effects"),
+    ({"action": "pick_up", "params": {"object": "cup"}, "required_resources": ["left_arm"],
+      "success_criteria": ["holding_cup"], "resolution_notes": "'it' is the cup"},
+     [("pick_up", {"object": "cup"})], "success_criteria required_resources"),
     # --- tasks --------------------------------------------------------------------------------
     (task("navigation", target_location="kitchen"), [("navigate_to", {"place": "kitchen"})], ""),
     (task("search_and_navigate", target_object="cup"), [("navigate_to", {"object": "cup"})], ""),
