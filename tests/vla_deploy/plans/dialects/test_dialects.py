@@ -236,11 +236,29 @@ ANYTHING = st.sampled_from(
 
 @given(
     st.dictionaries(
-        st.sampled_from(["actions", "steps", "goal", "feasible", "summary"]),
+        st.sampled_from(
+            ["actions", "steps", "goal", "feasible", "summary", "plan", "subtasks", "options"]
+        ),
         ANYTHING
         | st.lists(
             st.dictionaries(
-                st.sampled_from(["id", "action", "params", "type", "depends_on", "priority"]),
+                st.sampled_from(
+                    [
+                        "id",
+                        "action",
+                        "params",
+                        "type",
+                        "depends_on",
+                        "priority",
+                        "actions",
+                        "name",
+                        "effects",
+                        "object",
+                        "location",
+                        "after",
+                        "duration",
+                    ]
+                ),
                 ANYTHING,
             ),
             max_size=3,
