@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from tests.vla_deploy.planning.conftest import Desk
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.planner import checked
 from vla_deploy.plans.dialects import parse_plan
@@ -22,7 +23,7 @@ FETCH = [
 ]  # fmt: skip
 STRUCTURED = [
     {"action_type": "navigate_to", "priority": 1, "estimated_duration": 15.0,
-     "parameters": {"target_position": [2.5, 1.8, 0.0], "approach_direction": "front",
+     "parameters": {"target_position": [2.2, 2.1, 0.0], "approach_direction": "front",
                     "safety_margin": 0.5}},
     {"action_type": "find_object", "priority": 2, "estimated_duration": 8.0,
      "parameters": {"object_type": "red_cup", "search_method": "systematic_scan",
@@ -70,3 +71,26 @@ def test_what_the_robot_does_not_know_is_refused_with_the_action() -> None:
     with pytest.raises(PlanError, match='I do not know the object "trash bin"') as refused:
         checked(parse_plan(CLEAN), REQUEST)
     assert refused.value.action_id == "a1"
+
+
+def test_who_follows_the_command_reads_what_is_not_used(desk: Desk) -> None:
+    options = {"continue_on_error": True, "max_retries": 3, "safety_check": True}
+    events = desk.answers_to(plan={"action_sequence": STRUCTURED, "execution_options": options})
+    (planned,) = [one["plan"] for one in events if one["event"] == "plan"]
+    assert planned["options"]["continue_on_error"] is True
+    assert [note.split(" ")[:2] for note in planned["notes"]] == [
+        ["a1:", "approach_direction"],
+        ["a1:", "safety_margin"],
+        ["a2:", "search_method"],
+        ["a2:", "max_search_time"],
+        ["a3:", "grasp_type"],
+        ["a3:", "grasp_position"],
+    ]
+    assert desk.plans()[0]["plan"] == planned
+
+
+def test_a_plan_that_would_switch_checks_off_is_refused(desk: Desk) -> None:
+    options = {"safety_check": False}
+    (event,) = desk.answers_to(plan={"action_sequence": FETCH, "execution_options": options})
+    assert event["event"] == "rejected"
+    assert "never switched off" in event["reason"]

@@ -11,6 +11,7 @@ from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.maintenance.plan_check import PlanCheck, check_plan_file
+from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot
@@ -64,7 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     document = {"robot": robot.name, "profile": profile.name}
     found = PlanCheck()
     if arguments.plan:
-        found = check_plan_file(arguments.plan, arguments.scene, world_of(robot, {}))
+        world = world_of(robot, {}, base_planner(robot).is_free)
+        found = check_plan_file(arguments.plan, arguments.scene, world)
         document |= found.document()
     if found.plan is not None:
         lines += [f"plan {arguments.plan}: {len(found.plan.actions)} actions: ok", *found.lines()]

@@ -151,7 +151,8 @@ def _steps(
 ) -> tuple[Skill, ...]:
     """Return the skills of an action with their parameters, the way first where one is told."""
     form = form_of(name)
-    own, way, source = _read_parameters(action_id, form, given, findings)
+    known = {key: value for key, value in given.items() if form.parameter(key)}
+    own, way, source = _read_parameters(action_id, form, known, findings)
     for key, value in {} if is_canonical else form.default.items():
         if key not in own:
             own[key] = value
@@ -165,6 +166,9 @@ def _steps(
         way = {"object": own["object"]}
     if POINT in way:
         way |= _on_floor(action_id, way.pop(POINT), source[POINT], findings)
+    for key, value in given.items():  # of what has no form the validator says what is taken
+        if key not in known and own.setdefault(key, value) != value:
+            findings.fault(action_id, f"{source.get(key, name)} and {key} differ; leave one out")
     return ((("navigate_to", way),) if way else ()) + ((form.skill, own),)
 
 
@@ -177,9 +181,7 @@ def _read_parameters(
     source: dict[str, str] = {}
     for key, value in given.items():
         row = form.parameter(key)
-        if row is None:
-            own.setdefault(key, value)  # the validator says what the skill takes
-            continue
+        assert row is not None, "what has no form is not read"
         taken = findings.read(action_id, key, value, row.read) or ValueReading()
         into = way if row.of_way else own
         for name, one in taken.parameters.items():

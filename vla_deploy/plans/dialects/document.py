@@ -32,7 +32,9 @@ def plan_document(document: Any) -> Json:
         raise PlanInvalid([f"a plan is a JSON object or a list of actions, got {found!r:.60}"])
     inner = found.get("plan")
     if isinstance(inner, Mapping):
-        return {**{key: value for key, value in found.items() if key != "plan"}, **inner}
+        around = {key: value for key, value in found.items() if key != "plan"}
+        twice = {key: f"{key} around the plan" for key in around if key in inner}
+        return {**{twice.get(key, key): value for key, value in around.items()}, **inner}
     is_action = isinstance(next((found[one] for one in _NAMED_BY if one in found), None), str)
     if is_action and not any(isinstance(found.get(key), list) for key in LISTS):
         return {"actions": [dict(found)]}

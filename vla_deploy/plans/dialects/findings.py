@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from vla_deploy.plans.dialects.values import NotMeant, Read, ValueReading
+from vla_deploy.runtime.one_line import one_line
 
 _VALUE_CHARACTERS: Final = 60
 
@@ -23,7 +24,7 @@ class PlanNote:
     @property
     def line(self) -> str:
         """Return what became of the key, without the action's name."""
-        return f"{self.key} {self.value}".rstrip() + f": {self.text}"
+        return printable(f"{self.key} {self.value}".rstrip() + f": {self.text}")
 
     def document(self) -> dict[str, str]:
         """Return it as JSON takes it."""
@@ -48,6 +49,7 @@ class Findings:
 
     def fault(self, action_id: str, text: str) -> None:
         """Say what is wrong with an action, or with the plan itself where the id is ""."""
+        text = printable(text)
         self.faults.append(f'action "{action_id}": {text}' if action_id else text)
 
     def read(self, action_id: str, key: str, value: Any, read: Read) -> ValueReading | None:
@@ -62,6 +64,11 @@ class Findings:
         return taken
 
 
+def printable(said: str) -> str:
+    """Return a text in one line, without what would move a terminal's cursor."""
+    return "".join(one if one.isprintable() else "?" for one in one_line(said))
+
+
 def shown(value: Any) -> str:
     """Return a value as it stands in JSON, cut where it is long."""
     if value is None:
@@ -72,5 +79,5 @@ def shown(value: Any) -> str:
         said = str(value).lower()
     else:
         said = repr(value)
-    said = " ".join(said.split())
+    said = printable(said)
     return said if len(said) <= _VALUE_CHARACTERS else f"{said[:_VALUE_CHARACTERS]}..."

@@ -107,7 +107,7 @@ def _faults_of(error: ValidationError, above: str = "") -> list[str]:
 
 def _plan_fields(document: Json, findings: Findings) -> Json:
     fields: Json = {"goal": "unnamed goal"}
-    used = {OPTIONS[0], OPTIONS[1], SUBTASKS, _list_key(document)}
+    used = {_list_key(document), _options_key(document)}
     for key in GOALS:
         value = document.get(key)
         value = value.get("original_command") if isinstance(value, Mapping) else value
@@ -115,10 +115,11 @@ def _plan_fields(document: Json, findings: Findings) -> Json:
             fields["goal"] = value
             used.add(key)
     for key in (*_TEXTS, *_FEASIBLE):
-        if document.get(key) is not None:
-            fields["feasible" if key in _FEASIBLE else key] = document[key]
+        name = "feasible" if key in _FEASIBLE else key
+        if document.get(key) is not None and name not in fields:
+            fields[name] = document[key]
             used.add(key)
-    if isinstance(document.get(SUBTASKS), list):
+    if _list_key(document) == SUBTASKS:
         fields["success_criteria"] = criteria_of(document[SUBTASKS])
     for key in _LISTS_OF_TEXTS:
         value = document.get(key)
@@ -132,14 +133,18 @@ def _plan_fields(document: Json, findings: Findings) -> Json:
 
 
 def _list_key(document: Json) -> str:
-    return next((key for key in LISTS if isinstance(document.get(key), list)), "")
+    """Return under which key the actions stand, the first that holds any; "" where none does."""
+    listed = [key for key in (*LISTS, SUBTASKS) if isinstance(document.get(key), list)]
+    return next((key for key in listed if document[key]), listed[0] if listed else "")
+
+
+def _options_key(document: Json) -> str:
+    return next((key for key in OPTIONS if document.get(key) is not None), "")
 
 
 def _options(document: Json, findings: Findings) -> ExecutionOptions:
-    key = next((key for key in OPTIONS if document.get(key) is not None), None)
-    if key is None:
-        return ExecutionOptions()
-    given = document[key]
+    key = _options_key(document)
+    given = document.get(key, {})
     if not isinstance(given, Mapping):
         findings.fault("", f'{key} must be an object such as {{"continue_on_error": true}}; '
                        f"got {shown(given)}")  # fmt: skip
@@ -160,9 +165,10 @@ def _options(document: Json, findings: Findings) -> ExecutionOptions:
 
 def _actions(document: Json, findings: Findings, *, goes_on: bool) -> list[Json]:
     """Return the canonical actions, those that are not ordered by their author one by one."""
-    listed = document[_list_key(document)] if _list_key(document) else []
-    if not listed and isinstance(document.get(SUBTASKS), list):
-        listed = actions_of(document[SUBTASKS], findings)
+    key = _list_key(document)
+    listed = document.get(key, [])
+    if key == SUBTASKS:
+        listed = actions_of(listed, findings, goes_on=goes_on)
     if len(listed) > MOST_ACTIONS:
         findings.fault("", f"the plan has {len(listed)} actions, {MOST_ACTIONS} at most")
         return []

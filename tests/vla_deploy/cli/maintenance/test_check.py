@@ -10,7 +10,7 @@ import pytest
 PLAN = {
     "action_sequence": [
         {"id": "nav_001", "type": "navigation", "action": "navigate_to",
-         "parameters": {"location": [2.0, 1.5, 0.0], "approach_direction": "front"}},
+         "parameters": {"location": [2.2, 2.1, 0.0], "approach_direction": "front"}},
         {"id": "manip_001", "type": "manipulation", "action": "pick_up",
          "parameters": {"object": "red_cup"}, "dependencies": ["nav_001"]},
         {"id": "turn_001", "type": "movement", "action": "turn_left", "parameters": {"angle": 90}},
@@ -46,7 +46,7 @@ def test_each_action_is_shown_with_its_units_and_what_is_not_used(
     assert [" ".join(line.split()) for line in said.out.splitlines()[3:]] == [
         'map_name "flat": not used',
         "options: continue_on_error True",
-        "nav_001 navigate_to x 2 m, y 1.5 m",
+        "nav_001 navigate_to x 2.2 m, y 2.1 m",
         'approach_direction "front": not used, where the robot stands is chosen by the map and by '
         "its reach",
         "manip_001_find_object find_object object red cup (put in)",
@@ -75,6 +75,8 @@ def test_as_json_it_has_the_plan_the_notes_and_no_errors(check: Callable[..., An
         ([{"action": "go_to", "params": {"location": [20, 0, 0]}}],
          ['action "a1": navigate_to breaks "area allowed": the point 20, 0 m is outside of x -10 '
           "to 10 m, y -10 to 10 m, the map_bounds_m in force"], []),
+        ([{"action": "go_to", "params": {"location": [2.0, 1.5]}}],
+         ['action "a1": navigate_to breaks "area allowed": the map shows no free floor at'], []),
         ([{"action": "move", "params": {"distance": 1, "how": "fast"}}],
          ['action "a1": move has no parameter "how"; it takes: distance_m, speed_m_s'], []),
         ([{"id": "see", "action": "find_object", "params": {"object": "unknown_object"}}],
@@ -85,7 +87,7 @@ def test_as_json_it_has_the_plan_the_notes_and_no_errors(check: Callable[..., An
         ([{"action": "wait", "duration": 1}] * 500, ["the plan has 500 actions, 100 at most"], []),
         ({"anything": {"else": 1}}, ["it has no actions"], []),
     ],
-    ids=range(9),
+    ids=range(10),
 )  # fmt: skip
 def test_a_refusal_is_one_line_and_tells_faults_of_actions_from_those_of_their_order(
     check: Callable[..., Any], plan: object, validation: list[str], dependency: list[str]

@@ -138,16 +138,25 @@ def test_the_whole_request_of_an_action_executor_is_read_as_it_is_written() -> N
           "recovery_actions": TERSE_STEP}, "unnamed goal", "failure_reason recovery_description"),
         ({"action": "stop", "params": {}}, "unnamed goal", ""),
         ({"goal": "tidy", "plan": {"steps": TERSE_STEP}}, "tidy", ""),
-        ({"goal": "tidy", "actions": TERSE_STEP, "mood": "good"}, "tidy", "mood"),
+        ({"goal": "tidy", "actions": TERSE_STEP, "mood\n": "good"}, "tidy", "mood\n"),
+        ({"goal": "x", "plan": {"goal": "tidy", "steps": TERSE_STEP}}, "tidy",
+         "goal around the plan"),
+        ({"goal": "tidy", "actions": [], "steps": TERSE_STEP, "subtasks": TERSE_STEP,
+          "options": {}, "execution_options": {"max_retries": 2}, "command": "go"}, "tidy",
+         "subtasks execution_options command"),
+        ({"can_recover": True, "feasible": False, "actions": TERSE_STEP}, "unnamed goal",
+         "can_recover"),
     ],
-    ids=["sequence", "terse", "recovery", "one action", "wrapped", "unknown key"],
+    ids=["sequence", "terse", "recovery", "one action", "wrapped", "unknown key", "goal twice",
+         "lists twice", "feasible twice"],
 )  # fmt: skip
 def test_the_keys_of_a_plan_are_taken_or_noted(
     document: dict[str, object], goal: str, keys: str
 ) -> None:
     reading = read_plan(document)
     assert (reading.plan.goal, len(reading.plan.actions)) == (goal, 1)
-    assert [one.key for one in reading.notes] == keys.split()
+    assert " ".join(one.key for one in reading.notes) == keys
+    assert all("\n" not in str(one) for one in reading.notes)
     wanted = ("it is tidy",) if "success_criteria" in document else ()
     assert reading.plan.success_criteria == wanted
 
@@ -197,17 +206,23 @@ def test_what_comes_first_of_an_action_takes_over_what_it_waits_for() -> None:
 
 def test_subtasks_become_actions_in_their_order() -> None:
     get = {"name": "get", "description": "take it", "status": "pending", "actions": TERSE_STEP * 2}
-    put = {"name": "put", "dependencies": ["get"], "success_criteria": "it stands there",
+    put = {"name": "put", "dependencies": "get", "success_criteria": "it stands there",
            "actions": TERSE_STEP}  # fmt: skip
-    reading = read_plan({"goal": "g", "subtasks": [get, {**put, "name": "show"}, put]})
+    show = {"name": "show", "success_criteria": ["seen"], "actions": TERSE_STEP}
+    document = {"goal": "g", "subtasks": [get, show, put]}
+    reading = read_plan(document)
     assert [(one.id, one.depends_on, one.description) for one in reading.plan.actions] == [
         ("get_1", (), "take it"),
         ("get_2", ("get_1",), "take it"),
         ("show_1", ("get_2",), ""),
         ("put_1", ("get_2",), ""),
     ]
-    assert reading.plan.success_criteria == ("it stands there", "it stands there")
+    assert reading.plan.success_criteria == ("seen", "it stands there")
     assert [one.key for one in reading.notes] == ["get.status"]
+    going_on = parse_plan({**document, "options": {"continue_on_error": True}})
+    assert [(one.depends_on, one.after) for one in going_on.actions] == [
+        ((), ()), ((), ("get_1",)), ((), ("get_2",)), (("get_2",), ())
+    ]  # fmt: skip
 
 
 def test_all_faults_of_a_plan_are_told_at_once() -> None:

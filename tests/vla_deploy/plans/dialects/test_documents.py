@@ -210,6 +210,7 @@ REFUSALS: list[tuple[Any, str]] = [
     ({"action": "stop", "params": {}, "parameters": {"a": 1}}, "parameters and params differ"),
     ({"action": "stop", "params": {}, "colour": 1},
      "unknown keys: colour; what the skill takes stands in params"),
+    (terse("wait", duration=1, **{"(point)": 5, "duration_s": 2}), "differ; leave one out"),
     ({"action": "stop", "id": "x" * 65}, "its id must be a text of 1 to 64 letters"),
     ({"action": "stop", "id": {"a": 1}}, "its id must be a text"),
     ({"action": "stop", "priority": "urgent"},
