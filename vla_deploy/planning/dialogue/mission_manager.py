@@ -1,6 +1,7 @@
 """Carry missions out: give their subtasks to be planned, check criteria, begin at their times."""
 
 import logging
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -35,6 +36,10 @@ MOST_OPEN: Final = 10
 MOST_SHOWN: Final = 8
 _PERIOD_NS: Final = NS_PER_S // 5
 _LOST: Final = "lost"
+_REPORTS: Final = re.compile(
+    r"(?:give (?:me )?a )?report(?: back)?(?: to me)?|(?:tell me|say) (?:how it went|what you did)",
+    re.IGNORECASE,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -228,8 +233,11 @@ class MissionManager:
 
     def _give(self, run: MissionRun, name: str, subtask: Subtask) -> None:
         run.start(name, self._wall_s())
-        plan = None
-        if subtask.actions:
+        plan: dict[str, Any] | None = None
+        if _REPORTS.fullmatch(subtask.words.strip()):
+            said = {"id": "a1", "skill": "speak", "parameters": {"text": run.spoken_report()}}
+            plan = {"goal": subtask.words, "actions": [said]}
+        elif subtask.actions:
             actions = [one.model_dump(mode="json") for one in subtask.actions]
             plan = {"goal": subtask.words or run.mission.goal, "actions": actions}
         self._manager.take_part(

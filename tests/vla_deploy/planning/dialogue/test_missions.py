@@ -117,6 +117,16 @@ def test_a_criterion_that_is_not_met_fails_its_objective_and_what_depends_on_it(
     assert "1 of 3 objectives done" in told[-1]["error"]
 
 
+def test_a_report_says_what_is_done_and_what_is_not(flat) -> None:
+    give(flat, {"id": "a", "words": "look left"}, {"id": "b", "words": "bring me the unicorn"},
+         {"id": "c", "words": "Report back", "depends_on": ["a"]})  # fmt: skip
+    flat.desk.plans()
+    flat.ends("c1/a.s1")
+    (plan,) = flat.desk.plans()
+    text = plan["plan"]["actions"][0]["parameters"]["text"]
+    assert text.startswith("Done: look left. Not done: bring me the unicorn, because ")
+
+
 @pytest.mark.parametrize("words", ["bring me the unicorn", "fly to the moon"])
 def test_an_objective_that_nobody_can_plan_fails_with_its_reason(flat, words) -> None:
     told = give(flat, words) + flat.pass_s()
