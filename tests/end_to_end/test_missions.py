@@ -26,7 +26,7 @@ def of_arm(name: str, *skills: str, arm: str) -> dict[str, Any]:
     return {"id": name, "actions": actions}
 
 
-EIGHT = [
+EIGHT: list[dict[str, Any]] = [
     {"id": "turn", "words": "turn left 90 degrees"},
     of_arm("left", "move_arm", arm="left"),
     of_arm("right", "move_arm", arm="right"),
