@@ -22,6 +22,8 @@ _LENGTHS: Final = (3, 4, 5)
 # Each list counts 1 / (60 + rank): Cormack et al., "Reciprocal rank fusion", 2009.
 _RANK_OFFSET: Final = 60.0
 _CANDIDATES: Final = 24
+# A ranking by meaning counts for more than words and letters together, which err together.
+_MEANING: Final = 3.0
 _SMALL_WORDS: Final = (
     "a an the it its this that them my your me you i we is are was be to of in on at and or do "
     "please could would will robot"
@@ -77,11 +79,13 @@ def search(
     `asked` has the text's vector and the least cosine, by the name of each embedder.
     """
     scores: defaultdict[int, float] = defaultdict(float)
-    rankings = [_by_words(connection, text)]
-    rankings += [_by_vectors(connection, name, *wanted) for name, wanted in asked.items()]
-    for ranking in rankings:
+    rankings = [(1.0, _by_words(connection, text))]
+    for name, wanted in asked.items():
+        weight = 1.0 if name == LetterGroups.name else _MEANING
+        rankings.append((weight, _by_vectors(connection, name, *wanted)))
+    for weight, ranking in rankings:
         for rank, number in enumerate(ranking):
-            scores[number] += 1.0 / (_RANK_OFFSET + rank)
+            scores[number] += weight / (_RANK_OFFSET + rank)
     return sorted(scores.items(), key=lambda pair: (-pair[1], -pair[0]))
 
 

@@ -8,12 +8,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
+from drivers.clock import MonotonicClock
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import base_of
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.memory import Episode, EpisodeOutcome, MemoryStore
 from vla_deploy.memory.episode import place_words, sentence_of, unix_s
 from vla_deploy.memory.judgement import MOST_CHARACTERS
+from vla_deploy.memory.meaning import installed_embedder
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "list": "  vla-deploy memory list\n",
@@ -66,7 +69,8 @@ def list_episodes(arguments: argparse.Namespace) -> int:
 
 def find(arguments: argparse.Namespace) -> int:
     """Print the episodes that match some words, the best first."""
-    with _store(arguments) as store:
+    embedder = installed_embedder(ModelShelf.of_base(base_of(arguments), MonotonicClock()))
+    with closing(MemoryStore.of_base(base_of(arguments), embedder=embedder)) as store:
         found = store.recall(arguments.text, arguments.count)
     document = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
     text = _numbered([one.episode for one in found])
