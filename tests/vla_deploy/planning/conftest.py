@@ -143,9 +143,13 @@ class Desk:
     def control(self, state: str) -> None:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
 
-    def executor_is(self, state: str, **holding: str | None) -> None:
-        """Let the executor tell what it does, and what the hands hold."""
-        self._executor_status.put_document({"state": state, "holding": holding})
+    def executor_is(
+        self, state: str, doing: tuple[str, str] | None = None, **holding: str | None
+    ) -> None:
+        """Let the executor tell what it is `doing`, command and skill, and what the hands hold."""
+        command_id, skill = doing or (None, None)
+        told = {"state": state, "command_id": command_id, "skill": skill, "holding": holding}
+        self._executor_status.put_document(told)
 
     def sees(self, *names: str) -> None:
         """Let perception tell of things such as "red cup_1", in a row on the coffee table."""
