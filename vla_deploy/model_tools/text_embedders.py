@@ -20,6 +20,11 @@ TRIAL: Final = (
     "fetch a beverage for me",
     "the map of the flat is out of date",
 )
+GRAPH: Final = "model.onnx"
+"""What exports call it."""
+LEAST_COSINE: Final = 0.3
+MOST_TOKENS: Final = 512
+"""As many as BERT's positions; a longer text is cut off."""
 _WHOLE: Final = "sentence_embedding"
 _WEIGHTS: Final = (".onnx", ".onnx.data", ".onnx_data")
 

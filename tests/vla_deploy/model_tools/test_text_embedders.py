@@ -1,20 +1,23 @@
 """A person's text embedder is tried out, kept, and then the memory is searched by meaning."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
+from vla_deploy.cli.main import main
 from vla_deploy.inference.errors import InferenceError, ModelMismatch, RunFailed
 from vla_deploy.inference.manifest import Pooling
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.memory import Episode, EpisodeOutcome, MemoryStore
 from vla_deploy.memory.meaning import installed_embedder
+from vla_deploy.model_tools.published import TEXT_EMBEDDERS
 from vla_deploy.model_tools.text_embedders import TextEmbedderSource, add_text_embedder
 from vla_deploy.model_tools.verifying import verify
 
@@ -117,3 +120,20 @@ def test_a_spoiled_one_is_done_without(shelf: ModelShelf, tmp_path: Path) -> Non
     (model.folder / "model.onnx").write_bytes(b"cut off")
     assert installed_embedder(shelf) is None
     assert [one.is_ok for one in verify(shelf, "tiny")] == [True, False, False]
+
+
+def test_a_published_one_is_fetched_with_the_tokenizer_of_its_repository(
+    tmp_path: Path, open_hub: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    hub = open_hub(write_embedder(tmp_path / "given"), "onnx")
+    hub.files["tokenizer.json"] = hub.files.pop("onnx/tokenizer.json")
+    hub.files["onnx/model_O1.onnx"] = b"not asked for"
+    base = ("--runtime-base", str(tmp_path / "base"), "models")
+    given = ("fetch", "minilm-l6", "--endpoint", hub.url, "--profile", "desktop", "--json")
+    assert main([*base, *given]) == 0
+    assert json.loads(capsys.readouterr().out)["same_meaning_cosine"] == 1.0
+    at = f"/{TEXT_EMBEDDERS['minilm-l6'].repository}/resolve/{hub.SHA}/"
+    assert {path.removeprefix(at) for path in hub.fetched} == {"onnx/model.onnx", "tokenizer.json"}
+    assert main([*base, "verify", "minilm-l6"]) == 0
+    assert main([*base, *given]) == 2
+    assert "already" in capsys.readouterr().err

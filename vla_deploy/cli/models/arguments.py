@@ -18,7 +18,8 @@ from vla_deploy.cli.commands import (
 from vla_deploy.inference.manifest import Fit, Pooling
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.published import LANGUAGE_MODELS, WHISPERS
+from vla_deploy.model_tools.published import LANGUAGE_MODELS, TEXT_EMBEDDERS, WHISPERS
+from vla_deploy.model_tools.text_embedders import LEAST_COSINE
 from vla_deploy.perception.detectors.adapters import ADAPTERS
 
 EXAMPLES: Final = """  vla-deploy models list
@@ -131,8 +132,8 @@ def _add_embedder_arguments(add: argparse.ArgumentParser) -> None:
     add.add_argument(
         "--least-cosine",
         type=number_within(0.0, 1.0, "a cosine from 0 to 1"),
-        default=0.3,
-        help="below which a text embedder finds two texts unlike (default: 0.3)",
+        default=LEAST_COSINE,
+        help=f"below which a text embedder finds two texts unlike (default: {LEAST_COSINE:g})",
     )
 
 
@@ -188,18 +189,20 @@ def _fetch(acts: Any) -> None:
     fetch = add_command(
         acts,
         "fetch",
-        "fetch a published Whisper or language model from the Hugging Face hub, checked by its "
-        "hashes",
+        "fetch a published Whisper, language model or text embedder from the Hugging Face hub, "
+        "checked by its hashes",
         "  vla-deploy models fetch whisper-small.en\n"
         "  vla-deploy models fetch llama-3.2-1b-gpu\n"
+        "  vla-deploy models fetch minilm-l6\n"
         "  vla-deploy models fetch --language OWNER/REPO:FOLDER --as mine\n",
     )
     fetch.add_argument(
         "name",
         nargs="?",
         metavar="NAME",
-        choices=[*WHISPERS, *LANGUAGE_MODELS],
-        help=f"Whispers: {', '.join(WHISPERS)}; language models: {', '.join(LANGUAGE_MODELS)}",
+        choices=[*WHISPERS, *LANGUAGE_MODELS, *TEXT_EMBEDDERS],
+        help=f"Whispers: {', '.join(WHISPERS)}; language models: {', '.join(LANGUAGE_MODELS)}; "
+        f"text embedders: {', '.join(TEXT_EMBEDDERS)}",
     )
     fetch.add_argument(
         "--language",

@@ -21,7 +21,7 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.manifest_file import document_of
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.model_tools.listing import model_rows, profile_uses
-from vla_deploy.model_tools.published import WHISPERS
+from vla_deploy.model_tools.published import TEXT_EMBEDDERS, WHISPERS
 from vla_deploy.model_tools.verifying import verify
 from vla_deploy.supervisor.profiles.profile_choice import start_profile
 
@@ -85,6 +85,8 @@ def fetch(arguments: argparse.Namespace) -> int:
     shelf = _shelf(arguments)
     if arguments.name in WHISPERS:
         return emit(arguments, *whisper.fetch(arguments, shelf, report))
+    if arguments.name in TEXT_EMBEDDERS:
+        return emit(arguments, *embedder.fetch(arguments, shelf, _profile(arguments), report))
     return emit(arguments, *language.fetch(arguments, shelf, _profile(arguments), report))
 
 

@@ -1,6 +1,8 @@
-"""Carry out `vla-deploy models` for a text embedder: add it."""
+"""Carry out `vla-deploy models` for a text embedder: add and fetch it."""
 
 import argparse
+import dataclasses
+from collections.abc import Callable
 
 from platforms import Profile
 from vla_deploy.cli.models.arguments import Result
@@ -8,7 +10,14 @@ from vla_deploy.inference.manifest import Pooling
 from vla_deploy.inference.manifest_schema import TEXT_EMBEDDER
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.model_tools.text_embedders import TextEmbedderSource, add_text_embedder
+from vla_deploy.model_tools.keeping import require_free
+from vla_deploy.model_tools.published import TEXT_EMBEDDERS, fetched
+from vla_deploy.model_tools.text_embedders import (
+    LEAST_COSINE,
+    MOST_TOKENS,
+    TextEmbedderSource,
+    add_text_embedder,
+)
 
 
 def add(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> Result:
@@ -20,9 +29,39 @@ def add(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> R
         licence=arguments.licence,
         card=arguments.card,
         pooling=Pooling(arguments.pooling),
-        most_tokens=min(arguments.most_tokens, 512),
+        most_tokens=min(arguments.most_tokens, MOST_TOKENS),
         least_cosine=arguments.least_cosine,
     )
+    return _kept(arguments, shelf, profile, source)
+
+
+def fetch(
+    arguments: argparse.Namespace,
+    shelf: ModelShelf,
+    profile: Profile,
+    report: Callable[[str], None],
+) -> Result:
+    """Fetch a published text embedder, check it, try it out as a profile says and keep it."""
+    published = TEXT_EMBEDDERS[arguments.name]
+    name = arguments.new_name or arguments.name
+    require_free(shelf.store, name, replace=arguments.replace)
+    published = dataclasses.replace(published, revision=arguments.revision or published.revision)
+    with fetched(published, shelf.store, report, arguments.endpoint) as (folder, licence):
+        source = TextEmbedderSource(
+            name=name,
+            folder=folder,
+            summary=published.summary,
+            licence=arguments.licence or licence,
+            pooling=Pooling.MEAN,
+            most_tokens=MOST_TOKENS,
+            least_cosine=LEAST_COSINE,
+        )
+        return _kept(arguments, shelf, profile, source)
+
+
+def _kept(
+    arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile, source: TextEmbedderSource
+) -> Result:
     model, trial = add_text_embedder(
         shelf.store,
         source,
