@@ -32,6 +32,7 @@ CREATE INDEX thing_by_kind ON thing (kind, seen_s);
 ALTER TABLE episode ADD COLUMN actions TEXT NOT NULL DEFAULT '[]';
 ALTER TABLE episode ADD COLUMN judged_from TEXT NOT NULL DEFAULT '';
 ALTER TABLE episode ADD COLUMN why TEXT NOT NULL DEFAULT '';
+CREATE INDEX episode_with_actions ON episode (number) WHERE actions <> '[]' AND judged_from = '';
 """,
 )
 

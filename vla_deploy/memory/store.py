@@ -34,7 +34,7 @@ _EPISODE: Final = (
 )
 _THING: Final = "run_id, thing_id, kind, colour, place, x_m, y_m, z_m, seen_s"
 # So many commands are looked through for how their actions went.
-_RECENT: Final = 200
+_RECENT: Final = 50
 # Older episodes that get vectors of a new embedder along with each one that is added.
 _EMBEDDED_AT_ONCE: Final = 32
 _log = logging.getLogger(__name__)

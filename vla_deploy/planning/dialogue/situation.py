@@ -10,7 +10,7 @@ from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace, topics
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.ipc.topics import P
-from vla_deploy.memory import MemoryStore, experience_of
+from vla_deploy.memory import NO_EXPERIENCE, Experience, MemoryStore, experience_of
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
@@ -55,6 +55,7 @@ class Situation:
         self._table = space.cell_reader(topics.PROCESS_TABLE)
         self._frames: FrameReader = space.frame_reader(topics.RGBD)
         self._log = TaskLog(space)
+        self._called_up: tuple[tuple[str, str, bool], Experience] = ("", "", False), NO_EXPERIENCE
 
     def request(
         self,
@@ -76,9 +77,7 @@ class Situation:
             conversation=conversation,
             heard_confidence=command.heard_confidence,
             image=self._image() if Aid.IMAGE in of_use else None,
-            experience=experience_of(
-                self._memory, command.text, unix_s(), with_episodes=Aid.MEMORY in of_use
-            ),
+            experience=self._experience_of(command, with_episodes=Aid.MEMORY in of_use),
             task=self._task(),
             last_actions=self._log.last_actions,
         )
@@ -88,6 +87,14 @@ class Situation:
         """Return whether the executor says that it carries out a plan, from any source."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
         return sample is not None and sample.document().get("state", "idle") != "idle"
+
+    def _experience_of(self, command: UserCommand, *, with_episodes: bool) -> Experience:
+        """Call up once for each command what bears on it: it is asked for at every step of it."""
+        key = (command.command_id, command.text, with_episodes)
+        if key != self._called_up[0]:
+            found = experience_of(self._memory, command.text, unix_s(), with_episodes=with_episodes)
+            self._called_up = key, found
+        return self._called_up[1]
 
     def _task(self) -> str:
         """Return what is carried out, in the words of who asked for it, and the skill of now."""
