@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -92,6 +92,7 @@ class PlannerSession:
         )
         self.node = self._built()
         self._numbers = itertools.count(1)
+        self._under_way = ""
         # What is published may have any form, for a planner has to bear that.
         self._utterances: RingWriter[Any] = self._space.ring_writer(topics.UTTERANCE)
         self._told: RingWriter[Any] = self._space.ring_writer(topics.TASK_EVENT)
@@ -135,6 +136,8 @@ class PlannerSession:
     def give(self, **utterance: object) -> tuple[str, PlannerAnswer]:
         """Publish an utterance of any form; return its id and what came of it."""
         command_id = f"judge-{next(self._numbers)}"
+        if self._under_way:  # the robot is done with what it was told before
+            self._tell_finished(self._under_way)
         self._events.drain()
         self._plans.drain()
         try:
@@ -142,7 +145,9 @@ class PlannerSession:
             self._utterances.publish(message)
         except IpcError as error:
             return command_id, _answer("refuse", text=f"it cannot be said: {error}")
-        return command_id, self._await(command_id)
+        answer = self._await(command_id)
+        self._under_way = command_id if answer.outcome == "plan" else ""
+        return command_id, answer
 
     def carried_out(self, command_id: str, plan: Mapping[str, Any], error: str) -> None:
         """Publish what the executor would: each action, and the end."""
@@ -155,11 +160,17 @@ class PlannerSession:
         for one in ended:
             named = {"action_id" if key == "id" else key: value for key, value in one.items()}
             self._told.publish({"command_id": command_id, "event": "action"} | named)
+        self._tell_finished(command_id, error, ended)
+        self.node.step()
+
+    def _tell_finished(
+        self, command_id: str, error: str = "", ended: Sequence[Mapping[str, Any]] = ()
+    ) -> None:
+        self._under_way = ""
         self._told.publish({
             "command_id": command_id, "event": "finished", "success": not error,
-            "error": error or None, "actions": ended,
+            "error": error or None, "actions": [*ended],
         })  # fmt: skip
-        self.node.step()
 
     def status(self) -> Mapping[str, Any]:
         """Return what the planner tells of itself."""

@@ -32,6 +32,7 @@ def executor_document(world: FlatWorld) -> dict[str, Any]:
     held = {hand: world.held_in(hand) for hand in HANDS}
     return {
         "state": "idle",
+        "commands": [],
         "command_id": None,
         "action_id": None,
         "skill": None,

@@ -88,3 +88,42 @@ def test_fingers_that_close_on_nothing_are_reported(coarse_at_table: LockstepSta
     tuck = stack.robot.poses["tuck"]
     joints = stack.lockstep.truth()["joints"]
     assert all(joints[name]["position"] == pytest.approx(tuck[name], abs=0.1) for name in tuck)
+
+
+def pause_at(stack: LockstepStack, command_id: str, skill: str, seconds: float) -> None:
+    """Pause some time into a skill for 5 s: all comes to rest, and the hands hold what they hold."""
+
+    def began() -> bool:
+        assert stack.outcome(command_id) is None, stack.outcome(command_id)
+        return any(
+            event["event"] == "action" and event["skill"] == skill and event["status"] == "active"
+            for event in stack.events
+        )
+
+    assert stack.lockstep.run_until(began, 120.0)
+    stack.lockstep.run_for(seconds)
+    held = holding(stack)
+    stack.give(pause=True)
+    assert stack.lockstep.run_until(lambda: fastest(stack) < STANDSTILL_RAD_S, 2.0)
+    stack.lockstep.run_for(3.0)
+    at = stack.lockstep.truth()["joints"]
+    stack.lockstep.run_for(2.0)
+    later = stack.lockstep.truth()["joints"]
+    moved = {name: abs(later[name]["position"] - at[name]["position"]) for name in at}
+    assert max(moved.values()) < 0.01, max(moved.items(), key=lambda one: one[1])
+    assert holding(stack) == held
+    stack.give(pause=False)
+
+
+def test_a_job_that_is_paused_in_its_phases_comes_to_the_same_end(
+    coarse_at_table: LockstepStack,
+) -> None:
+    stack = coarse_at_table
+    command_id = stack.give(text=COMMAND)
+    for skill, seconds in (("pick_up", 1.0), ("pick_up", 0.8), ("pick_up", 1.5), ("place", 2.0)):
+        pause_at(stack, command_id, skill, seconds)
+    assert stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, 120.0)
+    outcome = stack.outcome(command_id)
+    assert outcome is not None
+    assert outcome["success"], outcome
+    assert stack.lockstep.inside("red_cup", "box")["inside"]

@@ -45,17 +45,17 @@ class RobotSession(RobotLink):
         return None
 
     def command(
-        self, pause: Callable[[], None] | None = None, **utterance: Unpack[UtteranceContent]
+        self, wait: Callable[[], None] | None = None, **utterance: Unpack[UtteranceContent]
     ) -> Iterator[TaskEvent]:
         """Give a command and return its events, up to and including the last one.
 
-        `pause` waits between two reads of the events.
+        `wait` waits between two reads of the events.
 
         Raises:
             CommandFailed: planner and executor do not answer; raised by the iterator.
         """
         events = self.events(topics.TASK_EVENT)
-        return self.follow(self.utter(**utterance), events, pause)
+        return self.follow(self.utter(**utterance), events, wait)
 
     def follow(
         self,

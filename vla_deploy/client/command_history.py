@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.action_status import summary_of
 from vla_deploy.client.command_record import CommandRecord, Kind, record_of
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
@@ -79,7 +80,7 @@ class CommandHistory:
     def _hear(self, event: Event[Utterance]) -> None:
         record = record_of(event.payload, self._wall_s(event.stamp_ns))
         self._keep(record)
-        if record.kind is not Kind.CANCEL:
+        if record.kind in (Kind.COMMAND, Kind.ANSWER):
             link = self._link
             self._open[record.command_id] = Following(
                 record.command_id,
@@ -143,5 +144,6 @@ def _unanswered(command_id: str) -> FinishedEvent:
         "event": "finished",
         "success": False,
         "error": _UNANSWERED,
+        "summary": summary_of(()),
         "actions": [],
     }

@@ -20,6 +20,8 @@ class Kind(StrEnum):
     COMMAND = "command"
     ANSWER = "answer"
     CANCEL = "cancel"
+    PAUSE = "pause"
+    RESUME = "resume"
 
 
 class Standing(StrEnum):
@@ -129,6 +131,8 @@ def record_of(utterance: Utterance, given_s: float) -> CommandRecord:
     kind = Kind.COMMAND
     for word in (Kind.ANSWER, Kind.CANCEL):
         kind = word if utterance.get(word.value) else kind
+    if "pause" in utterance:
+        kind = Kind.PAUSE if utterance["pause"] else Kind.RESUME
     return CommandRecord(
         command_id=str(utterance.get("command_id", "")),
         source=str(utterance.get("source", "")),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.client.action_status import UNFINISHED, ActionStatus
+from vla_deploy.client.action_status import UNFINISHED, ActionStatus, summary_of
 from vla_deploy.ipc import Sample
 from vla_deploy.ipc.payloads.tasks import ActionResult, ExecutorStatus, PlannerStatus, TaskEvent
 
@@ -81,7 +81,7 @@ def in_planner(command_id: str) -> Callable[[PlannerStatus], bool]:
 
 def in_executor(command_id: str) -> Callable[[ExecutorStatus], bool]:
     """Return what tells whether an executor's status names a command."""
-    return lambda status: status["command_id"] == command_id
+    return lambda status: command_id in status["commands"]
 
 
 class Watch:
@@ -127,6 +127,7 @@ def lost(command_id: str, why: str, actions: Mapping[str, ActionResult]) -> Task
         "event": "finished",
         "success": False,
         "error": f"lost: {why}; look where the robot is, then give the command again",
+        "summary": summary_of(one["status"] for one in told),
         "actions": told,
     }
 
@@ -145,6 +146,7 @@ def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:
             "error": event.get("error"),
             "retries": event.get("retries", 0),
             "note": event.get("note"),
+            "data": event.get("data", {}),
         }
 
 
@@ -158,4 +160,5 @@ def _pending(action: Mapping[str, Any]) -> ActionResult:
         "error": None,
         "retries": 0,
         "note": None,
+        "data": {},
     }

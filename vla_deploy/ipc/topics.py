@@ -363,6 +363,14 @@ EXECUTOR_STATUS = Topic(
     payload=tasks.ExecutorStatus,
     fields=(PackedField("document", "json", 8192),),
 )
+MISSIONS = Topic(
+    name="missions",
+    kind=TopicKind.CELL,
+    owner="planner",
+    summary="the newest missions: objectives, subtasks, states, what their actions used when",
+    payload=tasks.MissionsDocument,
+    fields=(PackedField("document", "json", 262144),),
+)
 PLANNER_STATUS = Topic(
     name="planner_status",
     kind=TopicKind.CELL,

@@ -7,6 +7,7 @@ from platforms import load_profile
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.memory.meaning import installed_embedder
+from vla_deploy.missions.store import FILE_NAME, MissionStore
 from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.prohibitions import Prohibitions
@@ -14,6 +15,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.runtime.executors import worker_thread
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.process_main import main
+from vla_deploy.runtime.state_dir import state_dir_of
 
 PLANNING_S: Final = 0.2
 """What a plan of the parser on board takes, of simulated time."""
@@ -29,7 +31,9 @@ def build(context: NodeContext) -> PlannerNode:
     embedder = installed_embedder(shelf, profile) if remembers else None
     memory = open_memory(profile.planning, base, embedder)
     executor = worker_thread("plan", context.clock, PLANNING_S)
-    return PlannerNode(context, robot, planner, executor, memory, Prohibitions.of_base(base))
+    missions = MissionStore(state_dir_of(base) / FILE_NAME)
+    forbidden = Prohibitions.of_base(base)
+    return PlannerNode(context, robot, planner, executor, memory, forbidden, missions)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,25 @@
 """Run the planner: commands in words or plans in any dialect in, validated plans out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.clock import NS_PER_S
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile
+from vla_deploy.client.action_status import summary_of
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
-from vla_deploy.ipc.payloads.tasks import PlanMessage, PlannerStatus, TaskEvent, Utterance
+from vla_deploy.ipc.payloads.tasks import (
+    MissionAct,
+    PlanMessage,
+    PlannerStatus,
+    TaskEvent,
+    Utterance,
+)
 from vla_deploy.memory import MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.keeper import MemoryKeeper
+from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
 from vla_deploy.planning.dialogue.command import (
@@ -22,6 +30,7 @@ from vla_deploy.planning.dialogue.command import (
 )
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
+from vla_deploy.planning.dialogue.mission_manager import MissionManager
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.planner import Planner
@@ -53,6 +62,8 @@ class PlannerNode:
         executor: Executor | None = None,
         memory: MemoryStore | None = None,
         prohibitions: Prohibitions | None = None,
+        missions: MissionStore | None = None,
+        wall_s: Callable[[], float] | None = None,
     ) -> None:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
@@ -62,6 +73,9 @@ class PlannerNode:
         self._executor = executor or InlineExecutor()
         self._memory = memory
         self._prohibitions = prohibitions
+        self._mission_store = missions
+        self._wall_s = wall_s or _wall_time_of(context.clock)
+        self._missions: MissionManager
         self._keeper: MemoryKeeper | None = None
         self._status_due_ns = 0
         self._is_stopped = False
@@ -76,7 +90,8 @@ class PlannerNode:
         self._utterances = self._space.ring_reader(topics.UTTERANCE, from_start=True)
         self._events = self._space.ring_reader(topics.TASK_EVENT, from_start=True)
         plans = self._space.ring_reader(topics.PLAN, from_start=True)
-        before = _unfinished(self._utterances.drain(), self._events.drain(), plans.drain())
+        told = self._events.drain()
+        before = _unfinished(self._utterances.drain(), told, plans.drain())
         self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
             self._keeper = MemoryKeeper(
@@ -88,9 +103,10 @@ class PlannerNode:
                 places=furniture_points(self._robot.places),
                 wall_s=unix_s,
             )
+        situation = Situation(self._space, self._clock, self._robot, self._memory)
         self._manager = CommandManager(
             self._planner,
-            Situation(self._space, self._clock, self._robot, self._memory),
+            situation,
             self._publisher,
             self._executor,
             self._clock,
@@ -98,6 +114,18 @@ class PlannerNode:
             self._prohibitions,
         )
         self._status = self._space.cell_writer(topics.PLANNER_STATUS)
+        self._missions = MissionManager(
+            self._manager,
+            situation,
+            self._publisher,
+            self._space.cell_writer(topics.MISSIONS),
+            self._clock,
+            self._wall_s,
+            (*self._robot.groups, "camera", "speaker"),
+            self._mission_store,
+            run_id=self._run_dir.name,
+        )
+        self._missions.take_up(told)
         for command_id in before.in_work:
             self._refuse(command_id, AWAY)
         for command_id in before.set_back:
@@ -112,13 +140,16 @@ class PlannerNode:
         for event in self._events.drain():
             self._note(event)
         self._manager.advance()
+        self._missions.advance()
         if self._keeper is not None:
             self._keeper.step()
         now_ns = self._clock.now_ns()
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + _STATUS_PERIOD_NS
             memory = self._keeper.document() if self._keeper is not None else None
-            self._status.put_document(self._manager.document(memory))
+            document = self._manager.document(memory)
+            document["commands"] += self._missions.under_way
+            self._status.put_document(document)
 
     def stop(self) -> None:
         """Close the topics; what is planned in the executor is given up."""
@@ -152,14 +183,52 @@ class PlannerNode:
     def _hear(self, event: Event[Utterance]) -> None:
         self._manager.metrics.heard += 1
         if self._stops_all(event):
+            self._missions.stop("stopped on request")
             self._manager.stop_all(command_id_of(event))
             return
         try:
             self._check_age(event)
-            self._manager.take(read_command(event))
+            if "pause" in event.payload:
+                command = UserCommand(command_id=command_id_of(event), told_ns=event.stamp_ns)
+                self._manager.pause(command, pause=bool(event.payload["pause"]))
+                return
+            if "mission_act" in event.payload:
+                self._act_on_mission(command_id_of(event), event.payload["mission_act"])
+                return
+            self._take(event)
         except PlanError as error:
             self._manager.metrics.refused += 1
             self._refuse(command_id_of(event), str(error))
+
+    def _take(self, event: Event[Utterance]) -> None:
+        mission = event.payload.get("mission")
+        if mission is not None:
+            command = UserCommand(
+                command_id=command_id_of(event),
+                told_ns=event.stamp_ns,
+                source=str(event.payload.get("source", "")),
+            )
+            self._missions.takes(command, mission)
+            return
+        command = read_command(event)
+        if self._manager.dialogue.pending is not None or not self._missions.takes(command):
+            self._manager.take(command)
+
+    def _act_on_mission(self, command_id: str, act: MissionAct) -> None:
+        mission_id = str(act["cancel"])
+        error = None
+        if not self._missions.cancel(mission_id, "cancelled on request"):
+            error = f'no mission "{mission_id}" that has not ended; see: vla-deploy mission list'
+        self._publisher.publish(
+            {
+                "command_id": command_id,
+                "event": "finished",
+                "success": error is None,
+                "error": error,
+                "summary": summary_of(()),
+                "actions": [],
+            }
+        )
 
     def _refuse(self, command_id: str, reason: str) -> None:
         self._publisher.refused(UserCommand(command_id=command_id, told_ns=0), reason)
@@ -174,6 +243,7 @@ class PlannerNode:
     def _note(self, event: Event[TaskEvent]) -> None:
         """Note what the executor publishes of a command."""
         payload, command_id = event.payload, command_id_of(event)
+        self._missions.note(event)
         if payload["event"] == "setback":
             self._manager.set_back(command_id, payload)
         elif payload["event"] == "rejected":
@@ -189,6 +259,14 @@ class PlannerNode:
             raise NotReadyToMove(
                 f"the command is {age_s:.0f} s old, the planner was away; give it again"
             )
+
+
+def _wall_time_of(clock: Clock) -> Callable[[], float]:
+    """Return a function of Unix seconds: on a robot the wall clock, else one by the run's time."""
+    if isinstance(clock, MonotonicClock):
+        return unix_s
+    offset_s = unix_s() - clock.now_ns() / NS_PER_S
+    return lambda: offset_s + clock.now_ns() / NS_PER_S
 
 
 # --- what an earlier planner of this run left behind ---------------------------------------------

@@ -39,8 +39,8 @@ class Held:
 class SkillContext:
     """Carry everything a skill may use; `hands` is the executor's memory of each hand.
 
-    `say` shows a text, `voice` has it heard; `notes` are what results say beside their status;
-    `rests` tell of relative motions, by the actions' ids, what is left of them;
+    `say` shows a text, `voice` has it heard; `notes` are what results say beside their status,
+    `data` what came of actions; `rests` what is left of relative motions, all by actor;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
     robot, where the robot file names any. `keeps_out` are the places that the plan may not enter.
@@ -55,6 +55,7 @@ class SkillContext:
     claims: ClaimBook
     hands: dict[str, Held | None] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    data: dict[str, dict[str, Any]] = field(default_factory=dict)
     rests: dict[str, Rest] = field(default_factory=dict)
     way_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     holder: str = ""
@@ -64,6 +65,10 @@ class SkillContext:
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""
         self.notes[self.link.acting] = text
+
+    def tell(self, **data: Any) -> None:
+        """Have the result of the acting action tell what came of it."""
+        self.data.setdefault(self.link.acting, {}).update(data)
 
     def may_go_on(self, rest: Rest) -> None:
         """Have what is left of the acting action told, should it end before it is done."""

@@ -12,6 +12,7 @@ SkillFailed
 ├── ServerCancelled  somebody else has cancelled a goal with its server
 ├── ServerLost       nobody knows how a goal ended: its server or the ROS gateway does not answer
 └── RobotNotReady    control refuses motion: a person must reset and arm
+    └── RefusedAtStart   it did before the action had begun
 """
 
 from typing import ClassVar
@@ -52,6 +53,8 @@ class OutOfReach(NotPossible):
 class PreconditionUnmet(NotPossible):
     """Say what does not hold that a skill needs before it begins."""
 
+    status = ActionStatus.REJECTED
+
 
 class ServerRejected(NotPossible):
     """Say which server beyond the robot did not take its goal."""
@@ -73,3 +76,9 @@ class ServerLost(SkillFailed):
 
 class RobotNotReady(SkillFailed):
     """Say that control refuses to move."""
+
+
+class RefusedAtStart(RobotNotReady):
+    """Say why control refuses an action that has not begun."""
+
+    status = ActionStatus.REJECTED

@@ -1,15 +1,14 @@
 """Run one plan: actions as their dependencies allow, each bounded in time, some tried twice."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.client.action_status import ActionStatus
+from vla_deploy.client.action_status import FINAL, ActionStatus
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
-from vla_deploy.ipc.payloads.tasks import ActionOutcome
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.plan import Action, FailureCause, Plan, execution_order
 from vla_deploy.plans.symbolic.state import SymbolicState
@@ -18,16 +17,19 @@ from vla_deploy.skills.errors import (
     EffectMissing,
     NotPossible,
     PreconditionUnmet,
+    RefusedAtStart,
     RobotNotReady,
     SkillFailed,
     TryAgain,
 )
+from vla_deploy.skills.records import ActionRecord, has_succeeded
 from vla_deploy.skills.resources import WAIT_LIMIT_S, needs_of
 from vla_deploy.skills.table import SKILL_FUNCTIONS
 from vla_deploy.skills.world_check import WorldCheck
 
-MAX_RETRIES = 1
 BACK_OFF_S = 1.0
+"""Before the first retry; twice as long before each further one, up to the longest."""
+LONGEST_BACK_OFF_S = 8.0
 # How long needs and effects are looked for, and how often: two images of the camera.
 WORLD_WAIT_S = 0.6
 WORLD_LOOK_S = 0.1
@@ -38,52 +40,28 @@ CAUSES = (
     (NotPossible, FailureCause.SKILL),
 )
 _WAITING: Final = "wait"  # lasts as long as it was asked for
-FINAL = frozenset(ActionStatus) - {ActionStatus.PENDING, ActionStatus.ACTIVE}
-
-
-@dataclass(slots=True, kw_only=True)
-class ActionRecord:
-    """Hold how one action went."""
-
-    action: Action
-    status: ActionStatus = ActionStatus.PENDING
-    started_ns: int = 0
-    execution_time_s: float = 0.0
-    error: str = ""
-    retries: int = 0
-    note: str = ""
-    cause: FailureCause | None = None
-    """By what it failed, where another plan may do better; None otherwise."""
-    left: Mapping[str, float] | None = None
-    """What is left of a relative motion that ended early; empty where nobody knows, else None."""
-
-    @property
-    def outcome(self) -> ActionOutcome:
-        """Return the record as events and results have it."""
-        return {
-            "skill": self.action.skill,
-            "parameters": self.action.parameters,
-            "status": self.status.value,
-            "execution_time_s": round(self.execution_time_s, 3),
-            "error": self.error or None,
-            "retries": self.retries,
-            "note": self.note or None,
-        }
 
 
 @dataclass(slots=True, kw_only=True)
 class _Branch:
     """Hold one action under way; `skill` is None before its first step and between two tries.
 
-    `done_ns` is when the skill came to its end; its effect is looked for from then on.
+    `done_ns` is when the skill came to its end; its effect is looked for from then on. Of the time
+    since `started_ns` pauses do not count.
     """
 
     record: ActionRecord
+    started_ns: int
     skill: Skill | None = None
     resume_ns: int = 0
     done_ns: int = 0
     unmet_ns: int = 0
     before: SymbolicState = field(default_factory=SymbolicState)
+
+    @property
+    def has_not_begun(self) -> bool:
+        """Return whether its skill has not made a step yet."""
+        return self.skill is None and not self.done_ns and not self.record.retries
 
 
 class PlanExecution:
@@ -103,14 +81,14 @@ class PlanExecution:
         self.plan = plan
         self.records = [ActionRecord(action=action) for action in execution_order(plan.actions)]
         self._context = context
-        context.keeps_out = frozenset(plan.keeps_out)
         self._tell = tell
         self._command_id = command_id
         self._world = WorldCheck(context)
         self._branches: dict[str, _Branch] = {}
         self._leaving: dict[str, tuple[ActionStatus, str]] = {}
         """How actions end as soon as servers beyond the robot have ended their goals."""
-        self._asked: set[str] = set()
+        self._asked: dict[str, int] = {}
+        """Since when each action has asked for parts of the robot, by the time that works."""
 
     @property
     def finished(self) -> bool:
@@ -119,12 +97,18 @@ class PlanExecution:
 
     @property
     def succeeded(self) -> bool:
-        """Return whether every action succeeded."""
-        return all(record.status is ActionStatus.SUCCEEDED for record in self.records)
+        """Return whether it succeeded, by its own options."""
+        goes_on = self.plan.options.continue_on_error
+        return has_succeeded(self.records, continue_on_error=goes_on)
 
     @property
     def setback(self) -> ActionRecord | None:
-        """Return the action that failed in a way that another plan may mend, or None."""
+        """Return the action that failed in a way that another plan may mend, or None.
+
+        A plan that goes on where actions fail needs no other.
+        """
+        if self.plan.options.continue_on_error:
+            return None
         return next((one for one in self.records if one.cause is not None), None)
 
     @property
@@ -134,9 +118,11 @@ class PlanExecution:
         return next(under_way, None) or next(map(self._record, self._leaving), None)
 
     def step(self) -> None:
-        """Start what may start, and advance every action under way."""
+        """Start what may start, and advance every action under way; in a pause nothing goes on."""
         now_ns = self._context.link.clock.now_ns()
         self._end_left()
+        if self._context.link.is_paused:
+            return
         self._start_ready(now_ns)
         for name, branch in list(self._branches.items()):
             is_open = branch.record.status not in FINAL and name not in self._leaving
@@ -144,13 +130,13 @@ class PlanExecution:
                 self._step_branch(branch, now_ns)
 
     def cancel(self, reason: str) -> None:
-        """Stop every motion now and cancel what has not ended.
+        """Stop every motion of the plan now and cancel what has not ended.
 
         What servers beyond the robot do ends when they have answered, in one of the next steps.
         """
         for branch in self._branches.values():
             _drop(branch)
-        self._context.link.halt()
+            self._context.link.halt_actor(self._actor(branch.record.action))
         for record in self.records:
             if record.status not in FINAL and record.action.id not in self._leaving:
                 self._leave(record, ActionStatus.CANCELLED, reason)
@@ -158,8 +144,10 @@ class PlanExecution:
     def abandon(self) -> None:
         """End what is left without the word of servers that have not answered yet."""
         for action_id, (status, error) in list(self._leaving.items()):
-            self._context.notes[action_id] = "not waited for its server to end its goal"
-            self._end(self._record(action_id), status, error)
+            record = self._record(action_id)
+            actor = self._actor(record.action)
+            self._context.notes[actor] = "not waited for its server to end its goal"
+            self._end(record, status, error)
 
     def _leave(self, record: ActionRecord, status: ActionStatus, error: str) -> None:
         """End an action, at once or as soon as no server has a goal of it any more."""
@@ -177,7 +165,7 @@ class PlanExecution:
 
     def _is_ending(self, action: Action) -> bool:
         ros = self._context.ros
-        return ros is not None and ros.is_ending(action.id)
+        return ros is not None and ros.is_ending(self._actor(action))
 
     def _record(self, action_id: str) -> ActionRecord:
         return next(one for one in self.records if one.action.id == action_id)
@@ -200,10 +188,12 @@ class PlanExecution:
                 self._start_if_granted(record, book, now_ns)
 
     def _ask_once(self, record: ActionRecord) -> None:
+        if record.action.id not in self._asked and record.status not in FINAL:
+            self._asked[record.action.id] = self._context.link.working_ns()
+            self._ask(record)
+
+    def _ask(self, record: ActionRecord) -> None:
         action = record.action
-        if action.id in self._asked or record.status in FINAL:
-            return
-        self._asked.add(action.id)
         try:
             self._context.claims.ask(
                 self._holder(action),
@@ -216,21 +206,29 @@ class PlanExecution:
 
     def _start_if_granted(self, record: ActionRecord, book: Book, now_ns: int) -> None:
         holder = self._holder(record.action)
+        working_ns = self._context.link.working_ns()
+        waited_s = (working_ns - self._asked[record.action.id]) / NS_PER_S
         if book.holds(holder):
-            self._branches[record.action.id] = _Branch(record=record)
+            self._branches[record.action.id] = _Branch(record=record, started_ns=working_ns)
             record.status = ActionStatus.ACTIVE
             record.started_ns = now_ns
             self._tell(record)
-        elif not book.waits(holder):
+        elif book.waits(holder):
+            return
+        elif waited_s < WAIT_LIMIT_S:  # the claim ran out in a pause
+            self._ask(record)
+        else:
             needs = needs_of(record.action, self._context.robot)
             why = obstacles(book, needs) or "others came first"
             self._give_up(record, f"waited {WAIT_LIMIT_S:g} s: {why}")
 
     def _step_branch(self, branch: _Branch, now_ns: int) -> None:
         record = branch.record
-        record.execution_time_s = (now_ns - record.started_ns) / NS_PER_S
-        self._context.link.acting = record.action.id
+        worked_ns = self._context.link.working_ns() - branch.started_ns
+        record.execution_time_s = worked_ns / NS_PER_S
+        self._context.link.acting = self._actor(record.action)
         self._context.holder = self._holder(record.action)
+        self._context.keeps_out = frozenset(self.plan.keeps_out)
         try:
             self._advance(branch)
         except StopIteration:
@@ -245,11 +243,11 @@ class PlanExecution:
         action = branch.record.action
         refusal = refusal_of(self._context.link.control_status)
         if refusal:
-            raise RobotNotReady(refusal)
+            raise RefusedAtStart(refusal) if branch.has_not_begun else RobotNotReady(refusal)
         timeout_s = self._timeout_s(action)
         if branch.record.execution_time_s > timeout_s:
             raise TryAgain(f"{action.skill} took longer than {timeout_s:g} s")
-        if self._context.link.is_blind or self._context.link.is_paused:
+        if self._context.link.is_blind or self._context.link.in_protective_stop:
             self._context.link.rest_base()
             return
         if branch.done_ns:
@@ -265,9 +263,10 @@ class PlanExecution:
         next(branch.skill)
 
     def _timeout_s(self, action: Action) -> float:
-        own_s = SKILLS[action.skill].timeout_s
+        spec = SKILLS[action.skill]
         if action.skill == _WAITING:
-            return own_s
+            return spec.timeout_s
+        own_s = self.plan.options.timeouts_s.get(spec.kind, spec.timeout_s)
         return min(own_s, self._context.robot.planning.action_timeout_s)
 
     def _lacks_need(self, branch: _Branch, now_ns: int) -> bool:
@@ -305,23 +304,36 @@ class PlanExecution:
     def _failed(self, branch: _Branch, error: SkillFailed, now_ns: int) -> None:
         record = branch.record
         _drop(branch)
-        self._context.link.halt_actor(record.action.id)
+        self._context.link.halt_actor(self._actor(record.action))
         retryable = isinstance(error, TryAgain) and SKILLS[record.action.skill].retryable
-        if retryable and record.retries < MAX_RETRIES:
+        if retryable and record.retries < self.plan.options.max_retries:
+            back_off_s = min(BACK_OFF_S * 2**record.retries, LONGEST_BACK_OFF_S)
             record.retries += 1
             record.error = f"trying again after: {error}"
             self._tell(record)
-            branch.resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
+            branch.resume_ns = now_ns + round(back_off_s * NS_PER_S)
             return
         record.cause = next((cause for kind, cause in CAUSES if isinstance(error, kind)), None)
-        self._give_up(record, str(error), error.status)
+        self._give_up(record, str(error), error.status, ends_all=isinstance(error, RobotNotReady))
 
     def _give_up(
-        self, record: ActionRecord, error: str, status: ActionStatus = ActionStatus.ABORTED
+        self,
+        record: ActionRecord,
+        error: str,
+        status: ActionStatus = ActionStatus.ABORTED,
+        *,
+        ends_all: bool = False,
     ) -> None:
-        """End an action without success, and with it the rest of the plan."""
+        """End an action without success, and with it what the plan's options do not let go on."""
         self._leave(record, status, error)
-        self.cancel(f"{record.action.id} failed")
+        if ends_all or not self.plan.options.continue_on_error:
+            self.cancel(f"{record.action.id} failed")
+            return
+        gone = {record.action.id}
+        for other in self.records:  # in the order of execution
+            if other.status is ActionStatus.PENDING and gone.intersection(other.action.depends_on):
+                gone.add(other.action.id)
+                self._leave(other, ActionStatus.CANCELLED, f"{record.action.id} failed")
 
     def _end(self, record: ActionRecord, status: ActionStatus, error: str) -> None:
         self._branches.pop(record.action.id, None)
@@ -330,17 +342,22 @@ class PlanExecution:
             self._context.claims.release(self._holder(record.action))
         record.status = status
         record.error = error
-        record.note = self._note_of(record.action.id)
-        rest = self._context.rests.pop(record.action.id, None)
+        record.note = self._note_of(record.action)
+        record.data = self._context.data.pop(self._actor(record.action), {})
+        rest = self._context.rests.pop(self._actor(record.action), None)
         if rest is not None and status is not ActionStatus.SUCCEEDED:
             record.left = _told(rest)
         self._tell(record)
 
-    def _note_of(self, action_id: str) -> str:
+    def _note_of(self, action: Action) -> str:
         """Return what the result says beside its status: of its skill, and of servers' cancels."""
-        note = self._context.notes.pop(action_id, "")
-        said = "" if self._context.ros is None else self._context.ros.words_of(action_id)
+        actor = self._actor(action)
+        note = self._context.notes.pop(actor, "")
+        said = "" if self._context.ros is None else self._context.ros.words_of(actor)
         return "; ".join(one for one in (note, said) if one)
+
+    def _actor(self, action: Action) -> str:
+        return f"{self._command_id}/{action.id}"
 
     def _holder(self, action: Action) -> str:
         return f"{action.skill} ({self._command_id or 'a plan'}, {action.id})"

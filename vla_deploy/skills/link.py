@@ -27,10 +27,11 @@ JOINT_AGE_S = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedMotion:
-    """Hold how a motion ended."""
+    """Hold how a motion ended; one that a pause interrupted has still to come to its end."""
 
     status: str
     reason: str
+    is_interrupted: bool = False
 
 
 def _direction(twist: Twist) -> Direction:
@@ -58,13 +59,20 @@ class SkillLink:
         """Whose motions are sent now: one of several actions that go on side by side."""
         self._active: dict[int, str] = {}
         self._ended: dict[int, EndedMotion] = {}
+        self._interrupted: set[int] = set()
         self._driver: str | None = None
+        self._paused_ns = 0
+        self._idle_ns = 0
 
     def refresh(self) -> None:
         """Take in the motions that have ended."""
         for event in self._results_in.drain():
-            ended = EndedMotion(status=event.payload["status"], reason=event.payload["reason"])
-            motion_id = event.payload["motion_id"]
+            motion_id, status = event.payload["motion_id"], event.payload["status"]
+            is_interrupted = motion_id in self._interrupted and status == "cancelled"
+            self._interrupted.discard(motion_id)
+            ended = EndedMotion(
+                status=status, reason=event.payload["reason"], is_interrupted=is_interrupted
+            )
             if motion_id in self._active:
                 del self._active[motion_id]
                 self._ended[motion_id] = ended
@@ -204,9 +212,34 @@ class SkillLink:
             return None
         return sample.document()
 
+    def pause(self) -> None:
+        """Bring to rest what this executor moves, for actions that go on from there later."""
+        if self.is_paused:
+            return
+        self._paused_ns = self.clock.now_ns()
+        for motion_id in sorted(self._active):
+            self._commands.publish({"kind": "cancel", "motion_id": motion_id})
+        self._interrupted |= self._active.keys()
+        self.rest_base()
+
+    def resume(self) -> None:
+        """Let actions go on."""
+        if self.is_paused:
+            self._idle_ns += self.clock.now_ns() - self._paused_ns
+            self._paused_ns = 0
+
     @property
     def is_paused(self) -> bool:
-        """Return whether control has paused the robot by a protective stop, which ends itself."""
+        """Return whether actions have been paused, and nothing is to move."""
+        return self._paused_ns > 0
+
+    def working_ns(self) -> int:
+        """Return a time that stands still in pauses: what actions reckon their patience by."""
+        return (self._paused_ns or self.clock.now_ns()) - self._idle_ns
+
+    @property
+    def in_protective_stop(self) -> bool:
+        """Return whether control holds the robot by a protective stop, which ends itself."""
         status = self.control_status
         return status is not None and status["state"] == "protective_stop"
 
@@ -273,6 +306,7 @@ class SkillLink:
         """End a motion that this executor started."""
         self._commands.publish({"kind": "cancel", "motion_id": motion_id})
         self._active.pop(motion_id, None)
+        self._interrupted.discard(motion_id)
 
     def ended(self, motion_id: int) -> EndedMotion | None:
         """Return how a motion ended, once, or None while it runs."""

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, Literal
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.client.action_status import ActionStatus
+from vla_deploy.client.action_status import FAILED, ActionStatus, summary_of
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import (
     Announcer,
@@ -28,14 +30,16 @@ from vla_deploy.ipc.payloads.tasks import (
 )
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import base_planner
+from vla_deploy.plans.catalogue import MOTIONLESS
 from vla_deploy.plans.plan import Plan
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.context import Held, SkillContext
-from vla_deploy.skills.executor import ActionRecord, PlanExecution
+from vla_deploy.skills.executor import PlanExecution
 from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.movements.arms import believe_fingers, recall_hands
+from vla_deploy.skills.records import ActionRecord
 from vla_deploy.skills.recovery import Recovery
 from vla_deploy.skills.resources import body_of
 from vla_deploy.skills.ros_goals import RosGoals
@@ -46,7 +50,7 @@ PLANNER_AGE_S = 2.0
 PLAN_WITHIN_S: Final = 20.0
 # Another plan is waited for as long as the planner may take, and a moment besides.
 _MOMENT_S: Final = 2.0
-_FAILED = frozenset({ActionStatus.ABORTED, ActionStatus.REJECTED, ActionStatus.LOST})
+MOST_COMMANDS: Final = 8
 
 
 def _told_hands(before: Sample[ExecutorStatus] | None) -> dict[str, Held]:
@@ -55,10 +59,20 @@ def _told_hands(before: Sample[ExecutorStatus] | None) -> dict[str, Held]:
     return {hand: Held(**grip) for hand, grip in grips.items()}
 
 
-class ExecutorNode:
-    """Execute one plan at a time; a new plan is refused while one runs, a cancel ends it.
+@dataclass(slots=True, kw_only=True)
+class _Job:
+    """Hold how one command is carried out; `execution` is None while another plan is awaited."""
 
-    Where a plan fails, the planner is asked for another way to the same goal, and waited for.
+    command_id: str
+    execution: PlanExecution | None = None
+    recovery: Recovery = field(default_factory=Recovery)
+
+
+class ExecutorNode:
+    """Execute plans side by side as far as they need different parts of the robot.
+
+    Where a plan fails, the planner is asked for another way to the same goal, and waited for. In a
+    pause all come to rest, and go on from there.
     """
 
     def __init__(
@@ -79,9 +93,8 @@ class ExecutorNode:
         self._events: RingWriter[TaskEvent]
         self._status: CellWriter[ExecutorStatus]
         self._planner: CellReader[PlannerStatus]
-        self._execution: PlanExecution | None = None
-        self._recovery = Recovery()
-        self._command_id = ""
+        self._jobs: dict[str, _Job] = {}
+        self._acting = ""
         self._status_ns = 0
         self._knows_hands = False
         self._told_hands: dict[str, Held] = {}
@@ -116,23 +129,19 @@ class ExecutorNode:
             self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
             self._take(event.payload)
-        if self._execution is not None:
-            self._execution.step()
-            self._conclude()
-        elif self._recovery.is_overdue(self._clock.now_ns()):
-            self._finish("the planner has no other plan in time")
-        elif self._knows_hands:
-            believe_fingers(
-                self._skills
-            )  # while an action is under way, its skill feels for itself
+        for job in list(self._jobs.values()):
+            self._advance(job)
+        if not self._jobs and self._knows_hands:
+            believe_fingers(self._skills)  # an action under way feels for itself
         self._tell_status()
 
     def stop(self) -> None:
         """Cancel what runs, so that nothing moves without its executor."""
-        self._call_off("the executor was stopped")
-        if self._execution is not None:
-            self._execution.abandon()
-            self._conclude()
+        for job in list(self._jobs.values()):
+            self._call_off(job, "the executor was stopped")
+            if job.execution is not None:
+                job.execution.abandon()
+                self._conclude(job)
         if self._skills.ros is not None:
             self._skills.ros.close()
         self._space.close()
@@ -152,67 +161,103 @@ class ExecutorNode:
 
     def _take(self, message: PlanMessage) -> None:
         command_id = message["command_id"]
-        if "cancel" in message:
-            self._call_off("cancelled on request")
-            self._skills.link.halt()
-            self._events.publish(
-                {
-                    "command_id": command_id,
-                    "event": "finished",
-                    "success": True,
-                    "error": None,
-                    "actions": [],
-                }
-            )
-            return
-        goes_on = self._recovery.is_awaited and command_id == self._command_id
-        if "give_up" in message:
-            if goes_on:
-                self._finish(message["give_up"])
-            return
+        job = self._jobs.get(command_id)
+        if "pause" in message:
+            self._pause(command_id, pause=message["pause"])
+        elif "cancel" in message:
+            self._cancel(command_id, message.get("of"))
+        elif "give_up" in message:
+            if job is not None and job.recovery.is_awaited:
+                self._finish(job, message["give_up"])
+        else:
+            self._begin(command_id, job, Plan.model_validate(message["plan"]))
+
+    def _begin(self, command_id: str, job: _Job | None, plan: Plan) -> None:
+        """Carry a plan out: that of a new command, or another one that is awaited."""
         refusal = refusal_of(self._skills.link.control_status)
-        if goes_on and refusal is not None:
-            self._finish(refusal)
+        if job is not None and job.recovery.is_awaited and refusal is not None:
+            self._finish(job, refusal)
             return
-        if refusal is None and self._is_busy and not goes_on:
-            refusal = "the robot is busy with another command; wait, or: vla-deploy stop"
+        if refusal is None and job is not None and job.execution is not None:
+            refusal = f"the robot carries out {command_id} already"
+        if refusal is None and job is None and len(self._jobs) >= MOST_COMMANDS:
+            refusal = f"the robot carries out {MOST_COMMANDS} commands already; wait for one to end"
         if refusal is not None:
             self._events.publish({"command_id": command_id, "event": "rejected", "reason": refusal})
             return
-        self._recovery = self._recovery.going_on() if goes_on else Recovery()
-        self._command_id = command_id
-        plan = Plan.model_validate(message["plan"])
-        self._execution = PlanExecution(plan, self._skills, self._tell_action, command_id)
+        job = _Job(command_id=command_id) if job is None else job
+        job.recovery = job.recovery.going_on()
+        job.execution = PlanExecution(
+            plan, self._skills, partial(self._tell_action, command_id), command_id
+        )
+        self._jobs[command_id] = job
 
-    @property
-    def _is_busy(self) -> bool:
-        return self._execution is not None or self._recovery.is_awaited
+    def _pause(self, command_id: str, *, pause: bool) -> None:
+        """Come to rest with all that goes on, or go on with it, and answer."""
+        link, ros = self._skills.link, self._skills.ros
+        if not pause:
+            link.resume()
+        elif self._jobs:
+            link.pause()
+            if ros is not None:
+                ros.pause()
+        self._answer(command_id, "" if self._jobs else "nothing is under way")
 
-    def _call_off(self, reason: str) -> None:
+    def _answer(self, command_id: str, error: str = "") -> None:
+        """Say that what was asked for is done, or why not."""
+        self._events.publish(
+            {
+                "command_id": command_id,
+                "event": "finished",
+                "success": not error,
+                "error": error or None,
+                "summary": summary_of(()),
+                "actions": [],
+            }
+        )
+
+    def _cancel(self, command_id: str, of: str | None) -> None:
+        """End one command, or all; what else this executor moves comes to rest with the last."""
+        for job in [one for one in self._jobs.values() if of in (None, one.command_id)]:
+            self._call_off(job, "cancelled on request")
+        if of is None:
+            self._skills.link.halt()
+            self._skills.link.resume()
+        self._answer(command_id)
+
+    def _advance(self, job: _Job) -> None:
+        if job.execution is not None:
+            self._acting = job.command_id
+            job.execution.step()
+            self._conclude(job)
+        elif job.recovery.is_overdue(self._clock.now_ns()):
+            self._finish(job, "the planner has no other plan in time")
+
+    def _call_off(self, job: _Job, reason: str) -> None:
         """End what runs, or what waits for another plan."""
-        if self._execution is not None:
-            self._execution.cancel(reason)
-            self._conclude()
-        elif self._recovery.is_awaited:
-            self._finish(reason)
+        if job.execution is not None:
+            job.execution.cancel(reason)
+            self._conclude(job)
+        elif job.recovery.is_awaited:
+            self._finish(job, reason)
 
-    def _conclude(self) -> None:
-        execution = self._execution
+    def _conclude(self, job: _Job) -> None:
+        execution = job.execution
         if execution is None or not execution.finished:
             return
-        setback, self._execution = execution.setback, None
-        self._recovery = self._recovery.after(execution.records)
-        may_go_on = self._recovery.may_go_on(self._robot.planning.further_plans)
+        setback, job.execution = execution.setback, None
+        job.recovery = job.recovery.after(execution.records)
+        may_go_on = job.recovery.may_go_on(self._robot.planning.further_plans)
         if setback is None or not may_go_on or not self._planner_lives():
-            self._finish("", success=execution.succeeded)
+            self._finish(job, "", success=execution.succeeded)
             return
         wait_ns = round((self._plan_within_s + _MOMENT_S) * NS_PER_S)
-        self._recovery = self._recovery.awaiting(self._clock.now_ns() + wait_ns)
+        job.recovery = job.recovery.awaiting(self._clock.now_ns() + wait_ns)
         done = [one.action.id for one in execution.records if one.status is ActionStatus.SUCCEEDED]
         left = {one.action.id: one.left for one in execution.records if one.left is not None}
         self._events.publish(
             {
-                "command_id": self._command_id,
+                "command_id": job.command_id,
                 "event": "setback",
                 "action_id": setback.action.id,
                 "skill": setback.action.skill,
@@ -223,31 +268,34 @@ class ExecutorNode:
             }
         )
 
-    def _finish(self, why_no_other: str, success: bool = False) -> None:
+    def _finish(self, job: _Job, why_no_other: str, success: bool = False) -> None:
         """Publish how the command ended; of plans that failed, all that was done counts.
 
         Where the world was against it, it is told what to do before, or instead.
         """
-        records, self._recovery = self._recovery.records, Recovery()
-        self._execution = None
-        errors = [one.error for one in reversed(records) if one.status in _FAILED]
+        records = job.recovery.records
+        self._jobs.pop(job.command_id, None)
+        if not self._jobs:
+            self._skills.link.resume()
+        errors = [one.error for one in reversed(records) if one.status in FAILED]
         errors += [one.error for one in records if one.error]
         advice = "" if success else self._advice(records)
         told = ". ".join(one.rstrip(".?") for one in (*errors[:1], advice) if one)
         error = "; ".join(one for one in (told, why_no_other) if one) or None
         self._events.publish(
             {
-                "command_id": self._command_id,
+                "command_id": job.command_id,
                 "event": "finished",
                 "success": success,
                 "error": None if success else error,
+                "summary": summary_of(one.status for one in records),
                 "actions": [{"id": one.action.id, **one.outcome} for one in records],
             }
         )
 
     def _advice(self, records: Sequence[ActionRecord]) -> str:
         """Return what to do about the action that the last plan failed by, "" where nothing."""
-        aborted = [one for one in records if one.status in _FAILED]
+        aborted = [one for one in records if one.status in FAILED]
         if not aborted or aborted[-1].cause is None:
             return ""
         return self._adviser.advice_on(aborted[-1].action)
@@ -256,10 +304,10 @@ class ExecutorNode:
         sample = self._planner.latest()
         return sample is not None and sample.age_s(self._clock.now_ns()) < PLANNER_AGE_S
 
-    def _tell_action(self, record: ActionRecord) -> None:
+    def _tell_action(self, command_id: str, record: ActionRecord) -> None:
         self._events.publish(
             {
-                "command_id": self._command_id,
+                "command_id": command_id,
                 "event": "action",
                 "action_id": record.action.id,
                 **record.outcome,
@@ -267,24 +315,29 @@ class ExecutorNode:
         )
 
     def _say(self, text: str) -> None:
-        self._events.publish({"command_id": self._command_id, "event": "said", "text": text})
+        self._events.publish({"command_id": self._acting, "event": "said", "text": text})
 
-    def _state(self) -> Literal["idle", "executing", "recovering"]:
-        if self._execution is not None:
+    def _state(self) -> Literal["idle", "executing", "recovering", "paused"]:
+        if self._skills.link.is_paused:
+            return "paused"
+        if any(job.execution is not None for job in self._jobs.values()):
             return "executing"
-        return "recovering" if self._recovery.is_awaited else "idle"
+        return "recovering" if self._jobs else "idle"
 
     def _tell_status(self) -> None:
         now_ns = self._clock.now_ns()
         if now_ns - self._status_ns < STATUS_PERIOD_NS:
             return
         self._status_ns = now_ns
-        execution = self._execution
-        active = execution.active if execution else None
+        jobs = [one for one in self._jobs.values() if one.execution is not None]
+        shown = min(jobs, key=_is_motionless, default=None)
+        active = shown.execution.active if shown and shown.execution else None
+        first = shown or next(iter(self._jobs.values()), None)
         self._status.put_document(
             {
                 "state": self._state(),
-                "command_id": self._command_id if self._is_busy else None,
+                "commands": list(self._jobs),
+                "command_id": first.command_id if first else None,
                 "action_id": active.action.id if active else None,
                 "skill": active.action.skill if active else None,
                 "way_m": self._skills.way_m[:_SHOWN_POINTS].round(3).tolist(),
@@ -294,6 +347,12 @@ class ExecutorNode:
                 "grips": {hand: _grip(held) for hand, held in self._skills.hands.items() if held},
             }
         )
+
+
+def _is_motionless(job: _Job) -> bool:
+    """Return whether nothing moves by the action of a job that is shown."""
+    active = None if job.execution is None else job.execution.active
+    return active is None or active.action.skill in MOTIONLESS
 
 
 def _grip(held: Held) -> GripDocument:

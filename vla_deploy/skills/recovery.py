@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from vla_deploy.skills.executor import ActionRecord
+from vla_deploy.skills.records import ActionRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from vla_deploy.ipc.payloads.services import RosStatus
 from vla_deploy.ipc.ros_goals import (
     GoalAct,
     GoalAnswer,
+    GoalKind,
     GoalRequest,
     GoalState,
     RosGoalUnreadable,
@@ -33,6 +34,7 @@ class SentGoal:
     """Hold how one goal stands; `state` is None until the gateway has told any.
 
     `note` is what the server said to a cancel. `left_m` is the rest of the way, where it is told.
+    What a pause interrupts goes on afterwards.
     """
 
     request: GoalRequest
@@ -44,6 +46,7 @@ class SentGoal:
     asked_ns: int = 0
     gateway_pid: int = 0
     is_cancelled: bool = False
+    is_interrupted: bool = False
     permit_ns: int = 0
     is_held: bool = False
 
@@ -115,6 +118,13 @@ class RosGoals:
             self._ask(goal, GoalAct.CANCEL, reason)
         else:
             _end(goal, GoalState.CANCELLED, "it was not sent yet")
+
+    def pause(self) -> None:
+        """Have arms stop on their way; a base that nobody permits to drive stops by itself."""
+        for goal in self._goals.values():
+            if goal.request.kind is GoalKind.FOLLOW and not goal.is_final:
+                goal.is_interrupted = True
+                self.cancel(goal, "paused")
 
     def cancel_of(self, actor: str, reason: str) -> None:
         """Have every goal of an action cancelled."""

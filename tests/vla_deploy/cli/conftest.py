@@ -137,7 +137,7 @@ class Robot:
 
     def executes(self, command_id: str | None) -> None:
         state = "executing" if command_id else "idle"
-        document = {"state": state, "command_id": command_id, "skill": None, "holding": {}}
+        document = {"state": state, "commands": [command_id] if command_id else []}
         self._executor.put_document(document)
 
 

@@ -93,7 +93,7 @@ def _successor_of(sample):
 
         @staticmethod
         def document() -> dict:
-            return {"command_id": None}
+            return {"commands": []}
 
     return Successor()
 

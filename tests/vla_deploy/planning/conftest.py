@@ -16,6 +16,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
+from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.node import PlannerNode
@@ -122,6 +123,7 @@ class Desk:
         )
         self._slow = slow
         self._given = 0
+        self.carried_out = ["another"]
         self._utterances = self._space.ring_writer("utterance")
         self._events = self._space.ring_reader("task_event", from_start=True)
         self._plans = self._space.ring_reader("plan", from_start=True)
@@ -136,9 +138,27 @@ class Desk:
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
         planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
-        self.planner = PlannerNode(self._context, butler(), planner, self.executor, self.memory)
+        self.planner = PlannerNode(
+            self._context,
+            butler(),
+            planner,
+            self.executor,
+            self.memory,
+            missions=MissionStore(self._context.run_dir / "missions.json"),
+            wall_s=self.wall_s,
+        )
         self.planner.start()
         return self.planner
+
+    def wall_s(self) -> float:
+        """Return Unix seconds, which go by the desk's clock."""
+        return 1_750_000_000.0 + self.clock.now_ns() / NS_PER_S
+
+    def missions(self) -> list[dict[str, Any]]:
+        """Return the missions as the planner shows them, the newest first."""
+        sample = self._space.cell_reader("missions").latest()
+        assert sample is not None
+        return sample.document()["missions"]
 
     def control(self, state: str) -> None:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
@@ -147,9 +167,10 @@ class Desk:
         self, state: str, doing: tuple[str, str] | None = None, **holding: str | None
     ) -> None:
         """Let the executor tell what it is `doing`, command and skill, and what the hands hold."""
+        commands = [] if state == "idle" else self.carried_out
         command_id, skill = doing or (None, None)
-        told = {"state": state, "command_id": command_id, "skill": skill, "holding": holding}
-        self._executor_status.put_document(told)
+        told = {"command_id": command_id, "skill": skill, "commands": commands}
+        self._executor_status.put_document({"state": state, "holding": holding, **told})
 
     def sees(self, *names: str) -> None:
         """Let perception tell of things such as "red cup_1", in a row on the coffee table."""
@@ -174,6 +195,10 @@ class Desk:
 
     def executor_tells(self, **event: object) -> None:
         self._executor.publish(event)
+
+    def ends(self, command_id: str) -> None:
+        """Let the executor tell that a command has succeeded."""
+        self.executor_tells(command_id=command_id, event="finished", success=True, error=None)
 
     def answers_to(self, text: str | None = None, **utterance: object) -> list[dict[str, Any]]:
         """Give an utterance, and return the events of the planner's next step."""

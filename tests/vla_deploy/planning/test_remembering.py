@@ -227,6 +227,9 @@ def test_patterns_take_with_the_other_hand_what_slipped_the_last_time(
         if judged is not None:
             memory.update_outcome(1, judged, "it was in the hand")
         (order,) = desk.plans_for("pick up the red cup")
+        desk.executor_tells(
+            command_id=order["command_id"], event="finished", success=False, error="cancelled"
+        )
         taken = next(one for one in order["plan"]["actions"] if one["skill"] == "pick_up")
         assert taken["parameters"].get("arm") == arm
 

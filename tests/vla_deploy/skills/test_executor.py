@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +15,7 @@ from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots import load_robot
 from vla_deploy.skills import executor
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.errors import NotPossible, RobotNotReady, TryAgain
 from vla_deploy.skills.executor import PlanExecution
 from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.resources import WAIT_LIMIT_S, body_of, needs_of
@@ -42,7 +43,12 @@ class Stage:
     ends: dict[str, Exception | None] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
 
-    def plan(self, **needs: tuple[str, ...]) -> PlanExecution:
+    def plan(
+        self,
+        options: Mapping[str, Any] | None = None,
+        command_id: str = "c1",
+        **needs: tuple[str, ...],
+    ) -> PlanExecution:
         """Return the execution of a plan whose action `a_look_at` does `look_at`."""
         actions = []
         for name, depends_on in needs.items():
@@ -50,12 +56,12 @@ class Stage:
             parameters: dict[str, Any] = {"id": name, **({"arm": arm} if arm else {})}
             action = Action(id=name, skill=skill, parameters=parameters, depends_on=depends_on)
             actions.append(action)
-        plan = Plan(goal="test", actions=tuple(actions))
+        plan = Plan(goal="test", actions=tuple(actions), options=dict(options or {}))
         return PlanExecution(
             plan,
             self.context,
             lambda one: self.told.append(f"{one.action.id} {one.status}"),
-            "c1",
+            command_id,
         )
 
     def step(self, execution: PlanExecution, count: int = 1) -> None:
@@ -224,3 +230,127 @@ def test_every_resource_of_the_catalogue_is_a_part_of_the_robot():
     for skill in executor.SKILLS:
         needed = needs_of(Action(id="a", skill=skill), robot)
         assert needed.keys() <= body_of(robot).keys()
+
+
+# --- options of a plan ----------------------------------------------------------------------------
+
+
+def statuses(execution: PlanExecution) -> dict[str, str]:
+    return {one.action.id[0]: one.status.value for one in execution.records}
+
+
+def test_a_plan_that_goes_on_cancels_only_what_depends_on_what_failed(stage: Stage):
+    execution = stage.plan(
+        {"continue_on_error": True},
+        a_turn=(),
+        b_look_at=("a_turn",),
+        c_speak=("b_look_at",),
+        d_open_gripper__left=(),
+    )
+    stage.step(execution)
+    stage.ends |= {"a_turn": NotPossible("stuck"), "d_open_gripper__left": None}
+    stage.step(execution)
+    assert statuses(execution) == {
+        "a": "aborted",
+        "b": "cancelled",
+        "c": "cancelled",
+        "d": "succeeded",
+    }
+    assert execution.succeeded
+    assert execution.setback is None
+
+
+def test_a_plan_that_goes_on_ends_all_the_same_where_the_robot_may_not_move(stage: Stage):
+    execution = stage.plan({"continue_on_error": True}, a_turn=(), b_look_at=())
+    stage.step(execution)
+    stage.ends["a_turn"] = RobotNotReady("stopped")
+    stage.step(execution)
+    assert statuses(execution) == {"a": "aborted", "b": "cancelled"}
+    assert not execution.succeeded
+
+
+def test_what_comes_after_needs_no_success_where_the_plan_goes_on(stage: Stage):
+    execution = stage.plan({"continue_on_error": True}, a_turn=(), b_look_at=())
+    second = execution.records[1]
+    second.action = second.action.model_copy(update={"after": ("a_turn",)})
+    stage.step(execution, 3)
+    assert active(execution) == ["a_turn"]
+    stage.ends["a_turn"] = NotPossible("stuck")
+    stage.step(execution, 2)
+    assert active(execution) == ["b_look_at"]
+
+
+@pytest.mark.parametrize("retries", [0, 1, 3])
+def test_what_may_be_tried_again_is_so_often_each_time_after_a_longer_rest(stage: Stage, retries):
+    execution = stage.plan({"max_retries": retries}, a_find_object=())
+    began, rests_s = [], []
+    for _ in range(retries + 1):
+        while not (stage.clock.ns and stage.context.link._active):
+            stage.step(execution)
+        began.append(stage.clock.ns)
+        stage.ends["a_find_object"] = TryAgain("not seen")
+        stage.step(execution)
+    rests_s = [round((later - earlier) / NS_PER_S) for earlier, later in pairwise(began)]
+    assert rests_s == [1, 2, 4][:retries]
+    assert statuses(execution) == {"a": "aborted"}
+    assert execution.records[0].retries == retries
+
+
+def test_a_plan_may_give_a_kind_of_skill_less_time(stage: Stage):
+    execution = stage.plan(
+        {"timeouts_s": {"movement": 2.0}, "max_retries": 0}, a_turn=(), b_speak=()
+    )
+    stage.step(execution, 50 * 3)
+    assert "took longer than 2 s" in execution.records[0].error
+
+
+def test_what_control_refuses_before_it_has_begun_is_rejected(stage: Stage):
+    execution = stage.plan(a_turn=())
+    status = {"state": "stopped", "estop_latched": True, "cause": "estop", "detail": ""}
+    stage.space.cell_writer("control_status").put_document(status)
+    execution.step()
+    assert statuses(execution) == {"a": "rejected"}
+
+
+# --- pauses, and several plans at once ------------------------------------------------------------
+
+
+def test_in_a_pause_nothing_goes_on_and_its_time_does_not_count(stage: Stage):
+    execution = stage.plan({"timeouts_s": {"movement": 2.0}}, a_turn=(), b_look_at=("a_turn",))
+    stage.step(execution, 50)
+    stage.context.link.pause()
+    stage.ends["a_turn"] = None
+    stage.clock.ns += 400 * NS_PER_S
+    stage.step(execution)
+    assert active(execution) == ["a_turn"]
+    assert stage.cancelled() == 1
+    stage.context.link.resume()
+    stage.step(execution, 2)
+    assert active(execution) == ["b_look_at"]
+    assert execution.records[0].execution_time_s == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_waits_for_a_part_of_the_robot_waits_on_after_a_long_pause(stage: Stage):
+    execution = stage.plan(a_turn=(), b_move=())
+    stage.step(execution)
+    stage.context.link.pause()
+    stage.clock.ns += round(WAIT_LIMIT_S + 10) * NS_PER_S
+    stage.step(execution)
+    stage.context.link.resume()
+    stage.step(execution)
+    assert statuses(execution) == {"a": "active", "b": "pending"}
+    stage.ends["a_turn"] = None
+    stage.step(execution, 2)
+    assert active(execution) == ["b_move"]
+
+
+def test_of_two_plans_one_is_cancelled_and_the_other_goes_on(stage: Stage):
+    one, other = stage.plan(a_turn=()), stage.plan(command_id="c2", a_open_gripper__left=())
+    stage.step(one)
+    stage.step(other)
+    assert (active(one), active(other)) == (["a_turn"], ["a_open_gripper__left"])
+    one.cancel("enough")
+    assert (stage.cancelled(), statuses(one)) == (1, {"a": "cancelled"})
+    stage.ends["a_open_gripper__left"] = None
+    stage.step(other)
+    assert other.succeeded

@@ -125,11 +125,11 @@ def test_a_protective_stop_is_a_pause_and_no_refusal(
     space: SharedSpace, clock: SteppedClock
 ) -> None:
     link = SkillLink(space, clock, load_robot("butler"))
-    silent = link.is_paused
+    silent = link.in_protective_stop
     control_says(space, state="protective_stop")
-    paused, refusal = link.is_paused, refusal_of(link.control_status)
+    paused, refusal = link.in_protective_stop, refusal_of(link.control_status)
     control_says(space, state="armed")
-    assert (silent, paused, refusal, link.is_paused) == (False, True, None, False)
+    assert (silent, paused, refusal, link.in_protective_stop) == (False, True, None, False)
 
 
 def context_of(link: SkillLink) -> SkillContext:

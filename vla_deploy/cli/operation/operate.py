@@ -1,4 +1,4 @@
-"""`vla-deploy estop | reset | arm | disarm | stop | shutdown`: the acts of an operator."""
+"""The acts of an operator: estop, reset, arm, disarm, stop, pause, resume, shutdown."""
 
 import argparse
 import os
@@ -27,6 +27,9 @@ def register(commands: Any) -> None:
         command.add_argument("--reason", default="", help="why, for the log")
         command.set_defaults(act=act)
     add_top_command(commands, "stop", "  vla-deploy stop\n", run_stop)
+    for name in ("pause", "resume"):
+        command = add_top_command(commands, name, f"  vla-deploy {name}\n", run_pause)
+        command.set_defaults(pause=name == "pause")
     add_top_command(commands, "shutdown", "  vla-deploy shutdown\n", run_shutdown)
 
 
@@ -57,6 +60,20 @@ def run_stop(arguments: argparse.Namespace) -> int:
     session.cancel()
     refusal = refusal_of(session.document(topics.CONTROL_STATUS, age_limit_s=1.0))
     print(f"stopped; {refusal or 'the robot is ready'}")
+    return 0
+
+
+def run_pause(arguments: argparse.Namespace) -> int:
+    """Have what goes on come to rest, holding what it holds, or go on from there.
+
+    Raises:
+        CommandFailed: nothing is under way, or planner and executor do not answer.
+    """
+    session = attach(arguments.runtime_base)
+    *_, last = session.command(pause=arguments.pause)
+    if last["event"] != "finished" or not last["success"]:
+        raise CommandFailed(last.get("error") or last.get("reason") or "no answer")
+    print("paused; go on with: vla-deploy resume" if arguments.pause else "the robot goes on")
     return 0
 
 

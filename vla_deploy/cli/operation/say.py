@@ -156,6 +156,10 @@ def line_of(event: TaskEvent) -> str | None:
             return _action_line(event)
         case "setback":
             return "looking for another way ..."
+        case "objective":
+            told = event["error"] or event["note"]
+            line = f"[{event['part']}] {event['state']}: {event['words']}"
+            return f"{line}  ({told})" if told else line
         case "said":
             return f"robot says: {event['text']}"
         case "rejected":

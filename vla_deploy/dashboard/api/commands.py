@@ -62,6 +62,18 @@ async def answer(body: AnswerBody, request: Request) -> CommandAccepted:
     return _uttered(request, text=body.text, answer=True)
 
 
+@router.post("/pause", status_code=HTTPStatus.ACCEPTED, dependencies=[_Operator])
+async def pause(request: Request) -> CommandAccepted:
+    """Have what goes on come to rest where it is, holding what it holds."""
+    return _uttered(request, pause=True)
+
+
+@router.post("/resume", status_code=HTTPStatus.ACCEPTED, dependencies=[_Operator])
+async def resume(request: Request) -> CommandAccepted:
+    """Have what was paused go on from there."""
+    return _uttered(request, pause=False)
+
+
 @router.get("", dependencies=[_Viewer])
 async def history(
     request: Request, limit: Annotated[int, Query(ge=1, le=MOST_COMMANDS)] = 50

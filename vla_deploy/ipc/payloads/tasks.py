@@ -33,8 +33,16 @@ class HeardEvidence(HeardDoubt):
     others: list[OtherWords]
 
 
+class MissionAct(TypedDict):
+    """Cancel a mission, one that waits for its time among them."""
+
+    cancel: str
+
+
 class UtteranceContent(TypedDict, total=False):
-    """Give a command in words or as a plan, cancel all, or answer what was asked and nothing else.
+    """Give a command in words or as a plan, cancel or pause all, or answer what was asked alone.
+
+    `mission` is one as a document, or an act about one that was given.
 
     `heard` comes with the source "voice".
     """
@@ -42,6 +50,9 @@ class UtteranceContent(TypedDict, total=False):
     text: str
     plan: PlanDocument
     cancel: bool
+    pause: bool
+    mission: dict[str, Any] | list[Any]
+    mission_act: MissionAct
     answer: bool
     heard: HeardEvidence
 
@@ -63,10 +74,11 @@ class PlanOrder(TypedDict):
 
 @final
 class PlanCancel(TypedDict):
-    """End what the executor does."""
+    """End what the executor does, or with `of` one of its commands."""
 
     command_id: str
     cancel: Literal[True]
+    of: NotRequired[str]
 
 
 @final
@@ -77,7 +89,15 @@ class PlanGivenUp(TypedDict):
     give_up: str
 
 
-PlanMessage = PlanOrder | PlanCancel | PlanGivenUp
+@final
+class PlanPause(TypedDict):
+    """Have all that the executor does come to rest, or go on."""
+
+    command_id: str
+    pause: bool
+
+
+PlanMessage = PlanOrder | PlanCancel | PlanGivenUp | PlanPause
 
 
 class AttemptDocument(TypedDict):
@@ -90,7 +110,11 @@ class AttemptDocument(TypedDict):
 
 
 class ActionOutcome(TypedDict):
-    """Say how an action goes; `note` is what a result has beside its status."""
+    """Say how an action goes; `note` is what its result says beside the status, `data` has numbers.
+
+    `data` has of navigate_to, move, turn: x_m, y_m, yaw_rad of the base; of pick_up, hand_over,
+    place: arm and class of the thing; of find_object: thing_id, position_m; of others nothing.
+    """
 
     skill: str
     parameters: Mapping[str, Any]
@@ -99,6 +123,7 @@ class ActionOutcome(TypedDict):
     error: str | None
     retries: int
     note: str | None
+    data: Mapping[str, Any]
 
 
 class ActionResult(ActionOutcome):
@@ -203,13 +228,38 @@ class SaidEvent(TypedDict):
     text: str
 
 
+class CommandSummary(TypedDict):
+    """Count the actions of a command, those of plans that failed among them."""
+
+    total_actions: int
+    successful_actions: int
+    failed_actions: int
+    success_rate: float
+
+
+class ObjectiveEvent(TypedDict):
+    """An objective of a mission, or one of its subtasks, stands otherwise than before."""
+
+    command_id: str
+    event: Literal["objective"]
+    part: str
+    words: str
+    state: str
+    error: str | None
+    note: str | None
+
+
 class FinishedEvent(TypedDict):
-    """The command has ended; `actions` are those of all its plans."""
+    """The command has ended; `actions` are those of all its plans.
+
+    `success` of a plan with `continue_on_error` is that any of its actions succeeded.
+    """
 
     command_id: str
     event: Literal["finished"]
     success: bool
     error: str | None
+    summary: CommandSummary
     actions: list[ActionResult]
 
 
@@ -224,6 +274,7 @@ TaskEvent = (
     | ActionEvent
     | SetbackEvent
     | SaidEvent
+    | ObjectiveEvent
     | FinishedEvent
 )
 
@@ -238,9 +289,13 @@ class GripDocument(TypedDict):
 
 
 class ExecutorStatus(TypedDict):
-    """Hold what the executor does; `way_m` is the base's path, `holding` the class in each hand."""
+    """Hold what the executor does; `way_m` is the base's path, `holding` the class in each hand.
 
-    state: Literal["idle", "executing", "recovering"]
+    `commands` are all that are carried out, `command_id`, `action_id` and `skill` of the first.
+    """
+
+    state: Literal["idle", "executing", "recovering", "paused"]
+    commands: list[str]
     command_id: str | None
     action_id: str | None
     skill: str | None
@@ -283,3 +338,13 @@ class PlannerStatus(PlannerCounts, BackEndsStatus):
     question: str | None
     prohibitions: list[str]
     memory: MemoryStatus | None
+
+
+class MissionsDocument(TypedDict):
+    """Hold the newest missions, the newest first, as `vla_deploy/missions/progress.py` has them.
+
+    `trouble` says why missions are not kept over a restart, "" where they are.
+    """
+
+    missions: list[dict[str, Any]]
+    trouble: str

@@ -1,10 +1,11 @@
 """Remember what is under way: the command that is being planned, the plans that are carried out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Final
 
+from drivers.clock import NS_PER_S
 from vla_deploy.ipc.payloads.tasks import SetbackEvent
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.errors import CannotBeDone
@@ -16,6 +17,8 @@ from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 from vla_deploy.runtime.deadline import Deadline
 
 RESTARTED: Final = "the planner was started again meanwhile"
+LOST_NS: Final = 3 * NS_PER_S
+"""So long the executor, which tells ten times a second what it does, may leave a command out."""
 _MOST_REMEMBERED: Final = 16
 
 
@@ -28,16 +31,30 @@ class ActivePlans:
     def __init__(self, further_plans: int = NOT_BOUNDED.further_plans) -> None:
         self._further_plans = further_plans
         self._active: dict[str, tuple[UserCommand, Carried]] = {}
+        self._since_ns: dict[str, int] = {}
 
     def __bool__(self) -> bool:
         """Return whether any plan is carried out."""
         return bool(self._active)
+
+    @property
+    def plans(self) -> Mapping[str, Plan]:
+        """Return the plan of each command that is carried out."""
+        return {name: carried.plan for name, (_, carried) in self._active.items()}
+
+    def lost(self, named: Collection[str], now_ns: int) -> list[str]:
+        """Return the commands that the executor has not named for too long."""
+        for name in self._active:
+            if name in named:
+                self._since_ns[name] = now_ns
+        return [name for name in self._active if now_ns - self._since_ns[name] > LOST_NS]
 
     def add(
         self,
         command: UserCommand,
         plan: Plan,
         answer: PlanningResult,
+        now_ns: int,
         agreed: frozenset[str] = frozenset(),
     ) -> None:
         """Note that the executor has a plan: the first for a command, or one after a failure.
@@ -52,6 +69,7 @@ class ActivePlans:
         else:
             carried = Carried(plan=plan, given=command.plan is not None, agreed=agreed)
         self._active[command.command_id] = replace(command, recovers=True), carried
+        self._since_ns[command.command_id] = now_ns
         while len(self._active) > _MOST_REMEMBERED:
             del self._active[next(iter(self._active))]
 

@@ -34,7 +34,8 @@ class UserCommand:
     `may_ask_again` they may be asked for once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
     on after a failure. One that `is_corrected`, by "no, the blue one", is read back.
-    With `awaits_word` the plan is held until the person says go.
+    With `awaits_word` the plan is held until the person says go. `mission` is the id of the one
+    that it is a part of.
     """
 
     command_id: str
@@ -50,6 +51,7 @@ class UserCommand:
     awaits_word: bool = False
     is_answer: bool = False
     recovers: bool = False
+    mission: str = ""
 
     @property
     def is_unsure(self) -> bool:

@@ -19,6 +19,7 @@ from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
+from vla_deploy.planning.dialogue.turns import ALL, Turns, parts_of_plan
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.follow_up import (
@@ -26,7 +27,14 @@ from vla_deploy.planning.patterns.follow_up import (
     corrected,
     last_done,
 )
-from vla_deploy.planning.patterns.steering import denies, is_word, objects, only_objects
+from vla_deploy.planning.patterns.steering import (
+    denies,
+    is_word,
+    objects,
+    only_objects,
+    pauses,
+    resumes,
+)
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.planning.recovery.strategies import recover
@@ -62,6 +70,7 @@ class CommandManager:
         self._async = AsyncPlanner(executor)
         self._clock = clock
         self._queue: deque[UserCommand] = deque()
+        self._turns = Turns()
         self._active = ActivePlans(further_plans)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
@@ -74,8 +83,16 @@ class CommandManager:
         """Take an utterance: the answer to what was asked, or a command of its own."""
         self._guarded(command, partial(self._take, command))
 
+    def pause(self, command: UserCommand, *, pause: bool) -> None:
+        """Have all that is carried out come to rest, or go on."""
+        self._events.paused(command.command_id, pause=pause)
+        says = Says.PAUSED if pause else Says.GOES_ON
+        self._events.say(command, says if self._is_moving else Says.NOTHING_GOES_ON)
+
     def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
+        if pending is None and not command.is_doubted and self._takes_as_pause(command):
+            return
         command = self._doubted_yes(command)
         if pending is not None:
             is_taken = self._takes_as_answer(command, pending)
@@ -85,6 +102,16 @@ class CommandManager:
             self.dialogue.refuse(command, Says.NOTHING_ASKED)
         elif not is_taken:
             self._take_anew(command)
+
+    def _takes_as_pause(self, command: UserCommand) -> bool:
+        """Take "hold on" and "go on" while something is carried out."""
+        if self._is_moving and pauses(command.text):
+            self.pause(command, pause=True)
+        elif resumes(command.text) and self._situation.is_paused:
+            self.pause(command, pause=False)
+        else:
+            return False
+        return True
 
     def _take_anew(self, command: UserCommand) -> None:
         """Take an utterance that answers nothing: a command, an objection, or a correction.
@@ -101,7 +128,7 @@ class CommandManager:
             if is_all:
                 self._events.say(command, Says.LEFT)
                 return
-        if len(self._queue) >= MOST_WAITING:
+        if len(self._queue) + len(self._turns.waiting) >= MOST_WAITING:
             self.dialogue.refuse(command, Says.MANY_WAIT)
             return
         self._queue.append(corrected or command)
@@ -111,7 +138,7 @@ class CommandManager:
     @property
     def _goes_on(self) -> bool:
         """Return whether anything is carried out, planned, or waits for its turn."""
-        return self._is_moving or any((self._async.command, self._queue))
+        return self._is_moving or any((self._async.command, self._queue, self._turns.waiting))
 
     @property
     def _is_moving(self) -> bool:
@@ -130,7 +157,7 @@ class CommandManager:
         self._cancel_all(command_id)
         open_ones = (self.dialogue.settle(), self.dialogue.take_held())
         asked = [one.command for one in open_ones if one is not None]
-        dropped = (*asked, self._async.call_off(), *self._queue)
+        dropped = (*asked, self._async.call_off(), *self._queue, *self._turns.clear())
         self._queue.clear()
         for command in dropped:
             if command is not None:
@@ -139,11 +166,27 @@ class CommandManager:
         stop = UserCommand(command_id=command_id, told_ns=self._clock.now_ns(), text="stop")
         self.dialogue.remember(stop, TurnOutcome.CANCELLED)
 
+    def take_part(self, command: UserCommand) -> None:
+        """Take a subtask of a mission: no answer, no word, no objection."""
+        self._queue.append(command)
+
+    def drop(self, command_id: str) -> None:
+        """End one command, wherever it is."""
+        asked = self.dialogue.pending
+        if asked is not None and asked.command.command_id == command_id:
+            self.dialogue.settle()
+        if self._async.command is not None and self._async.command.command_id == command_id:
+            self._async.call_off()
+        self._queue = deque(one for one in self._queue if one.command_id != command_id)
+        self._turns.drop(command_id)
+        if self._active.end(command_id) is not None:
+            self._events.cancelled(f"{command_id}-cancel", command_id)
+
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command."""
         ended = self._active.end(command_id)
         self.dialogue.ended(command_id, success, error)
-        if ended is not None:
+        if ended is not None and not ended[0].mission:
             self._events.ended(*ended, success, error)
 
     def turned_away(self, command_id: str, error: str) -> None:
@@ -164,6 +207,7 @@ class CommandManager:
         """Go on with what has become possible."""
         self.dialogue.drop_overdue()
         self._look_after_job()
+        self._look_after_turns()
         while self._queue and self._async.command is None and self.dialogue.pending is None:
             command = self._queue.popleft()
             self._guarded(command, partial(self._begin, command))
@@ -173,7 +217,8 @@ class CommandManager:
         """Return which commands are in work, what was asked, and the counts; and of `memory`."""
         pending, held = self.dialogue.pending, self.dialogue.held
         waiting = [one.command for one in (pending, held) if one is not None]
-        in_work = (self._async.command, *waiting, *self._queue)
+        turns = [one.command for one in self._turns.waiting]
+        in_work = (self._async.command, *waiting, *self._queue, *turns)
         asked = pending or held
         return {
             **self.metrics.document(),
@@ -188,7 +233,7 @@ class CommandManager:
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
-            self.dialogue.conclude(PlannedCommand(command, request, answer))
+            self._settle(PlannedCommand(command, request, answer))
             return
         if command.recovers:
             carried = self._active.of(command.command_id)
@@ -229,10 +274,49 @@ class CommandManager:
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
             return
-        if _stands_still(found) and self._is_moving:
-            # A plan is turned away while another runs, and nobody needs to be asked about a halt.
+        if _stands_still(found) and self._is_moving:  # nobody needs to be asked about a halt
             self._cancel_all(f"{found.command.command_id}-stops")
-        self.dialogue.conclude(found)
+        self._settle(found)
+
+    # --- what waits for its turn ----------------------------------------------------------------
+
+    def _settle(self, done: PlannedCommand) -> None:
+        """Conclude a command, or let it wait while it would disturb what is carried out."""
+        if self._turns.must_wait(done, self._busy):
+            self._put_off(done.command, partial(self._queue.append, done.command))
+        else:
+            self.dialogue.conclude(done)
+
+    def _put_off(self, command: UserCommand, go_on: Callable[[], None]) -> None:
+        place = self._turns.add(command, go_on, self._under_way)
+        if place is not None:
+            self._events.queued(command, place)
+            self._events.say(command, Says.AFTERWARDS)
+
+    def _look_after_turns(self) -> None:
+        """End what the executor does not know of any more, and go on with what waited for it."""
+        if not (self._active or self._turns.waiting):
+            return
+        executing = self._situation.executing
+        for command_id in self._active.lost(executing or (), self._clock.now_ns()):
+            why = "the executor does not know of it any more"
+            self.has_ended(command_id, False, why)
+            self._events.lost(command_id, why)
+        for turn in self._turns.take_due(self._under_way):
+            self._guarded(turn.command, turn.go_on)
+
+    @property
+    def _under_way(self) -> frozenset[str]:
+        """Return the commands that are carried out."""
+        return frozenset(self._active.plans) | (self._situation.executing or frozenset())
+
+    @property
+    def _busy(self) -> frozenset[str]:
+        """Return the parts of the robot that are used by what is carried out."""
+        plans = self._active.plans
+        if self._under_way - plans.keys():
+            return ALL
+        return frozenset[str]().union(*map(parts_of_plan, plans.values()))
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -407,6 +491,9 @@ class CommandManager:
             checked = self.planner.check(plan, request)
         except PlanError as error:
             self.dialogue.refuse(pending.command, error, pending.answer)
+            return
+        if self._turns.must_wait_with(pending.command, checked, self._busy):
+            self._put_off(pending.command, partial(self._run_confirmed, pending, plan))
             return
         proposal = pending.answer.proposal
         if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):

@@ -154,7 +154,8 @@ class Dialogue:
         else:
             self._accepted(request, answer)
         self._events.dispatched(command, plan, answer)
-        self._active.add(command, plan, answer, agreement_to(plan, request))
+        agreed = agreement_to(plan, request)
+        self._active.add(command, plan, answer, self._clock.now_ns(), agreed)
         self.metrics.planned += 1
         self._remember_plan(done, plan, TurnOutcome.UNDER_WAY)
 

@@ -3,9 +3,10 @@
 from typing import Final
 
 from drivers.clock import Clock
+from vla_deploy.client.following import lost
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.announcer import Announcer
-from vla_deploy.ipc.payloads.tasks import AttemptDocument, PlanEvent, RejectedEvent
+from vla_deploy.ipc.payloads.tasks import AttemptDocument, PlanEvent, RejectedEvent, TaskEvent
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.phrasing import Says, first_part
 from vla_deploy.planning.interfaces import PlanningResult
@@ -26,6 +27,14 @@ class PlannerEvents:
         self._events = space.ring_writer(topics.TASK_EVENT)
         self._voice = Announcer(space, "planner", clock)
 
+    def publish(self, event: TaskEvent) -> None:
+        """Publish an event of a mission."""
+        self._events.publish(event)
+
+    def lost(self, command_id: str, why: str) -> None:
+        """Publish the end of a command that nobody carries out any more."""
+        self._events.publish(lost(command_id, why, {}))
+
     def say(self, command: UserCommand, text: str) -> None:
         """Say something to a person who gave a command by voice; others read it."""
         if command.is_spoken:
@@ -41,6 +50,14 @@ class PlannerEvents:
     def cancelled_all(self, command_id: str) -> None:
         """Let the executor end what it does."""
         self._plans.publish({"command_id": command_id, "cancel": True})
+
+    def cancelled(self, command_id: str, of: str) -> None:
+        """Let the executor end one of the commands that it carries out."""
+        self._plans.publish({"command_id": command_id, "cancel": True, "of": of})
+
+    def paused(self, command_id: str, *, pause: bool) -> None:
+        """Let the executor come to rest with all that it does, or go on."""
+        self._plans.publish({"command_id": command_id, "pause": pause})
 
     def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
         """Publish that a plan takes time, and which back ends are asked."""

@@ -12,6 +12,7 @@ from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.ipc.topics import P
 from vla_deploy.memory import NO_EXPERIENCE, Experience, MemoryStore, experience_of
 from vla_deploy.memory.episode import unix_s
+from vla_deploy.missions.criteria import Facts
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.dialogue.command import UserCommand
@@ -82,11 +83,29 @@ class Situation:
             last_actions=self._log.last_actions,
         )
 
+    def facts(self) -> Facts:
+        """Return what is known now, for criteria to be judged by."""
+        here = self._here()
+        scene = self._snapshot(here)
+        world = world_of(self._robot, self._holding(scene), self._is_free)
+        return Facts(world=world, scene=scene, here=here)
+
     @property
     def is_executing(self) -> bool:
         """Return whether the executor says that it carries out a plan, from any source."""
+        return bool(self.executing)
+
+    @property
+    def executing(self) -> frozenset[str] | None:
+        """Return the commands that the executor says it carries out, None while it is silent."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
-        return sample is not None and sample.document().get("state", "idle") != "idle"
+        return None if sample is None else frozenset(sample.document()["commands"])
+
+    @property
+    def is_paused(self) -> bool:
+        """Return whether the executor says that it has paused."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        return sample is not None and sample.document()["state"] == "paused"
 
     def _experience_of(self, command: UserCommand, *, with_episodes: bool) -> Experience:
         """Call up once for each command what bears on it: it is asked for at every step of it."""

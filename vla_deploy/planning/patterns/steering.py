@@ -40,6 +40,11 @@ _OBJECTS: Final = re.compile(
     r"(?:that's |that is )?(?:the )?(?:wrong(?: one)?|not (?:it|right))|"
     r"(?:wait|hold on|hang on|pause)(?: a (?:second|moment|minute|bit))?"
 )
+_MOMENT: Final = r"(?: (?:for )?(?:a|one|just a) (?:second|sec|moment|minute|bit))?"
+_PAUSES: Final = re.compile(rf"(?:wait|hold on|hang on|pause|stand by){_MOMENT}(?: there)?")
+_RESUMES: Final = re.compile(
+    r"(?:resume|continue|carry on|keep going|go on|go ahead|proceed)(?: (?:now|with (?:it|that)))?"
+)
 _SENTENCE: Final = re.compile(r"[.!?;,]+")
 _URGING: Final = frozenset(
     {"and", "but", "no", "oh", "hey", "please", "robot", "butler", "just", "now", "wait", "i",
@@ -55,6 +60,22 @@ def is_stop(text: str) -> bool:
     return any(bare) and all(
         part in STOP_PHRASES or _STOP_DOING.fullmatch(part) for part in bare if part
     )
+
+
+def pauses(text: str) -> bool:
+    """Return whether words mean: come to rest, and go on later from there."""
+    return _is_all(text, _PAUSES)
+
+
+def resumes(text: str) -> bool:
+    """Return whether words mean: go on with what was paused."""
+    return _is_all(text, _RESUMES)
+
+
+def _is_all(text: str, pattern: re.Pattern[str]) -> bool:
+    said = " ".join(text[:MOST_CHARACTERS].lower().replace(",", " ").split())
+    bare = [courtesy_off(part) for part in _SENTENCE.split(said)]
+    return any(bare) and all(pattern.fullmatch(part) for part in bare if part)
 
 
 def objects(text: str) -> bool:

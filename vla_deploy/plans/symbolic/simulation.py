@@ -92,7 +92,7 @@ def in_turn(actions: Sequence[Action]) -> tuple[Action, ...]:
             known |= {needed, *before.get(needed, ())}
         added: list[str] = []
         for one in reversed(ordered):
-            if one.id not in known and _parts(one) & _parts(action):
+            if one.id not in known and parts_of(one) & parts_of(action):
                 added.append(one.id)
                 known |= {one.id, *before[one.id]}
         before[action.id] = known
@@ -100,7 +100,7 @@ def in_turn(actions: Sequence[Action]) -> tuple[Action, ...]:
     return tuple(ordered)
 
 
-def _parts(action: Action) -> frozenset[str]:
+def parts_of(action: Action) -> frozenset[str]:
     """Return what no two actions use at a time; an arm that is not named may be either."""
     spec, arm = SKILLS.get(action.skill), action.parameters.get("arm")
     arms = {"arms": ARMS, "arm": ARMS if arm is None else (str(arm),)}

@@ -4,7 +4,7 @@ Every goal names the claim under which its action holds the parts that the serve
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
@@ -151,8 +151,12 @@ def thinned(
     return times_s[kept], positions[kept]
 
 
-def pursue_all(context: SkillContext, requests: Sequence[GoalRequest]) -> Skill:
+def pursue_all(
+    context: SkillContext, requests: Sequence[GoalRequest]
+) -> Generator[None, None, bool]:
     """Have several goals pursued at a time; the first that fails has the others cancelled.
+
+    Returns False where a pause was before the end of one.
 
     Raises:
         ServerRejected, ServerAborted, ServerCancelled, ServerLost: one did not succeed.
@@ -162,13 +166,19 @@ def pursue_all(context: SkillContext, requests: Sequence[GoalRequest]) -> Skill:
     try:
         while not all(goal.is_final for goal in goals):
             for goal in goals:
-                conclude(goal)
+                _conclude_unpaused(goal)
             yield
         for goal in goals:
-            conclude(goal)
+            _conclude_unpaused(goal)
     finally:
         for goal in goals:
             ros.cancel(goal, "its action has ended")
+    return not any(goal.is_interrupted for goal in goals)
+
+
+def _conclude_unpaused(goal: SentGoal) -> None:
+    if not (goal.is_interrupted and goal.state is GoalState.CANCELLED):
+        conclude(goal)
 
 
 def _goals_of(context: SkillContext) -> RosGoals:

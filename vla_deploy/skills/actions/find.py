@@ -38,8 +38,16 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         TryAgain: it is nowhere to be seen.
     """
     query = parse_object(parameters["object"])
-    if remembered(context, query) is not None:
-        return
+    if remembered(context, query) is None:
+        yield from _search(context, query)
+    found = remembered(context, query)
+    if found is None:
+        raise TryAgain(_nowhere(context, query))
+    context.tell(thing_id=found["id"], position_m=list(found["position_m"]))
+
+
+def _search(context: SkillContext, query: Query) -> Skill:
+    """Look around, then from one viewpoint after the other, until the object is in the scene."""
     places = context.robot.places
     shut = {view for name in context.keeps_out & places.keys() for view in places[name].viewpoints}
     left = {view: None for one in places.values() for view in one.viewpoints if view not in shut}
@@ -50,8 +58,6 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         viewpoint = min(left, key=lambda one: _way_m(context, one))
         del left[viewpoint]
         yield from _search_from(context, viewpoint, query)
-    if remembered(context, query) is None:
-        raise TryAgain(_nowhere(context, query))
 
 
 def _look_around(context: SkillContext, query: Query, left: dict[Pose2D, None]) -> Skill:

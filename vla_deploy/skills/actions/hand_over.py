@@ -52,6 +52,7 @@ def hand_over(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from speak(context, {"text": f"{here}. Pull a little, and I let go."})
     yield from _taken(context, hand, kind, alone)
     yield from open_gripper(context, {"arm": hand})
+    context.tell(arm=hand, **{"class": kind})
     yield from pause(context, AWAY_S)
 
 
@@ -61,13 +62,12 @@ def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill
     Raises:
         NotPossible: nobody does.
     """
-    clock = context.link.clock
-    end_ns = clock.now_ns() + round(PATIENCE_S * NS_PER_S)
+    end_ns = context.link.working_ns() + round(PATIENCE_S * NS_PER_S)
 
     def is_over() -> bool:
         return _is_gone(context, hand) or _is_pulled(context, hand, alone)
 
-    while (left_s := (end_ns - clock.now_ns()) / NS_PER_S) > 0.0:
+    while (left_s := (end_ns - context.link.working_ns()) / NS_PER_S) > 0.0:
         with suppress(Touched):
             yield from stay(context, arm_joints(context, hand), left_s, PULL_RATIO, is_over)
         if _is_gone(context, hand) or (yield from _is_pulled_on(context, hand, alone)):
@@ -80,9 +80,9 @@ def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill
 
 def _is_pulled_on(context: SkillContext, hand: str, alone: Efforts) -> Generator[None, None, bool]:
     """Return, after a moment, whether the arm has felt a pull all the while that does not fade."""
-    until_ns = context.link.clock.now_ns() + round(PULLED_S * NS_PER_S)
+    until_ns = context.link.working_ns() + round(PULLED_S * NS_PER_S)
     most = 0.0
-    while context.link.clock.now_ns() < until_ns:
+    while context.link.working_ns() < until_ns:
         felt = _felt(context, hand, alone)
         if felt <= PULL_EFFORT_RATIO:
             return False

@@ -9,7 +9,7 @@ from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.movements.carrying import carry
-from vla_deploy.skills.movements.drive import drive_to, turn_by
+from vla_deploy.skills.movements.drive import drive_to, tell_place, turn_by
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.gaze import DRIVING_GAZE, remembered, see, turn_head
 from vla_deploy.skills.movements.stand import standing_poses
@@ -29,6 +29,11 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         NotPossible: the place is unknown or no path leads there.
         TryAgain: the object has not been seen, or the way is blocked.
     """
+    yield from _go(context, parameters)
+    tell_place(context)
+
+
+def _go(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from carry(context)
     speed_m_s = parameters.get("speed_m_s")
     if "object" in parameters:

@@ -74,6 +74,7 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
             met.append(choice.grasp.yaw_rad)
             if len(met) == MOST_TOUCHES:
                 raise
+    context.tell(arm=choice.hand, **{"class": choice.held.kind})
     yield from carry(context)
 
 

@@ -76,6 +76,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         raise NotPossible(f"the {hand} hand has lost the {held.kind} on the way")
     release = yield from _release(context, parameters, hand, held)
     yield from or_carry(context, _put_down(context, hand, held, release))
+    context.tell(arm=hand, **{"class": held.kind})
     yield from carry(context)
 
 

@@ -37,8 +37,8 @@ def find_myself(context: SkillContext) -> Skill:
 
 def _search(context: SkillContext, twist: Twist, duration_s: float) -> Skill:
     """Make a motion for so long while the robot is lost, as far as control lets it."""
-    end_ns = context.link.clock.now_ns() + round(duration_s * NS_PER_S)
-    while context.link.place_state is PlaceState.LOST and context.link.clock.now_ns() < end_ns:
+    end_ns = context.link.working_ns() + round(duration_s * NS_PER_S)
+    while context.link.place_state is PlaceState.LOST and context.link.working_ns() < end_ns:
         context.link.drive(twist)
         yield
     context.link.drive(AT_REST)

@@ -158,6 +158,7 @@ def move(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     start, distance_m = context.link.pose, float(parameters["distance_m"])
     context.may_go_on(lambda: {"distance_m": distance_m - _ahead_m(start, context.link.pose)})
     yield from straight(context, distance_m, parameters.get("speed_m_s"))
+    tell_place(context)
 
 
 def straight(context: SkillContext, distance_m: float, speed_m_s: float | None = None) -> Skill:
@@ -198,6 +199,7 @@ def turn(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     angle_rad, turned = float(parameters["angle_rad"]), _Turned(context)
     context.may_go_on(lambda: {"angle_rad": angle_rad - turned.by_rad()})
     yield from _turn(context, angle_rad, turned)
+    tell_place(context)
 
 
 def turn_by(context: SkillContext, angle_rad: float) -> Skill:
@@ -220,10 +222,16 @@ def _turn(context: SkillContext, angle_rad: float, turned: "_Turned") -> Skill:
     yield from stand_still(context)
 
 
+def tell_place(context: SkillContext) -> None:
+    """Have the result of the acting action tell where the base stands."""
+    pose = context.link.pose
+    context.tell(x_m=round(pose.x_m, 3), y_m=round(pose.y_m, 3), yaw_rad=round(pose.yaw_rad, 3))
+
+
 def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
     """Hold the base at rest for a moment, so that what is seen next does not smear."""
-    end_ns = context.link.clock.now_ns() + round(duration_s * NS_PER_S)
-    while context.link.clock.now_ns() < end_ns:
+    end_ns = context.link.working_ns() + round(duration_s * NS_PER_S)
+    while context.link.working_ns() < end_ns:
         context.link.drive(AT_REST)
         yield
 
@@ -252,7 +260,7 @@ class _Patience:
 
     def __init__(self, context: SkillContext) -> None:
         self._link = context.link
-        self._clear_ns = context.link.clock.now_ns()
+        self._clear_ns = context.link.working_ns()
 
     def pass_on(self, twist: Twist, hindrance: str) -> Twist:
         """Return what to drive now; no hindrance is "".
@@ -273,7 +281,7 @@ class _Patience:
         Raises:
             TryAgain: something has for too long.
         """
-        now_ns = self._link.clock.now_ns()
+        now_ns = self._link.working_ns()
         if not reason:
             self._clear_ns = now_ns
         elif now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:

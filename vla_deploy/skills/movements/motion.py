@@ -1,7 +1,7 @@
 """Move joints and wait for them: the pieces that every bodily skill is made of."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,20 +28,24 @@ def pause(context: SkillContext, duration_s: float) -> Skill:
 
 def wait_until(context: SkillContext, done: Callable[[], bool], timeout_s: float) -> Skill:
     """Wait until `done()` or the time-out; the caller checks which it was."""
-    end_ns = context.link.clock.now_ns() + round(timeout_s * NS_PER_S)
-    while not done() and context.link.clock.now_ns() < end_ns:
+    end_ns = context.link.working_ns() + round(timeout_s * NS_PER_S)
+    while not done() and context.link.working_ns() < end_ns:
         yield
 
 
-def _finish(context: SkillContext, motion_id: int, what: str) -> Skill:
+def _finish(context: SkillContext, motion_id: int, what: str) -> Generator[None, None, bool]:
+    """Wait for the end of a motion; return False where a pause was before it."""
     while (result := context.link.ended(motion_id)) is None:
         yield
+    if result.is_interrupted:
+        return False
     if result.status == "stopped" and refusal_of(context.link.control_status):
         raise RobotNotReady(f"{what}: stopped by control: {result.reason}")
     if result.status == "touched":
         raise Touched(f"{what}: {result.reason}")
     if result.status != "done":
         raise TryAgain(f"{what}: {result.status}: {result.reason}")
+    return True
 
 
 def move_joints(
@@ -65,15 +69,17 @@ def move_joints(
         there = [targets.get(name, place) for name, place in zip(joints, here, strict=True)]
         return _timed(context, joints, np.stack([here, np.array(there)]), speed_ratio)
 
-    arms = arms_beyond(context.robot, tuple(targets))
-    requests = trajectory_requests(context, arms, timed) if arms else []
-    beyond = {joint for request in requests for joint in request.joints}
-    own = {joint: value for joint, value in targets.items() if joint not in beyond}
-    motion_id = context.link.send_goal(own, speed_ratio, effort_ratio) if own else None
-    if requests:
-        yield from pursue_all(context, requests)
-    if motion_id is not None:
-        yield from _finish(context, motion_id, f"moving {_named(own)}")
+    arms, is_done = arms_beyond(context.robot, tuple(targets)), False
+    while not is_done:
+        requests = trajectory_requests(context, arms, timed) if arms else []
+        beyond = {joint for request in requests for joint in request.joints}
+        own = {joint: value for joint, value in targets.items() if joint not in beyond}
+        motion_id = context.link.send_goal(own, speed_ratio, effort_ratio) if own else None
+        is_done = (yield from pursue_all(context, requests)) if requests else True
+        if motion_id is not None:
+            is_done &= yield from _finish(context, motion_id, f"moving {_named(own)}")
+        if not is_done:
+            yield from settle(context, tuple(targets))
 
 
 def follow_joints(
@@ -94,13 +100,26 @@ def follow_joints(
         RobotNotReady: another stop ended it.
         SkillFailed: a server rejected or gave up its part, or nobody knows how it ended.
     """
-    times_s, positions = _timed(context, joints, waypoints, speed_ratio)
-    requests = _requests_along(context, joints, times_s, positions) if contact_ratio is None else []
-    if requests:
-        yield from pursue_all(context, requests)
-        return
-    motion_id = context.link.send_trajectory(joints, times_s, positions, contact_ratio)
-    yield from _finish(context, motion_id, f"moving {_named(joints)}")
+    way = waypoints
+    while True:
+        times_s, way = _timed(context, joints, way, speed_ratio)
+        requests = _requests_along(context, joints, times_s, way) if contact_ratio is None else []
+        if requests:
+            is_done = yield from pursue_all(context, requests)
+        else:
+            motion_id = context.link.send_trajectory(joints, times_s, way, contact_ratio)
+            is_done = yield from _finish(context, motion_id, f"moving {_named(joints)}")
+        if is_done:
+            return
+        yield from settle(context, joints)
+        columns = [context.robot.joint_index[name] for name in joints]
+        way = rest_of(way, context.link.setpoints[columns])
+
+
+def rest_of(way: NDArray[np.float64], here: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what is left of a way (n, joints) for joints that have stopped on it."""
+    nearest = int(np.argmin(np.linalg.norm(way - here, axis=1)))
+    return np.vstack([here, way[min(nearest + 1, len(way) - 1) :]])
 
 
 def _timed(
@@ -151,15 +170,17 @@ def stay(
         RobotNotReady: another stop ended it.
     """
     columns = [context.robot.joint_index[name] for name in joints]
-    here = context.link.setpoints[columns]
-    motion_id = context.link.send_trajectory(
-        joints, np.array([0.0, duration_s]), np.stack([here, here]), contact_ratio
-    )
-    for _ in _finish(context, motion_id, f"holding {_named(joints)}"):
-        if done():
-            context.link.cancel(motion_id)
-            return
-        yield
+    end_ns = context.link.working_ns() + round(duration_s * NS_PER_S)
+    while (left_s := (end_ns - context.link.working_ns()) / NS_PER_S) > POINT_PERIOD_S:
+        here = context.link.setpoints[columns]
+        motion_id = context.link.send_trajectory(
+            joints, np.array([0.0, left_s]), np.stack([here, here]), contact_ratio
+        )
+        for _ in _finish(context, motion_id, f"holding {_named(joints)}"):
+            if done():
+                context.link.cancel(motion_id)
+                return
+            yield
 
 
 def minimum_jerk(

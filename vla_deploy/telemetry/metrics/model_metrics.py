@@ -62,9 +62,9 @@ PLANNING: Final[tuple[Metric, ...]] = (
     ),
     _executor(
         "vla_executor_state",
-        "Whether the robot carries out a command: 1 for its state, 0 for the other.",
+        "Whether the robot carries out commands: 1 for its state, 0 for the others.",
         at("state"),
-        states=("idle", "executing"),
+        states=("idle", "executing", "recovering", "paused"),
     ),
 )
 

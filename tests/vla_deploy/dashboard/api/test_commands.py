@@ -62,6 +62,14 @@ def test_a_cancel_is_an_utterance_of_its_own(dashboard):
     assert dashboard.get(f"commands/{cancel}")["kind"] == "cancel"
 
 
+@pytest.mark.parametrize(("act", "pause"), [("pause", True), ("resume", False)])
+def test_a_pause_is_an_utterance_of_its_own(dashboard, act, pause):
+    command_id = dashboard.post(f"commands/{act}")["command_id"]
+    heard = dashboard.robot.hears("utterance")[-1]
+    assert heard == {"command_id": command_id, "source": "page", "pause": pause}
+    assert dashboard.get(f"commands/{command_id}")["kind"] == act
+
+
 def test_what_has_ended_or_never_was_cannot_be_cancelled(dashboard):
     command_id = dashboard.post("commands", body={"text": "wave"})["command_id"]
     dashboard.robot.tells(command_id, "finished", success=True, error=None, actions=[])

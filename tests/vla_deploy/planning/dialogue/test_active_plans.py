@@ -84,9 +84,9 @@ def test_no_more_plans_than_the_robot_file_allows(further_plans: int) -> None:
     plan = Plan.model_validate({"goal": "go", "actions": [go]})
     command = UserCommand(command_id="c1", text="go to the kitchen", told_ns=0)
     told = {"action_id": "a1", "error": "blocked", "cause": "skill", "done": []}
-    active.add(command, plan, PlanningResult())
+    active.add(command, plan, PlanningResult(), 0)
     for _ in range(further_plans):
-        active.add(active.set_back("c1", told), plan, PlanningResult())
+        active.add(active.set_back("c1", told), plan, PlanningResult(), 0)
     words = f"[planning] further_plans of the robot file allows {further_plans} other plans"
     with pytest.raises(CannotBeDone, match=re.escape(words)):
         active.set_back("c1", told)

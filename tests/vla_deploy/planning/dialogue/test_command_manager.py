@@ -28,7 +28,9 @@ def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
     later.do_one()
     assert events(desk.answers()) == [("c1", "accepted"), ("c1", "plan"), ("c2", "planning")]
     later.do_one()
-    assert events(desk.answers()) == [("c2", "rejected"), ("c3", "accepted"), ("c3", "plan")]
+    assert events(desk.answers()) == [("c2", "rejected"), ("c3", "queued")]
+    desk.ends("c1")
+    assert events(desk.answers()) == [("c1", "finished"), ("c3", "accepted"), ("c3", "plan")]
 
 
 def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
@@ -96,7 +98,7 @@ def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open
 class TestObjecting:
     @pytest.mark.parametrize(
         "said",
-        ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "wait", "stop this"],
+        ["no!", "don't pick it up", "Don\u2019t touch the cups", "leave it", "stop this"],
     )
     def test_what_objects_to_what_is_under_way_ends_it(self, desk, said):
         desk.sees("red cup_1")
@@ -493,3 +495,72 @@ class TestRepeating:
         assert told[-1]["event"] == "rejected"
         assert told[-1]["reason"].startswith("nothing was done before that I could repeat")
         assert desk.plans() == []
+
+
+class TestTurns:
+    """The coffee table has a red cup; the robot goes to the kitchen by c1."""
+
+    @pytest.fixture
+    def busy(self, desk):
+        desk.sees("red cup_1")
+        desk.plans_for("go to the kitchen", source="voice")
+        desk.said_aloud()
+        return desk
+
+    def test_what_would_disturb_waits_in_its_order_and_is_planned_as_the_world_is_then(self, busy):
+        told = busy.answers_to("pick up the cup", source="voice")
+        assert (events(told), told[0]["place"]) == ([("c2", "queued")], 1)
+        assert busy.said_aloud() == [Says.AFTERWARDS]
+        assert busy.answers_to("go to the bedroom")[-1]["place"] == 2
+        assert busy.status()["commands"] == ["c2", "c3"]
+        busy.executor_is("idle", left="ball", right="book")
+        busy.ends("c1")
+        told = busy.answers()
+        assert events(told)[1:] == [("c2", "rejected"), ("c3", "accepted"), ("c3", "plan")]
+        assert "no hand is free" in told[1]["reason"]
+
+    def test_what_only_speaks_is_answered_at_once(self, busy):
+        assert events(busy.answers_to("what do you see"))[-1] == ("c2", "plan")
+
+    @pytest.mark.parametrize("text", ["sing a song", "go to the moon", "bring me the unicorn"])
+    def test_what_will_never_be_possible_is_refused_at_once(self, busy, text):
+        assert events(busy.answers_to(text)) == [("c2", "rejected")]
+
+    def test_a_stop_ends_what_waits_too(self, busy):
+        busy.answers_to("pick up the cup")
+        assert busy.plans_for("stop") == [{"command_id": "c3", "cancel": True}]
+        busy.ends("c1")
+        assert busy.plans_for("hello")[0]["command_id"] == "c4"
+
+    def test_what_was_agreed_to_meanwhile_waits_without_being_asked_again(self, busy):
+        busy.ends("c1")
+        assert events(busy.answers_to("drive backwards 1.05 m"))[-1] == ("c2", "asked")
+        busy.executor_is("executing")
+        assert events(busy.answers_to("yes")) == [("c3", "answered"), ("c2", "queued")]
+        busy.executor_is("idle")
+        assert events(busy.answers()) == [("c2", "accepted"), ("c2", "plan")]
+
+    def test_a_command_of_which_the_executor_knows_nothing_holds_nobody_up(self, busy):
+        busy.answers_to("pick up the cup")
+        for _ in range(8):
+            busy.executor_is("idle")
+            busy.control("armed")
+            told = busy.answers()
+            busy.clock.pass_s(0.5)
+        assert events(told) == [("c2", "accepted"), ("c2", "plan")]
+
+    def test_while_another_plan_goes_on_nobody_knows_what_it_uses(self, desk):
+        desk.executor_is("executing")
+        assert events(desk.answers_to("go to the kitchen")) == [("c1", "queued")]
+        desk.executor_is("idle")
+        assert events(desk.answers()) == [("c1", "accepted"), ("c1", "plan")]
+
+    @pytest.mark.parametrize("text", ["wait", "Hold on a second!", "pause, please", "hang on"])
+    def test_a_pause_and_its_end_are_for_the_executor(self, busy, text):
+        assert busy.plans_for(text, source="voice") == [{"command_id": "c2", "pause": True}]
+        busy.executor_is("paused")
+        assert busy.plans_for("go on", source="voice") == [{"command_id": "c3", "pause": False}]
+        assert busy.said_aloud() == [Says.PAUSED, Says.GOES_ON]
+
+    def test_words_for_a_pause_mean_a_while_where_nothing_goes_on(self, desk):
+        assert desk.plans_for("wait 5 seconds")[0]["plan"]["actions"][0]["skill"] == "wait"

@@ -32,6 +32,7 @@ def talk(desk):
         desk.shows(*seen, robot=ROBOT)
         answers, plans = desk.answers_to(text), desk.plans()
         if plans:
+            desk.ends(plans[-1]["command_id"])
             return in_short(plans[-1]["plan"])
         last = answers[-1]
         return f"{last['event']}: {last.get('question') or last.get('reason')}"

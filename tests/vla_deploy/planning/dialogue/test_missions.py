@@ -1,0 +1,234 @@
+"""Missions seen from the topics: order, what goes on side by side, times, restarts, the end."""
+
+import json
+from typing import Any
+
+import pytest
+
+from vla_deploy.planning.dialogue.phrasing import Says
+
+
+def events(told: list[dict]) -> list[tuple[str, str]]:
+    return [(one["command_id"], one["event"]) for one in told if one["event"] != "objective"]
+
+
+class Flat:
+    """Play the executor of a mission: end its commands, and let time pass."""
+
+    def __init__(self, desk: Any) -> None:
+        self.desk = desk
+        self.executor: tuple[str, dict] | None = None
+
+    def executor_is(self, state: str, **holding: str | None) -> None:
+        """Let the executor tell from now on what it does."""
+        self.executor = state, holding
+
+    def pass_s(self, seconds: float = 0.75) -> list[dict]:
+        """Let time pass, and return what the planner told."""
+        told = []
+        for _ in range(max(1, round(seconds / 0.25))):
+            self.desk.clock.pass_s(0.25)
+            self.desk.control("armed")
+            if self.executor:
+                self.desk.executor_is(self.executor[0], **self.executor[1])
+            told += self.desk.answers()
+        return told
+
+    def given(self) -> list[str]:
+        """Return which subtasks the executor was given since the last look."""
+        return [one["command_id"] for one in self.desk.plans() if "plan" in one]
+
+    def ends(self, command_id: str, error: str = "") -> list[dict]:
+        self.desk.executor_tells(
+            command_id=command_id,
+            event="finished",
+            success=not error,
+            error=error or None,
+            actions=[{"status": "aborted" if error else "succeeded"}],
+        )
+        return self.pass_s()
+
+    def state(self) -> tuple[str, dict[str, str]]:
+        mission = self.desk.missions()[0]
+        return mission["state"], {name: one["state"] for name, one in mission["objectives"].items()}
+
+
+@pytest.fixture
+def flat(desk):
+    desk.sees("red cup_1")
+    return Flat(desk)
+
+
+def give(flat: Flat, *objectives: Any, **rest: Any) -> list[dict]:
+    flat.desk.give(mission={"objectives": list(objectives)} | rest)
+    return flat.pass_s()
+
+
+def test_words_become_a_mission_whose_objectives_come_one_after_the_other(flat) -> None:
+    flat.desk.give(text="go to the kitchen; look left; say done", source="voice")
+    assert events(flat.pass_s())[0] == ("c1", "accepted")
+    assert flat.given() == ["c1/o1.s1"]
+    assert flat.desk.status()["commands"] == ["c1"]
+    flat.ends("c1/o1.s1")
+    assert flat.given() == ["c1/o2.s1"]
+    flat.ends("c1/o2.s1")
+    assert flat.given() == ["c1/o3.s1"]
+    told = flat.ends("c1/o3.s1")
+    finished = told[-1]
+    assert (finished["command_id"], finished["success"]) == ("c1", True)
+    assert finished["summary"]["successful_actions"] == 3
+    assert flat.state()[0] == "completed"
+    assert flat.desk.said_aloud()[-1].startswith("3 of 3 objectives done")
+
+
+def test_what_needs_other_parts_goes_on_side_by_side_and_the_rest_in_its_turn(flat) -> None:
+    give(
+        flat,
+        {"id": "drive", "words": "go to the kitchen"},
+        {"id": "left", "actions": [{"id": "a", "skill": "open_gripper",
+                                    "parameters": {"arm": "left"}}]},
+        {"id": "right", "actions": [{"id": "a", "skill": "open_gripper",
+                                     "parameters": {"arm": "right"}}]},
+        {"id": "say", "words": "say hello"},
+        {"id": "first", "priority": 1, "words": "turn left 90 degrees"},
+    )  # fmt: skip
+    assert flat.given() == ["c1/first.s1", "c1/left.s1", "c1/right.s1", "c1/say.s1"]
+    for name in ("first", "left", "right"):
+        flat.ends(f"c1/{name}.s1")
+    assert flat.given() == ["c1/drive.s1"]
+
+
+def test_a_criterion_that_is_not_met_fails_its_objective_and_what_depends_on_it(flat) -> None:
+    give(
+        flat,
+        {"id": "take", "words": "pick up the red cup", "success_criteria": "holding the red cup"},
+        {"id": "bring", "words": "go to the kitchen", "depends_on": ["take"]},
+        {"id": "look", "words": "look left"},
+    )
+    flat.desk.carried_out = ["c1/look.s1"]
+    flat.executor_is("executing", left=None, right=None)
+    flat.ends("c1/take.s1")
+    flat.pass_s(5.0)
+    assert flat.state()[1]["take"] == "failed"
+    assert flat.state()[1]["bring"] == "cancelled"
+    told = flat.ends("c1/look.s1")
+    assert 'take.s1 "holding the red cup" is not met' not in told[-1]["error"]
+    assert '"holding the red cup" is not met: the hands hold nothing' in told[-1]["error"]
+    assert "1 of 3 objectives done" in told[-1]["error"]
+
+
+@pytest.mark.parametrize("words", ["bring me the unicorn", "fly to the moon"])
+def test_an_objective_that_nobody_can_plan_fails_with_its_reason(flat, words) -> None:
+    told = give(flat, words) + flat.pass_s()
+    assert (told[-1]["event"], told[-1]["success"]) == ("finished", False)
+    assert words in told[-1]["error"]
+
+
+def test_a_mission_begins_at_its_time_and_again_and_again(flat) -> None:
+    flat.desk.give(text="every ten minutes, go to the kitchen", source="voice")
+    told = flat.pass_s()
+    assert events(told)[:3] == [("c1", "accepted"), ("c1", "said"), ("c1", "finished")]
+    for _ in range(2):
+        assert flat.given() == ["c1/o1.s1"]
+        flat.ends("c1/o1.s1")
+        flat.pass_s(590.0)
+        assert flat.given() == []
+        flat.pass_s(10.0)
+    assert flat.desk.missions()[0]["cycles"] == 3
+
+
+def test_a_mission_waits_for_its_condition(flat) -> None:
+    flat.desk.give(text="when the hands are empty, go to the kitchen")
+    flat.executor_is("idle", left="cup", right=None)
+    flat.pass_s(2.0)
+    assert flat.given() == []
+    flat.executor_is("idle", left=None, right=None)
+    flat.pass_s()
+    assert flat.given() == ["c1/o1.s1"]
+
+
+def test_a_stop_ends_what_is_carried_out_and_not_what_waits_for_its_time(flat) -> None:
+    flat.desk.give(text="go to the kitchen at 23:59")
+    give(flat, "go to the kitchen", "look left")
+    told = flat.desk.answers_to("stop")
+    assert ("c2", "finished") in events(told)
+    assert [one["state"] for one in flat.desk.missions()] == ["cancelled", "planning"]
+    assert flat.pass_s(2.0) == []
+
+
+def test_one_mission_is_cancelled_by_its_id(flat) -> None:
+    give(flat, "go to the kitchen", "look left")
+    assert flat.given() == ["c1/o1.s1"]
+    told = flat.desk.answers_to(mission_act={"cancel": "c1"})
+    assert flat.desk.plans() == [
+        {"command_id": "c1/o1.s1-cancel", "cancel": True, "of": "c1/o1.s1"}
+    ]
+    assert events(told)[-1] == ("c2", "finished")
+    assert told[-1]["success"]
+    (told,) = flat.desk.answers_to(mission_act={"cancel": "c9"})
+    assert 'no mission "c9"' in told["error"]
+
+
+def test_a_pause_shows_and_nothing_new_begins(flat) -> None:
+    give(flat, "go to the kitchen", "say hello")
+    flat.desk.carried_out = ["c1/o1.s1"]
+    flat.executor_is("paused")
+    flat.given()
+    flat.ends("c1/o2.s1")
+    assert flat.state()[0] == "paused"
+    flat.executor_is("executing")
+    flat.pass_s()
+    assert flat.state()[0] == "executing"
+
+
+def test_a_planner_that_is_started_again_goes_on_where_it_was(flat) -> None:
+    give(flat, "go to the kitchen", {"id": "o2", "words": "look left", "depends_on": ["o1"]})
+    flat.executor_is("idle")
+    # It ended while no planner was there to hear it.
+    flat.desk.executor_tells(command_id="c1/o1.s1", event="finished", success=True, error=None,
+                             actions=[])  # fmt: skip
+    flat.desk.start()
+    flat.pass_s(1.0)
+    assert flat.given() == ["c1/o1.s1", "c1/o2.s1"]
+    # Nobody carries this one out any more: it is begun again, once.
+    flat.desk.start()
+    flat.pass_s(1.0)
+    assert flat.given() == ["c1/o2.s1+2"]
+    flat.desk.start()
+    flat.pass_s(1.0)
+    assert flat.given() == []
+    assert "o1: completed" not in json.dumps(flat.desk.missions())
+    assert flat.state() == ("failed", {"o1": "completed", "o2": "failed"})
+
+
+def test_what_an_executor_took_with_it_is_begun_again(flat) -> None:
+    give(flat, "go to the kitchen")
+    assert flat.given() == ["c1/o1.s1"]
+    flat.executor_is("idle")
+    flat.pass_s(4.0)
+    assert flat.given() == ["c1/o1.s1+2"]
+
+
+@pytest.mark.parametrize(
+    ("mission", "why"),
+    [
+        ([], "at least 1 item"),
+        ({"objectives": [{"words": "go", "required_resources": ["third_arm"]}]}, "third_arm"),
+        ({"objectives": ["go"], "schedule": {"at_unix_s": 7}}, "give a time that is to come"),
+        ({"objectives": [{"words": "go", "criteria": "all is well"}]}, "cannot be checked"),
+        ("7", "expected a JSON object or a list"),
+    ],
+)
+def test_a_mission_with_faults_is_refused_in_one_line(flat, mission, why) -> None:
+    flat.desk.give(mission=mission)
+    (told,) = flat.pass_s()
+    assert told["event"] == "rejected"
+    assert why in told["reason"]
+    assert "\n" not in told["reason"]
+
+
+def test_a_command_waits_for_the_mission_and_an_answer_does_not(flat) -> None:
+    give(flat, "go to the kitchen")
+    assert events(flat.desk.answers_to("go to the bedroom", source="voice")) == [("c2", "queued")]
+    assert events(flat.desk.answers_to("what do you see"))[-1] == ("c3", "plan")
+    assert flat.desk.said_aloud() == [Says.AFTERWARDS]
