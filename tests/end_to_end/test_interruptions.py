@@ -91,7 +91,7 @@ def test_fingers_that_close_on_nothing_are_reported(coarse_at_table: LockstepSta
 
 
 def pause_at(stack: LockstepStack, command_id: str, skill: str, seconds: float) -> None:
-    """Pause some time into a skill for 5 s: all comes to rest, and the hands hold what they hold."""
+    """Pause some time into a skill for 5 s: all rests, and the hands hold what they hold."""
 
     def began() -> bool:
         assert stack.outcome(command_id) is None, stack.outcome(command_id)

@@ -7,7 +7,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
+from vla_deploy.ipc.claims import (
+    Book,
+    Claim,
+    amend,
+    ask,
+    declare,
+    obstacles,
+    release,
+    settle,
+    widen,
+)
 from vla_deploy.ipc.errors import BadPayload, ClaimRefused
 from vla_deploy.ipc.space import SharedSpace
 from vla_deploy.ipc.topics import CLAIMS
@@ -71,6 +81,11 @@ class ClaimBook:
             ClaimRefused: there are too many claims.
         """
         self._change(lambda book, now_ns: amend(book, holder, wants, now_ns))
+
+    def widen(self, holder: str, wants: Mapping[str, int]) -> bool:
+        """Give a holder more than it has kept, where that is free; return whether it has it."""
+        book = self._change(lambda book, _: widen(book, holder, wants))
+        return any(one.holder == holder and one.wants == wants for one in book.granted)
 
     def obstacles(self, wants: Mapping[str, int]) -> str:
         """Say who holds what stands in the way."""

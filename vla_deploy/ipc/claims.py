@@ -83,6 +83,25 @@ def amend(book: Book, holder: str, wants: Mapping[str, int], now_ns: int) -> Boo
     return settle(replace(book, granted=granted), now_ns)
 
 
+def widen(book: Book, holder: str, wants: Mapping[str, int]) -> Book:
+    """Give a holder more, where that is free; who waits for it waits on, for it holds nothing.
+
+    Whoever widens must hold something alone that nobody else who widens holds: two that each wait
+    for what the other has would wait for ever.
+    """
+    own = next((one.wants for one in book.granted if one.holder == holder), None)
+    if own is None:
+        return book
+    for resource, amount in wants.items():
+        added = amount - own.get(resource, 0)
+        if added > book.capacities.get(resource, 0) - book.used(resource):
+            return book
+    granted = tuple(
+        replace(one, wants=dict(wants)) if one.holder == holder else one for one in book.granted
+    )
+    return replace(book, granted=granted)
+
+
 def settle(book: Book, now_ns: int) -> Book:
     """Forget claims that have waited too long, and grant whatever can be granted."""
     granted = list(book.granted)

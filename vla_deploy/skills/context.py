@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.ros_goals import RosGoals
 
+BASE: Final = "base"
 Skill = Generator[None, None, None]
 """A skill yields once per executor step, returns on success, raises SkillFailed otherwise."""
 
@@ -41,6 +42,7 @@ class SkillContext:
 
     `say` shows a text, `voice` has it heard; `notes` are what results say beside their status,
     `data` what came of actions; `rests` what is left of relative motions, all by actor;
+    `needs` are the parts that each holder claims for the whole of its action;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
     robot, where the robot file names any. `keeps_out` are the places that the plan may not enter.
@@ -61,6 +63,24 @@ class SkillContext:
     holder: str = ""
     ros: RosGoals | None = None
     keeps_out: frozenset[str] = frozenset()
+    needs: dict[str, Mapping[str, int]] = field(default_factory=dict)
+
+    def keep_only(self, hand: str) -> None:
+        """Leave all but the base and one arm, with its hand, to others for a phase of the action.
+
+        The base stands still meanwhile. What is left is taken back by `take_all_again`.
+        """
+        described = self.robot.hands[hand]
+        kept = {BASE, described.arm, *self.robot.groups_moving((described.gripper,))}
+        wants = {
+            part: count for part, count in self.needs.get(self.holder, {}).items() if part in kept
+        }
+        self.claims.amend(self.holder, wants)
+
+    def take_all_again(self) -> "Skill":
+        """Wait until the acting action has every part of the robot again that it needs."""
+        while not self.claims.widen(self.holder, self.needs.get(self.holder, {})):
+            yield
 
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""

@@ -210,6 +210,7 @@ class PlanExecution:
         waited_s = (working_ns - self._asked[record.action.id]) / NS_PER_S
         if book.holds(holder):
             self._branches[record.action.id] = _Branch(record=record, started_ns=working_ns)
+            self._context.needs[holder] = needs_of(record.action, self._context.robot)
             record.status = ActionStatus.ACTIVE
             record.started_ns = now_ns
             self._tell(record)
@@ -255,12 +256,18 @@ class PlanExecution:
             return
         if branch.skill is None and self._is_ending(action):
             return  # a server has still to end what was tried before
+        if branch.record.retries and branch.skill is None and not self._has_all():
+            return  # others use what a phase of the first try has left to them
         if branch.skill is None:
             if self._lacks_need(branch, self._context.link.clock.now_ns()):
                 return
             branch.before = self._world.state(action)
             branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
         next(branch.skill)
+
+    def _has_all(self) -> bool:
+        """Return whether the acting action has every part of the robot that it needs."""
+        return next(self._context.take_all_again(), True) is True
 
     def _timeout_s(self, action: Action) -> float:
         spec = SKILLS[action.skill]
@@ -339,6 +346,7 @@ class PlanExecution:
         self._branches.pop(record.action.id, None)
         self._leaving.pop(record.action.id, None)
         if record.action.id in self._asked:
+            self._context.needs.pop(self._holder(record.action), None)
             self._context.claims.release(self._holder(record.action))
         record.status = status
         record.error = error

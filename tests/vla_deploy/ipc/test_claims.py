@@ -1,8 +1,20 @@
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
+from vla_deploy.ipc.claims import (
+    Book,
+    Claim,
+    amend,
+    ask,
+    declare,
+    obstacles,
+    release,
+    settle,
+    widen,
+)
 from vla_deploy.ipc.errors import ClaimRefused
 
 BODY = Book(capacities={"base": 1, "head": 1, "left_arm": 1, "right_arm": 1, "ram_mb": 1000})
@@ -145,3 +157,15 @@ def test_nothing_is_ever_oversubscribed_and_everyone_is_served_when_releases_com
     for _ in range(len(book.waiting) + len(book.granted)):
         book = release(book, [one.holder for one in book.granted[:1]], now_ns)
     assert (book.granted, book.waiting) == ((), ())
+
+
+def test_a_holder_takes_back_what_it_has_left_as_soon_as_that_is_free():
+    both = {"base": 1, "head": 1}
+    book = ask(amend(filled(claim("a", **both)), "a", {"base": 1}, 0), claim("b", head=1), 0)
+    assert holders(book) == ["a", "b"]
+    assert widen(book, "a", both) == book
+    book = ask(book, claim("c", head=1), 0)
+    free = replace(book, granted=book.granted[:1])
+    assert widen(free, "a", both).granted[0].wants == both
+    assert widen(free, "a", both).waits("c")
+    assert widen(free, "stranger", both) == free

@@ -271,7 +271,15 @@ class MissionManager:
         return (run, name) if is_it else (None, "")
 
     def _tell_part(self, run: MissionRun, name: str) -> None:
+        """Publish how a part stands; of an objective with one subtask the objective alone."""
         part = run.subtasks.get(name) or run.objectives[name]
+        objective = name.partition(".")[0]
+        is_only = name != objective and sum(
+            one.startswith(f"{objective}.") for one in run.subtasks
+        ) == 1  # fmt: skip
+        if part.state is PartState.CHECKING or (is_only and part.state is PartState.COMPLETED):
+            return
+        name = objective if is_only else name
         self._publisher.publish(
             {
                 "command_id": run.mission_id,

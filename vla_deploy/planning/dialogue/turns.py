@@ -12,6 +12,7 @@ from vla_deploy.plans.symbolic.simulation import parts_of
 
 ALL: Final = frozenset({"all"})
 """What is under way while nobody knows which parts of the robot a plan uses."""
+BASE: Final = "base"
 _NEVER_BETTER: Final = (
     *(Ambiguous, CommandUnreadable, NotAble, NotUnderstood),
     *(UnknownObject, UnknownPlace),
@@ -65,8 +66,8 @@ class Turns:
             return False
         parts = parts_of_plan(plan)
         disturbs = busy == ALL or bool(parts & busy)
-        if command.mission:
-            return disturbs and bool(parts)
+        if command.mission and busy != ALL:  # the executor gives arms and eyes in their turn
+            return disturbs and BASE in parts
         return disturbs or bool(self.waiting) or (bool(busy) and not parts)
 
     def add(self, command: UserCommand, go_on: Callable[[], None], busy: object) -> int | None:

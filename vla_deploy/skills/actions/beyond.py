@@ -15,7 +15,7 @@ from vla_deploy.ipc.ros_goals import MOST_POINTS, GoalKind, GoalRequest, GoalSta
 from vla_deploy.plans.catalogue import TIMEOUTS_S, SkillKind
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
-from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.context import BASE, Skill, SkillContext
 from vla_deploy.skills.errors import (
     ServerAborted,
     ServerCancelled,
@@ -26,7 +26,6 @@ from vla_deploy.skills.errors import (
 from vla_deploy.skills.ros_goals import RosGoals, SentGoal
 
 NAVIGATION_SERVER: Final = "navigate_to_pose"
-BASE: Final = "base"
 ERRORS: Final[Mapping[GoalState, type[SkillFailed]]] = MappingProxyType(
     {
         GoalState.REJECTED: ServerRejected,

@@ -46,6 +46,7 @@ def hand_over(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     held = context.hands[hand]
     kind = ANY_CLASS if held is None else held.kind
     yield from carry(context)
+    context.keep_only(hand)
     yield from settle(context, arm_joints(context, hand))
     alone = _efforts(context, hand)
     here = "Here you are" if kind == ANY_CLASS else f"Here is the {kind}"

@@ -67,15 +67,17 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     met: list[float] = []
     while True:
         choice = yield from solve_near(context, query, partial(_choose, context, query, hands, met))
+        context.keep_only(choice.hand)
         try:
-            yield from or_carry(context, _grasp(context, choice, query))
+            yield from or_carry(context, _grasp(context, choice, query), choice.hand)
             break
         except Touched:
+            yield from context.take_all_again()
             met.append(choice.grasp.yaw_rad)
             if len(met) == MOST_TOUCHES:
                 raise
     context.tell(arm=choice.hand, **{"class": choice.held.kind})
-    yield from carry(context)
+    yield from carry(context, (choice.hand,))
 
 
 def _grasp(context: SkillContext, choice: GraspChoice, query: Query) -> Skill:

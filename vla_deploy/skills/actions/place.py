@@ -75,9 +75,10 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         context.hands[hand] = None
         raise NotPossible(f"the {hand} hand has lost the {held.kind} on the way")
     release = yield from _release(context, parameters, hand, held)
-    yield from or_carry(context, _put_down(context, hand, held, release))
+    context.keep_only(hand)
+    yield from or_carry(context, _put_down(context, hand, held, release), hand)
     context.tell(arm=hand, **{"class": held.kind})
-    yield from carry(context)
+    yield from carry(context, (hand,))
 
 
 def _put_down(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:

@@ -1,7 +1,7 @@
 """Bring arms to where they may travel, past what stands on furniture and out from under it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -28,8 +28,8 @@ CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30)
 RESTARTS = 2
 
 
-def carry(context: SkillContext) -> Skill:
-    """Bring both arms to where they may travel: tucked when empty, close in front when loaded.
+def carry(context: SkillContext, hands: Sequence[str] | None = None) -> Skill:
+    """Bring arms, all or some, to where they may travel: tucked, or close in front when loaded.
 
     A hand that is low over furniture is raised first: the way to its chest is no straight line. An
     arm under furniture is drawn out before.
@@ -38,12 +38,13 @@ def carry(context: SkillContext) -> Skill:
         NotPossible: an arm is under furniture, and the robot cannot drive back.
         TryAgain: something stands behind the robot.
     """
-    if not all(_is_at(context, _travel_targets(context, hand)) for hand in context.robot.hands):
+    hands = tuple(context.robot.hands) if hands is None else hands
+    if not all(_is_at(context, _travel_targets(context, hand)) for hand in hands):
         yield from leave_underside(context)
-    for hand in context.robot.hands:
+    for hand in hands:
         yield from _raise_clear(context, hand)
     targets: dict[str, float] = {}
-    for hand in context.robot.hands:
+    for hand in hands:
         wanted = _travel_targets(context, hand)
         if not _is_at(context, wanted):
             targets |= wanted
@@ -119,12 +120,12 @@ def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
     return arm_targets(context, hand, best)
 
 
-def or_carry(context: SkillContext, skill: Skill) -> Skill:
-    """Run a skill; where it fails, bring the arms to where they may travel before saying so."""
+def or_carry(context: SkillContext, skill: Skill, hand: str) -> Skill:
+    """Run a skill of one hand; where it fails, bring its arm to where it may travel before that."""
     try:
         yield from skill
     except (TryAgain, NotPossible):
-        yield from carry(context)
+        yield from carry(context, (hand,))
         raise
 
 

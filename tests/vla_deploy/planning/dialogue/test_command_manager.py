@@ -542,12 +542,14 @@ class TestTurns:
 
     def test_a_command_of_which_the_executor_knows_nothing_holds_nobody_up(self, busy):
         busy.answers_to("pick up the cup")
+        told = []
         for _ in range(8):
             busy.executor_is("idle")
             busy.control("armed")
-            told = busy.answers()
+            told += busy.answers()
             busy.clock.pass_s(0.5)
-        assert events(told) == [("c2", "accepted"), ("c2", "plan")]
+        assert events(told) == [("c1", "finished"), ("c2", "accepted"), ("c2", "plan")]
+        assert "does not know of it any more" in told[0]["error"]
 
     def test_while_another_plan_goes_on_nobody_knows_what_it_uses(self, desk):
         desk.executor_is("executing")

@@ -157,7 +157,7 @@ def test_a_stop_ends_what_is_carried_out_and_not_what_waits_for_its_time(flat) -
 
 
 def test_one_mission_is_cancelled_by_its_id(flat) -> None:
-    give(flat, "go to the kitchen", "look left")
+    give(flat, "go to the kitchen", "drive back 0.1 m")
     assert flat.given() == ["c1/o1.s1"]
     told = flat.desk.answers_to(mission_act={"cancel": "c1"})
     assert flat.desk.plans() == [
