@@ -21,6 +21,7 @@ _ARM: Final = (*HANDS, None)
 SKILLS: Final[Mapping[str, Mapping[str, Range | None]]] = MappingProxyType({
     "navigate_to": {"place": None, "object": None, "x_m": (0.0, 8.0), "y_m": (0.0, 6.0),
                     "yaw_rad": (-math.pi, math.pi)},
+    "charge": {"place": None},
     "move": {"distance_m": (-3.0, 3.0)},
     "turn": {"angle_rad": (-2 * math.pi, 2 * math.pi)},
     "look_at": {"object": None, "direction": None},

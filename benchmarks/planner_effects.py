@@ -247,8 +247,8 @@ def _plain(text: object) -> str:
 
 SKILLS: Final[Mapping[str, Callable[[FlatWorld, Parameters], None]]] = MappingProxyType(
     {
-        "navigate_to": _navigate, "move": _move, "turn": _turn, "look_at": _look,
-        "find_object": _find, "pick_up": _pick, "place": _put, "hand_over": _give,
+        "navigate_to": _navigate, "charge": _navigate, "move": _move, "turn": _turn,
+        "look_at": _look, "find_object": _find, "pick_up": _pick, "place": _put, "hand_over": _give,
         "open_gripper": _open, "close_gripper": _close, "move_arm": _pose_arm, "speak": _speak,
         "wait": _wait, "stop": _stop,
     }

@@ -83,6 +83,8 @@ class TwinProcess:
         self._ready.unlink(missing_ok=True)
         robot = load_robot(options.robot)
         self._twin = _build_twin(options, robot)
+        if self._twin.battery is not None:
+            self._twin.battery.serve(devices)
         self._digest = WireDigest(lambda: self._now_ns())
         self._hub = CanHub(
             self._twin.can_wire, devices / robot.can_bus.device, on_packet=self._digest.add

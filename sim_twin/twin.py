@@ -5,6 +5,7 @@ from typing import TypeVar
 from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
+from sim_twin.battery import TwinBattery, dock_contact
 from sim_twin.can import CanWire, robot_drives
 from sim_twin.device import WireDevice
 from sim_twin.errors import TwinModelMismatch
@@ -22,6 +23,7 @@ from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.servos import Coupling, EmulatedServoSpec, ServoBank, WireTiming
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.battery_settings import BatterySource
 
 S = TypeVar("S", bound=StreamedDevice)
 
@@ -75,6 +77,7 @@ class Twin:
         names = (*self.lines, *self.stream_lines, robot.camera.device)
         self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply()
+        self.battery = self._battery(robot)
         self.faults = FaultInjector(self)
         self._hazards: HazardWatch | None = None
         self._camera: HeadCamera | None = None
@@ -165,6 +168,8 @@ class Twin:
         if now_ns >= self.imu.due_ns:
             self.imu.step(now_ns)
         self.can_wire.poll(now_ns)
+        if self.battery is not None and now_ns >= self.battery.due_ns:
+            self.battery.step(now_ns)
         if self._camera is not None:
             self._camera.device.step(now_ns)
         if self._hazards is not None:
@@ -174,6 +179,21 @@ class Twin:
         """Release OpenGL where the camera was used."""
         if self._camera is not None:
             self._camera.close()
+
+    def _battery(self, robot: RobotDescription) -> TwinBattery | None:
+        """Return the pack of the robot file; servos hang on it where they measure it."""
+        if robot.battery is None:
+            return None
+        feeds = robot.battery.source is BatterySource.SERVOS
+        return TwinBattery(
+            robot.battery,
+            drawn_w=self._drawn_w,
+            is_docked=dock_contact(self.engine, robot),
+            feed=self.servo_supply.feed if feeds else _keep_regulated,
+        )
+
+    def _drawn_w(self) -> float:
+        return self.servos.supply_w + sum(drive.supply_w for drive in self.drives)
 
     def _streamed(self, kind: type[S], what: str) -> S:
         for device in self.streamed_devices.values():
@@ -196,6 +216,10 @@ class Twin:
         )
         shafts.command(duty)
         engine.drives.command_each(now_ns, self._drive_laws)
+
+
+def _keep_regulated(_volts: float) -> None:
+    """Leave the servos' supply as it is: a regulator stands between it and the pack."""
 
 
 def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:

@@ -137,6 +137,11 @@ class EmulatedDrive(ABC):
             self._trip(cause)
         self._tripped = cause
 
+    @property
+    def supply_w(self) -> float:
+        """Return the power that the motor draws; negative while it brakes into the supply."""
+        return self._stage.bus_current_a * self._stage.bus_v
+
     def set_supply(self, on: bool) -> None:
         """Switch the drive's supply: off is silent and without torque, on boots anew."""
         if on and not self._supplied:

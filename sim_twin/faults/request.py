@@ -64,6 +64,8 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     effect = EFFECTS.get((component, of or fault))
     if effect is None:
         raise _unsupported(component, of or fault)
+    if component is Component.BATTERY and robot.battery is None:
+        raise FaultRefused("battery: the robot file has no [battery]")
     instance, number = _instance(component, raw.get("instance"), robot)
     faults = _unknown_keys(raw, effect, rhythmic=rhythmic)
     timing = _timing(raw, faults, rhythmic=rhythmic)

@@ -7,7 +7,6 @@ from sim_twin.faults.effect import Effect, Ending, FaultParameter, Target
 from sim_twin.faults.line_effects import DELAY, Rows, line_rows
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
-from sim_twin.faults.supply import NOMINAL_V
 from sim_twin.faults.vocabulary import Component, Fault
 
 _COOL_C: Final = 40.0
@@ -85,7 +84,8 @@ def _slip(target: Target) -> Ending:
 def _brown_out(target: Target) -> Ending:
     twin, values = target.twin, target.values
     twin.servo_supply.ramp_to(values["volts_v"], twin.now_ns, values["ramp_s"])
-    return lambda: twin.servo_supply.ramp_to(NOMINAL_V, twin.now_ns, values["ramp_s"])
+    supply = twin.servo_supply
+    return lambda: supply.ramp_to(supply.usual_v, twin.now_ns, values["ramp_s"])
 
 
 _VOLTS: Final = FaultParameter(

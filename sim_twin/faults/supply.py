@@ -9,8 +9,16 @@ class Supply:
     """Hold a supply voltage that may move in time."""
 
     def __init__(self, volts: float = NOMINAL_V) -> None:
+        self.usual_v = volts
+        """What it gives where nothing disturbs it."""
         self._from_v = self._to_v = volts
         self._start_ns = self._end_ns = 0
+
+    def feed(self, volts: float) -> None:
+        """Give another voltage from now on, or after what disturbs it now."""
+        if self._to_v == self.usual_v:
+            self._to_v = volts
+        self.usual_v = volts
 
     def ramp_to(self, volts: float, now_ns: int, over_s: float = 0.0) -> None:
         """Move from the present voltage to another one."""

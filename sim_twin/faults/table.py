@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Final
 
+from sim_twin.faults.battery_effects import BATTERY_ROWS
 from sim_twin.faults.can_effects import CAN_ROWS
 from sim_twin.faults.effect import Effect
 from sim_twin.faults.line_effects import SENSOR_ROWS
@@ -13,6 +14,7 @@ EFFECTS: Final[Mapping[tuple[Component, Fault], Effect]] = {
     **SERVO_ROWS,
     **CAN_ROWS,
     **SENSOR_ROWS,
+    **BATTERY_ROWS,
 }
 
 

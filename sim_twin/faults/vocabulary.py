@@ -37,3 +37,4 @@ class Component(Enum):
     ESTOP = "estop"
     MICROPHONE = "microphone"
     SPEAKER = "speaker"
+    BATTERY = "battery"

@@ -6,7 +6,7 @@ Nodes are stepped by due time, in a repeatable order.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import can
 
@@ -22,6 +22,9 @@ from sim_twin.timing.clock import SimClock, Simulation
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.node import Node, NodeContext
+
+DEVICES_DIR: Final = "dev"
+"""Where the twin's files are, below the run's directory."""
 
 
 class HeldDevice(Protocol):
@@ -236,6 +239,8 @@ class Lockstep(Schedule):
         """
         self.robot = load_robot(robot)
         self.twin = Twin(self.robot, world, seed, servo_timing)
+        if self.twin.battery is not None:
+            self.twin.battery.serve(tmp_path / DEVICES_DIR)
         self.clock = SimClock(self.twin)
         self.devices = MemoryOpener(self.twin, self.clock)
         self.context = NodeContext(

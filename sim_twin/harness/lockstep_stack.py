@@ -16,7 +16,7 @@ from drivers.opener import DeviceOpener
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
 from sim_twin.harness.audio_streams import streamed_microphone, streamed_speaker
-from sim_twin.harness.lockstep import Lockstep
+from sim_twin.harness.lockstep import DEVICES_DIR, Lockstep
 from sim_twin.harness.robot import RobotFailed, RobotUnderTest
 from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
@@ -29,6 +29,7 @@ from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.battery_settings import BatterySettings
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import Node, NodeContext
@@ -36,6 +37,7 @@ from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.listener import PAGE, build_stop_words
 from vla_deploy.speech.voice.robot_voice import build_voice
+from vla_deploy.supervisor.battery import open_battery
 
 COMMAND_TIMEOUT_S: Final = 300.0
 LOOK_PERIOD_S: Final = 1.0 / topics.NEAR_OBSTACLES.rate_hz
@@ -146,6 +148,27 @@ class LockstepControl(RobotUnderTest):
         self._link.close()
 
 
+class BatteryNode:
+    """Step what the supervisor steps beside the processes: the keeper of the battery."""
+
+    period_s = 0.5
+
+    def __init__(self, context: NodeContext, robot: BatterySettings, space: SharedSpace) -> None:
+        root = context.run_dir / DEVICES_DIR
+        self._keeper = open_battery(robot, space, context.clock, root, InlineExecutor())
+
+    def start(self) -> None:
+        """Do nothing: the keeper is open."""
+
+    def step(self) -> None:
+        """Measure and publish."""
+        self._keeper.step()
+
+    def stop(self) -> None:
+        """Close the topic."""
+        self._keeper.close()
+
+
 class LockstepStack(LockstepControl):
     """Own a twin and every node of the robot; give commands and read what became of them."""
 
@@ -172,6 +195,8 @@ class LockstepStack(LockstepControl):
         self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
         for node in (self.perception, self.planner, self.executor):
             self.lockstep.add(node)
+        if self.robot.battery is not None:
+            self.lockstep.add(BatteryNode(context, self.robot.battery, self.space))
         if speech:
             self.lockstep.add(self._speech())
 

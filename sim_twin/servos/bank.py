@@ -53,6 +53,11 @@ class ServoBank:
         """Return whether bytes take time on this bus."""
         return self._queue.paced
 
+    @property
+    def supply_w(self) -> float:
+        """Return the power that the motors draw, as of the firmware's last look."""
+        return self._firmware.supply_w
+
     def receive(self, data: bytes) -> None:
         """Take bytes that the host has put on the bus."""
         now_ns = self._now_ns

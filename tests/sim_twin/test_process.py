@@ -21,6 +21,8 @@ from drivers.clock import MonotonicClock
 from drivers.dynamixel.wire.codec import Instruction, encode_instruction
 from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
+from platforms.probes.battery import CHARGE, PowerSupplySource
+from platforms.tree import Tree
 from sim_twin.errors import RefereeRefusal, TwinUnreachable
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
@@ -172,6 +174,16 @@ def test_sensors_send_unasked(devices: PathOpener, name: str, header: bytes) -> 
         heard += line.read(1000, MonotonicClock().now_ns() + 2_000_000_000)
     line.close()
     assert header in heard
+
+
+def test_the_batterys_gauge_is_a_folder_among_the_devices(run_dir: Path) -> None:
+    source = PowerSupplySource(Tree(run_dir / "dev"))
+
+    def charge() -> float | None:
+        return next(one.value for one in source.readings() if one.name == CHARGE)
+
+    await_that("the gauge", lambda: charge() is not None, START_TIMEOUT_S)
+    assert charge() == pytest.approx(0.8, abs=0.05)
 
 
 def test_the_referee_reports_the_truth_and_the_pace(run_dir: Path) -> None:

@@ -4,10 +4,12 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from platforms.probes import open_probes, read_power_modes
+from platforms.probes.battery import CHARGE, FOLDER, PowerSupplySource
 from platforms.probes.thermal import ZONES
 from platforms.tree import Tree, ValueMissing, number_in
 from vla_deploy.doctor.context import DoctorContext, boot_option
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
+from vla_deploy.robots.battery_settings import BatterySource
 
 MARGIN_K: Final = 10.0
 TRIPS: Final = frozenset({"passive", "hot", "critical"})
@@ -145,3 +147,20 @@ def _processors(listed: str) -> set[int]:
 
 def _listed(processors: Iterable[int]) -> str:
     return ",".join(map(str, processors))
+
+
+def battery(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Read the gauge that the robot file names."""
+    settings = None if context.robot is None else context.robot.battery
+    if settings is None:
+        yield missing("battery", "the robot file has no [battery]")
+    elif settings.source is BatterySource.SERVOS:
+        yield ok("battery", "its voltage comes from the servos")
+    else:
+        source = PowerSupplySource(context.tree, settings.supply)
+        charge = next(one for one in source.readings() if one.name == CHARGE)
+        if charge.value is None:
+            why = charge.reason.removeprefix("missing, because ")
+            yield warn("battery", why, f"ls {FOLDER}   # [battery] supply names one of them")
+        else:
+            yield ok("battery", f"{100 * charge.value:.0f} %")

@@ -50,6 +50,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Power", "throttling", power.throttling),
     Check("Power", "power mode", power.power_mode),
     Check("Power", "CPU governor", power.governor),
+    Check("Power", "battery", power.battery),
     Check("Power", "isolated CPUs", power.isolated_processors),
     Check("Storage", "disk", computer.disks, live=True),
     Check("Storage", "shared memory", computer.shared_memory, live=True),

@@ -258,6 +258,7 @@ JUDGES: Final[Mapping[str, Judge]] = {
     "find_object": _look,
     "look_at": _look,
     "navigate_to": _navigate,
+    "charge": _navigate,
     "move": _move,
     "pick_up": _pick_up,
     "place": _place,

@@ -538,6 +538,16 @@ BOARD = Topic(
     payload=supervision.BoardDocument,
     fields=(PackedField("document", "json", 32768),),
 )
+BATTERY = Topic(
+    name="battery",
+    kind=TopicKind.CELL,
+    owner="supervisor",
+    rate_hz=2,
+    deadline_s=5.0,
+    summary="charge, voltage, current, whether it charges, or why that is not known, as JSON",
+    payload=supervision.BatteryDocument,
+    fields=(PackedField("document", "json", 2048),),
+)
 BUDGET_STOP = Topic(
     name="budget_stop",
     kind=TopicKind.CELL,

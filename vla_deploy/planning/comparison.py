@@ -19,6 +19,8 @@ _LEADING_UP: Final = frozenset({"find_object", "navigate_to"})
 _NOT_COMPARED: Final = frozenset({*MOTIONLESS, "look_at"})
 # Digits of metres and radians that are compared.
 _DIGITS: Final = 1
+# Who goes to the charging station goes to charge.
+_ALIKE: Final = {"charge": "navigate_to"}
 # How a way is driven; which hand gives shows in what the hands hold then.
 _HOW: Final = frozenset(
     {("navigate_to", "yaw_rad"), ("navigate_to", "speed_m_s"), ("move", "speed_m_s"),
@@ -56,7 +58,7 @@ def _ways(actions: list[Action], request: PlanRequest) -> Iterator[str]:
         following = (one.skill for one in compared[number:] if one.skill not in _LEADING_UP)
         if action.skill in _LEADING_UP and next(following, "") in _HANDLING:
             continue
-        yield " ".join([action.skill, *_values(action, request)])
+        yield " ".join([_ALIKE.get(action.skill, action.skill), *_values(action, request)])
 
 
 def _values(action: Action, request: PlanRequest) -> Iterator[str]:

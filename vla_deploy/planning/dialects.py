@@ -98,6 +98,7 @@ _PUT = _rename(
 # Each skill, what its parameters become, and the names that dialects have for it.
 _SKILL_NAMES: Final[tuple[tuple[str, ParameterMap, tuple[str, ...]], ...]] = (
     ("navigate_to", _target, ("navigate_to", "navigate", "go_to", "move_to")),
+    ("charge", _target, ("charge", "recharge", "dock")),
     ("move", _distance(1.0), ("move_forward",)),
     ("move", _distance(-1.0), ("move_backward",)),
     ("turn", _angle(1.0), ("turn_left", "rotate")),

@@ -8,6 +8,7 @@ PlanError             of vla_deploy.plans.errors, with what is wrong with a plan
 ├── Declined          ask the next back end: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 └── NotReadyToMove    reset and arm the robot first
+    └── BatteryLow    let it charge
 """
 
 from collections.abc import Sequence
@@ -63,3 +64,7 @@ class Ambiguous(PlanError):
 
 class NotReadyToMove(PlanError):
     """Say why the robot may not move now, and what to do about it."""
+
+
+class BatteryLow(NotReadyToMove):
+    """Say that the battery is too low for a plan."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from typing import Any, Protocol
 
+from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.ipc.payloads.tasks import ActionStatusName, AttemptDocument
 from vla_deploy.memory.experience import NO_EXPERIENCE, Experience
 from vla_deploy.model_servers.calls.picture import Image
@@ -79,11 +80,11 @@ class PlanRequest:
 
     `here` is the robot's x and y in metres and its yaw in radians, in the map. `experience` is what
     the robot remembers that may bear on the command. `task` is what is carried out now, in words,
-    "" for nothing; `last_actions` are those that ended last, the newest first. `battery_ratio` is
-    how full the battery is, None where it is not measured. `heard_confidence`, 0 to 1, is how sure
-    the recogniser is of the words; None for typed text. `image` (rows, columns, RGB) is what the
-    robot sees now, where a back end can use it. `failed` describes plans for this command that were
-    tried before, and what went wrong. `prohibitions` are what people have forbidden for good.
+    "" for nothing; `last_actions` are those that ended last, the newest first. `battery` is
+    None where nothing tells of it. `heard_confidence`, 0 to 1, is how sure the recogniser is of the
+    words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now, where a
+    back end can use it. `failed` describes plans for this command that were tried before, and what
+    went wrong. `prohibitions` are what people have forbidden for good.
     """
 
     command_id: str
@@ -95,11 +96,11 @@ class PlanRequest:
     experience: Experience = NO_EXPERIENCE
     task: str = ""
     last_actions: tuple[ActionNote, ...] = ()
-    battery_ratio: float | None = None
     heard_confidence: float | None = None
     image: Image | None = field(default=None, compare=False, repr=False)
     failed: tuple[str, ...] = ()
     prohibitions: tuple[Prohibition, ...] = ()
+    battery: BatteryDocument | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,6 +22,7 @@ from vla_deploy.memory.keeper import MemoryKeeper
 from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
+from vla_deploy.planning.dialogue.battery_watch import BatteryWatch
 from vla_deploy.planning.dialogue.command import (
     UserCommand,
     asks_to_stop,
@@ -77,6 +78,7 @@ class PlannerNode:
         self._wall_s = wall_s or _wall_time_of(context.clock)
         self._missions: MissionManager
         self._keeper: MemoryKeeper | None = None
+        self._battery: BatteryWatch | None = None
         self._status_due_ns = 0
         self._is_stopped = False
         self._manager: CommandManager
@@ -113,6 +115,10 @@ class PlannerNode:
             self._robot.planning.further_plans,
             self._prohibitions,
         )
+        if self._robot.battery is not None:
+            self._battery = BatteryWatch(
+                self._robot.battery, situation, self._manager, self._space, self._clock
+            )
         self._status = self._space.cell_writer(topics.PLANNER_STATUS)
         self._missions = MissionManager(
             self._manager,
@@ -141,6 +147,8 @@ class PlannerNode:
             self._note(event)
         self._manager.advance()
         self._missions.advance()
+        if self._battery is not None:
+            self._battery.step()
         if self._keeper is not None:
             self._keeper.step()
         now_ns = self._clock.now_ns()

@@ -113,6 +113,14 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             estimated_duration_s=15.0,
             retryable=True,
         ),
+        "charge": SkillSpec(
+            kind=SkillKind.NAVIGATION,
+            summary="drive to the charging station, and see that the battery charges there",
+            parameters={"place": SkillParameter(type=Type.PLACE, required=False)},
+            resources=("base", "head", "camera", "arms"),
+            estimated_duration_s=20.0,
+            retryable=True,
+        ),
         "move": SkillSpec(
             kind=SkillKind.MOVEMENT,
             summary="drive straight, forward or (negative) backward",

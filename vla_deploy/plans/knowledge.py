@@ -68,7 +68,8 @@ class World:
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
     known. `is_free` returns whether the base fits on a point of the map; None means that no map is
-    at hand. A gripper opens `opening_max_m` wide, None where that is not known.
+    at hand. A gripper opens `opening_max_m` wide, None where that is not known. The robot charges
+    at the place `station`, where it has one.
     """
 
     places: Mapping[str, str]
@@ -82,6 +83,7 @@ class World:
     opening_max_m: float | None = None
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
+    station: str = ""
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -141,4 +143,5 @@ def world_of(
         opening_max_m=max(openings_m, default=None),
         bounds=robot.planning,
         is_free=is_free,
+        station="" if robot.battery is None else robot.battery.station,
     )

@@ -9,6 +9,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+from vla_deploy.robots.battery_settings import battery_is_usable
 from vla_deploy.runtime.table_schema import TableFault, is_number
 
 Document = Mapping[str, Any]
@@ -246,6 +247,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     poses_are_reachable,
     places_are_distinct,
     ros_is_on_where_needed,
+    battery_is_usable,
 )
 
 

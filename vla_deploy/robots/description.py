@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.robots.battery_settings import BatterySettings
 from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.devices import (
     USUAL_VOICE,
@@ -134,6 +135,7 @@ class RobotDescription:
     speaker: Audio | None = None
     voice: VoiceSettings = USUAL_VOICE
     ros: RosSettings = UNUSED
+    battery: BatterySettings | None = None
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
 

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from platforms.profile_source import merged
 from vla_deploy.robots import protection_schema, schema
+from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
 from vla_deploy.robots.camera import CameraDescription
@@ -59,6 +60,7 @@ SHAPES: Mapping[str, Shape] = {
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
     "ros": ROS,
+    "battery": BATTERY,
     "limits.*": schema.LIMITS,
     "groups.*": schema.GROUP,
     "hands.*": schema.HAND,
@@ -197,6 +199,7 @@ def _build(document: Document, directory: Path, camera: CameraDescription) -> Ro
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
         ros=build(RosSettings, document.get("ros", {})),
+        battery=build(BatterySettings, document["battery"]) if "battery" in document else None,
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
         groups={
             name: build(StopGroup, {"name": name, **row})

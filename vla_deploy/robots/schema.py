@@ -40,6 +40,7 @@ ROBOT: Shape = {
     "speaker": TABLE.optional,
     "voice": TABLE.optional,
     "ros": TABLE.optional,
+    "battery": TABLE.optional,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,

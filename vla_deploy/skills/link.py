@@ -12,6 +12,7 @@ from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.motion_ids import motion_ids
 from vla_deploy.ipc.payloads.motion import ControlStatus, GoalMotion, TrajectoryMotion
 from vla_deploy.ipc.payloads.scene import HandDocument, SurfaceDocument, ThingDocument
+from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Pose2D
@@ -51,6 +52,7 @@ class SkillLink:
         self._scene = space.cell_reader(topics.SCENE)
         self._scan = space.cell_reader(topics.SCAN)
         self._control_status = space.cell_reader(topics.CONTROL_STATUS)
+        self._battery = space.cell_reader(topics.BATTERY)
         self._results_in = space.ring_reader(topics.MOTION_RESULT, from_start=False)
         self._commands = space.ring_writer(topics.MOTION_COMMAND)
         self._base = space.cell_writer(topics.BASE_COMMAND)
@@ -131,6 +133,14 @@ class SkillLink:
         if sample is None or sample.age_s(self.clock.now_ns()) > POSE_AGE_S:
             raise TryAgain("perception does not tell the robot's pose; is it running?")
         return Pose2D.of(sample.data)
+
+    @property
+    def battery(self) -> BatteryDocument | None:
+        """Return how the battery is, None where nothing tells."""
+        sample = self._battery.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > topics.BATTERY.deadline_s:
+            return None
+        return sample.document()
 
     @property
     def match_ratio(self) -> float:

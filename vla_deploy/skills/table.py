@@ -2,6 +2,7 @@
 
 from types import MappingProxyType
 
+from vla_deploy.skills.actions.charge import charge
 from vla_deploy.skills.actions.find import find_object
 from vla_deploy.skills.actions.hand_over import hand_over
 from vla_deploy.skills.actions.navigate import navigate_to
@@ -16,6 +17,7 @@ from vla_deploy.skills.movements.gaze import look_at
 SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
     {
         "navigate_to": navigate_to,
+        "charge": charge,
         "move": move,
         "turn": turn,
         "look_at": look_at,

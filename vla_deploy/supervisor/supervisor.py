@@ -122,7 +122,7 @@ class Supervisor:
             lambda: self.profile,
             self._notify,
             self.request_stop,
-            self._robot.ros,
+            self._robot,
         )
         try:
             self._wait_until_ready()
@@ -213,6 +213,8 @@ class Supervisor:
         if changed or now_ns >= self._report_due_ns:
             self._report(now_ns)
         run.activity.step(self._given_up.refusal)
+        if run.battery is not None:
+            run.battery.step()
         run.serial_workers.step(wanted=self.profile.realtime_priority > 0)
         run.notifier.step(
             ready=self._is_ready(),

@@ -24,6 +24,7 @@ def collect(link: RobotLink) -> dict[str, Any]:
         "pose": None if pose is None else pose_document(pose),
         "scene": link.document(topics.SCENE, age_limit_s=5.0),
         "speech": link.document(topics.SPEECH_STATUS, age_limit_s=2.0),
+        "battery": link.document(topics.BATTERY, topics.BATTERY.deadline_s),
         "profile": link.document(topics.PROFILE_STATUS, age_limit_s=3.0),
         "replay": link.document(topics.REPLAY_STATUS, age_limit_s=3.0),
         "dashboard_url": None if dashboard is None else dashboard["url"],

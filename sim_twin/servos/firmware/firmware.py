@@ -108,6 +108,11 @@ class Firmware:
             self._reload()
         return self._motion.advance(max(dt_s, 1e-6))
 
+    @property
+    def supply_w(self) -> float:
+        """Return what the motors drew at the last look."""
+        return self._rail.supply_w if self._powered else 0.0
+
     def couple_anew(self) -> None:
         """Take over a change of the coupling."""
         self._reactions.stale = True

@@ -19,6 +19,8 @@ class Rail:
     def __init__(self, models: Sequence[ServoDatasheet], resistance_ohm: float) -> None:
         self._resistance_ohm = resistance_ohm
         stall_a = np.array([model.stall_current_a for model in models])
+        self.supply_w = 0.0
+        """What the motors drew when the voltage was last asked for."""
         self._per_volt = np.array([1.0 / model.voltage_v for model in models])
         self._a_per_volt = stall_a * self._per_volt
         self._a_per_rad_s = np.array(
@@ -30,7 +32,9 @@ class Rail:
         back_a = float(duty.dot(velocity_rad_s * self._a_per_rad_s))
         per_volt_a = float(duty.dot(duty * self._a_per_volt))
         ohm = self._resistance_ohm
-        return min(supply_v, max(0.0, (supply_v + ohm * back_a) / (1.0 + ohm * per_volt_a)))
+        volts = min(supply_v, max(0.0, (supply_v + ohm * back_a) / (1.0 + ohm * per_volt_a)))
+        self.supply_w = supply_v * max(0.0, per_volt_a * volts - back_a)
+        return volts
 
     def nominal_ratio(self, volts: float) -> Floats:
         """Return a voltage as a share of each motor's nominal one."""

@@ -89,3 +89,20 @@ def test_isolated_processors_matter_where_control_has_its_own(
     computer.write("/sys/devices/system/cpu/isolated", isolated)
     (finding,) = power.isolated_processors(computer.context(profile))
     assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("capacity", "level", "words"),
+    [
+        ("63", FindingLevel.OK, "63 %"),
+        ("?", FindingLevel.WARN, "holds '?', expected a number"),
+        (None, FindingLevel.WARN, "no battery is in /sys/class/power_supply"),
+    ],
+)
+def test_the_batterys_gauge_is_read(computer, capacity, level, words) -> None:
+    if capacity is not None:
+        computer.write("/sys/class/power_supply/BAT0/type", "Battery")
+        computer.write("/sys/class/power_supply/BAT0/capacity", capacity)
+    (finding,) = power.battery(computer.context(robot="butler"))
+    assert finding.level is level
+    assert words in finding.measured

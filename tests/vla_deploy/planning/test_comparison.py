@@ -28,6 +28,7 @@ SAME: tuple[tuple[Steps, Steps], ...] = (
     ((KITCHEN,), (("navigate_to", {"place": "the kitchen", "yaw_rad": 1.0}), SAY)),
     ((RED, GIVE), (RED, GIVE, ("wait", {"duration_s": 2}))),
     ((SAY,), (("wait", {"duration_s": 5}),)),
+    ((("charge", {}),), (("navigate_to", {"place": "charging station"}),)),
 )
 OTHER: tuple[tuple[Steps, Steps], ...] = (
     ((RED,), (BLUE,)),

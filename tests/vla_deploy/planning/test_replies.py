@@ -9,7 +9,11 @@ from benchmarks.planner_session import PlannerSession
     ("text", "outcome", "said"),
     [
         ("good evening", "plan", "Good evening."),
-        ("How much battery do you have left?", "plan", "I cannot measure how full my battery is."),
+        (
+            "How much battery do you have left?",
+            "plan",
+            "I cannot measure how full my battery is: nothing measures it now.",
+        ),
         ("bring me my glasses", "refuse", 'the object "my glasses"; I can handle: ball, book'),
         ("put the glasses in the box", "refuse", 'the object "the glasses"; I can handle: ball'),
         ("where is my cap", "refuse", 'the object "my cap"; I can handle: ball, book'),

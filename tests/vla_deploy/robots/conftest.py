@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ import pytest
 
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.devices import Servo
+from vla_deploy.robots.loader import ROBOTS_DIR
 
 SITES = '<site name="lidar"/><site name="imu"/><site name="head_camera"/>'
 
@@ -40,3 +42,9 @@ def small(tmp_path: Path) -> Callable[..., RobotDescription]:
         return small_robot(tmp_path, inside, joints, around, **fields)
 
     return small
+
+
+@pytest.fixture
+def butler_copy(tmp_path: Path) -> Path:
+    """The robot file of a copy of Butler."""
+    return Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler")) / "robot.toml"

@@ -1,5 +1,4 @@
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -7,11 +6,6 @@ import pytest
 from vla_deploy.robots import RobotFileError, load_robot, robot_names
 from vla_deploy.robots.description import StopCategory
 from vla_deploy.robots.loader import ROBOTS_DIR
-
-
-@pytest.fixture
-def butler_copy(tmp_path: Path) -> Path:
-    return Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler")) / "robot.toml"
 
 
 def edit(file: Path, *changes: tuple[str, str]) -> Path:

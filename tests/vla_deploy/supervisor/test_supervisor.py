@@ -274,3 +274,19 @@ def start_supervisor(stage, python) -> subprocess.Popen:
     with supervisor.stdout:
         assert supervisor.stdout.readline() == "ready\n"
     return supervisor
+
+
+def test_the_batterys_gauge_is_one_of_the_devices_that_are_replaced(stage, step_until, tmp_path):
+    gauge = tmp_path / "dev/sys/class/power_supply/BAT0"
+    gauge.mkdir(parents=True)
+    for name, text in {"type": "Battery", "status": "Discharging", "capacity": "63"}.items():
+        (gauge / name).write_text(text)
+    with stage.supervisor(stage.row("a"), devices_dir=tmp_path / "dev") as supervisor:
+        supervisor.start()
+        cell = supervisor.space.cell_reader("battery")
+        assert step_until(supervisor, lambda: cell.latest() is not None)
+        told = cell.latest().document()
+        assert (told["charge_ratio"], told["is_charging"]) == (0.63, False)
+        assert (
+            "there is no /sys/class/power_supply/BAT0/voltage_now" in told["missing"]["voltage_v"]
+        )

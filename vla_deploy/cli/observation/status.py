@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.session import attach
+from vla_deploy.client.battery import battery_words
 from vla_deploy.client.place_state import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome
 from vla_deploy.telemetry.robot_state import collect
@@ -43,6 +44,7 @@ def as_text(status: dict[str, Any]) -> str:
             f"activity: {activity_words(status.get('activity'))}",
             _control(status),
             _pose(status),
+            *_battery(status),
             *_planner(status),
             _task(status),
             _speech(status),
@@ -140,6 +142,11 @@ def _pose(status: dict[str, Any]) -> str:
     if pose["state"] == "tracking":
         return where
     return f"{where}, {pose['state']}: {DOUBT_TEXT[Doubt[pose['doubt'].upper()]]}"
+
+
+def _battery(status: dict[str, Any]) -> list[str]:
+    battery = status.get("battery")
+    return [] if battery is None else [f"battery: {battery_words(battery)}"]
 
 
 def _planner(status: dict[str, Any]) -> list[str]:

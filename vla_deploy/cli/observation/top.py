@@ -23,6 +23,7 @@ from rich.text import Text
 from vla_deploy.cli.commands import add_top_command, number_within
 from vla_deploy.cli.observation.status import twin_words
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.client.battery import battery_words
 from vla_deploy.ipc import TOPICS, PulseReader
 
 DOCUMENTS: Final = (
@@ -34,6 +35,7 @@ DOCUMENTS: Final = (
     "planner_status",
     "board",
     "twin_status",
+    "battery",
 )
 AGE_LIMIT_S: Final = 3.0
 _LONGEST_S: Final = 3600.0
@@ -239,6 +241,10 @@ def _below(report: Report) -> Iterator[Text]:
     control = report["control_status"]
     for name, bus in (control["buses"] if control else {}).items():
         yield Text(f"bus {name}: {_bus_words(bus)}")
+    battery = report["battery"]
+    if battery is not None:
+        style = _BAD if battery["critical"] else _POOR if battery["low"] else ""
+        yield Text("battery: ").append(battery_words(battery), style)
     budget = report["budget"]
     if budget:
         steps = [f"{one['action']} {one['process'] or ''}" for one in budget["ladder"]["taken"]]

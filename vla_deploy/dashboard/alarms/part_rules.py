@@ -5,6 +5,7 @@ from functools import partial
 from typing import Final
 
 from drivers.twin_page import TwinPace
+from vla_deploy.client.battery import battery_words
 from vla_deploy.client.place_state import DOUBT_TEXT, Doubt
 from vla_deploy.dashboard.alarms.alarm import AlarmFinding, AlarmSeverity
 from vla_deploy.dashboard.alarms.robot_status import Document, RobotStatus
@@ -120,6 +121,34 @@ def place(robot: RobotStatus) -> Iterator[AlarmFinding]:
         unit="of the lidar's points on the map",
         age_s=robot.age_s("pose"),
     )
+
+
+def battery(robot: RobotStatus) -> Iterator[AlarmFinding]:
+    """Find a battery that is low, or whose charge nobody can tell."""
+    told = robot.document("battery")
+    if told is None:
+        return
+    finding = partial(
+        AlarmFinding, process="supervisor", field="battery", age_s=robot.age_s("battery")
+    )
+    charge, is_critical = told["charge_ratio"], told["critical"]
+    if told["low"]:
+        severity = AlarmSeverity.ERROR if is_critical else AlarmSeverity.WARNING
+        yield finding(
+            text=f"the battery is {'nearly empty' if is_critical else 'low'}: "
+            f"{battery_words(told)}",
+            severity=AlarmSeverity.INFO if told["is_charging"] else severity,
+            advice="let it charge: vla-deploy say go and charge",
+            measured=charge,
+            unit="of its capacity",
+            rise_s=0.0,
+        )
+    elif charge is None:
+        yield finding(
+            text=f"the battery's {battery_words(told)}",
+            severity=AlarmSeverity.WARNING,
+            advice="look at the gauge and at [battery] of the robot file",
+        )
 
 
 def stop_door(robot: RobotStatus) -> Iterator[AlarmFinding]:

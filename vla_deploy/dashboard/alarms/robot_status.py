@@ -22,6 +22,7 @@ DOCUMENTS: Final = frozenset(
         "planner_status",
         "stop_door_status",
         "twin_status",
+        "battery",
     }
 )
 _WINDOW_NS: Final = 5 * NS_PER_S

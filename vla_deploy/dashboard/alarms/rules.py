@@ -24,6 +24,7 @@ RULES: Final[tuple[Rule, ...]] = (
     part_rules.seeing,
     part_rules.planning,
     part_rules.place,
+    part_rules.battery,
     part_rules.stop_door,
 )
 

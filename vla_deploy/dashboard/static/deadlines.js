@@ -20,6 +20,7 @@ const DEADLINES_S = {
   activity: 4,
   profile_status: 4,
   budget: 4,
+  battery: 5,
   topics: 4,
   path: 4,
   alarms: Infinity, // told on change

@@ -33,6 +33,10 @@ class Gateway:
         """Return how control is, or None where it is silent."""
         return self.link.document(topics.CONTROL_STATUS, _STATUS_AGE_S)
 
+    def battery(self) -> Mapping[str, Any] | None:
+        """Return how the battery is, or None where nothing tells."""
+        return self.link.document(topics.BATTERY, topics.BATTERY.deadline_s)
+
 
 class GatewayPart(Protocol):
     """Do one thing for the graph; a part that is stepped or stopped for nothing inherits that."""

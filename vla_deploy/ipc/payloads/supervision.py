@@ -237,3 +237,22 @@ class ProfileStatus(TypedDict):
     target: str
     last: ConcludedRequest
     fault: str
+
+
+class BatteryDocument(TypedDict):
+    """Describe the battery; what is not known is null, and `missing` says why by its key.
+
+    `current_a` is positive into the battery. A charge that `is_estimate` was read off the voltage.
+    `low` and `critical` follow the robot file's ratios, and stay while the charge is not known.
+    """
+
+    source: Literal["power_supply", "servos"]
+    stamp_ns: int
+    voltage_v: float | None
+    charge_ratio: float | None
+    is_estimate: bool
+    current_a: float | None
+    is_charging: bool | None
+    low: bool
+    critical: bool
+    missing: dict[str, str]

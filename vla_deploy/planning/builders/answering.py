@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
+from vla_deploy.client.battery import SILENT, battery_sentences
 from vla_deploy.memory.episode import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
@@ -114,6 +115,13 @@ def _say(text: str) -> list[Skill]:
     return [("speak", {"text": text[:500]})]
 
 
+def _tell_battery(_: Fields, request: PlanRequest) -> list[Skill]:
+    """Say how full the battery is, or why that is not known."""
+    if request.battery is None:
+        return _say(f"I cannot measure how full my battery is: {SILENT}.")
+    return _say(battery_sentences(request.battery))
+
+
 def _tell_doing(_: Fields, request: PlanRequest) -> list[Skill]:
     turns = request.conversation.turns
     return _say(f"The last that I was told is: {turns[-1].said}." if turns else READY)
@@ -129,7 +137,6 @@ ANSWERS: Final[Mapping[str, Callable[[Fields, PlanRequest], list[Skill]]]] = {
     # One that may not move refuses every plan before.
     "ready": lambda _fields, _request: _say(READY),
     "thanks": lambda _fields, _request: _say("You are welcome."),
-    # No board or drive measures the charge.
-    "battery": lambda _fields, _request: _say("I cannot measure how full my battery is."),
+    "battery": _tell_battery,
 }
 """What each subject of a question is answered by."""

@@ -12,7 +12,7 @@ from typing import Final
 
 from vla_deploy.planning.builders import answering
 from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
-from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.grammar import CHARGING, Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
@@ -155,7 +155,15 @@ def _go(spoken: Steps, step: Step) -> list[Skill]:
     if where == "back" or where in _SPEAKERS:
         return [("navigate_to", {"place": "here"})]
     places = re.sub(r" with (?:it|them|that|this)$", "", spoken.spoken(step, "where"))
-    return [("navigate_to", {"place": _NEAR.sub("", one)}) for one in _parts_of(places)]
+    return [_way_to(_NEAR.sub("", one), spoken.request) for one in _parts_of(places)]
+
+
+def _way_to(place: str, request: PlanRequest) -> Skill:
+    """Return the way to a place; at the charging station the robot charges."""
+    station = request.world.station
+    if station and (place == CHARGING or match_place(place, request.world.places) == station):
+        return "charge", {}
+    return "navigate_to", {"place": place}
 
 
 def _pick(spoken: Steps, step: Step) -> list[Skill]:

@@ -15,7 +15,8 @@ COPIED_FIELDS: Final = frozenset(
     {"what", "where", "from", "to", "by", "text", "name", "except", "else"}
 )
 # What stands for words that were not said: "come here" goes to "me".
-IMPLIED: Final = ("me", "back", "charging station")
+CHARGING: Final = "charging station"
+IMPLIED: Final = ("me", "back", CHARGING)
 MOST_STEPS: Final = 6
 
 _ARMS: Final = ("left", "right")

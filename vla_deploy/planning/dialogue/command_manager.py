@@ -145,6 +145,16 @@ class CommandManager:
         """Return whether a plan is carried out, be it one of a planner that has ended since."""
         return bool(self._active) or self._situation.is_executing
 
+    @property
+    def is_at_work(self) -> bool:
+        """Return whether anything is carried out, planned or asked, or waits for its turn."""
+        return self._goes_on or self.dialogue.pending is not None
+
+    @property
+    def plans_carried_out(self) -> tuple[Plan, ...]:
+        """Return the plans that the executor has, as far as this planner knows of them."""
+        return tuple(self._active.plans.values())
+
     def _forbids(self, command: UserCommand) -> bool:
         """Return whether a command forbids something for good, which is safe at once."""
         if command.awaits_word:
@@ -489,6 +499,7 @@ class CommandManager:
         try:
             self._situation.check_ready()
             checked = self.planner.check(plan, request)
+            self._situation.check_battery(checked)
         except PlanError as error:
             self.dialogue.refuse(pending.command, error, pending.answer)
             return

@@ -129,6 +129,8 @@ class Dialogue:
                 self._situation.check_ready()
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
+            if not command.recovers:
+                self._situation.check_battery(answer.plan)
             self._events.check_length(answer.plan)
             if done.awaits_word and not command.recovers:  # the word has been said
                 self.hold(done)

@@ -11,7 +11,7 @@ from enum import StrEnum
 from itertools import zip_longest
 from typing import Any, Final
 
-from vla_deploy.planning.errors import NotReadyToMove, NotUnderstood
+from vla_deploy.planning.errors import BatteryLow, NotReadyToMove, NotUnderstood
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.plans.plan import PUT_IN, Plan
 
@@ -37,6 +37,7 @@ class Says(StrEnum):
     HEARD_BADLY = "Sorry, I did not understand that. Please say it again."
     NOT_UNDERSTOOD = "Sorry, I did not understand that."
     NOT_READY = "Sorry, I may not move now."
+    BATTERY_LOW = "Sorry, my battery is too low for that."
     REFUSED = "Sorry, I cannot do that: {reason}."
     AFTERWARDS = "I do that next."
     PAUSED = "I pause."
@@ -50,6 +51,7 @@ class Says(StrEnum):
 # What a person hears of errors whose message is for reading.
 _SPOKEN: Final[Mapping[type[PlanError], Says]] = {
     NotUnderstood: Says.NOT_UNDERSTOOD,
+    BatteryLow: Says.BATTERY_LOW,
     NotReadyToMove: Says.NOT_READY,
 }
 Parameters = Mapping[str, Any]
@@ -62,6 +64,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "find_object": lambda given: f"look for {_the(given['object'])}",
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
     "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
+    "charge": lambda given: "go and charge",
     "hand_over": lambda given: "hand it over",
     "open_gripper": lambda given: f"open my {_hand(given)}",
     "close_gripper": lambda given: f"close my {_hand(given)}",

@@ -8,6 +8,7 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace, topics
+from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.ipc.topics import P
 from vla_deploy.memory import NO_EXPERIENCE, Experience, MemoryStore, experience_of
@@ -15,12 +16,14 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.missions.criteria import Facts
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
+from vla_deploy.planning.dialogue.battery_rules import refusal_at_low
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.task_log import TaskLog
-from vla_deploy.planning.errors import NotReadyToMove
+from vla_deploy.planning.errors import BatteryLow, NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.plans.knowledge import world_of
+from vla_deploy.plans.plan import Plan
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
 from vla_deploy.world.touch import is_denied
@@ -54,6 +57,7 @@ class Situation:
         self._executor = space.cell_reader(topics.EXECUTOR_STATUS)
         self._control = space.cell_reader(topics.CONTROL_STATUS)
         self._table = space.cell_reader(topics.PROCESS_TABLE)
+        self._battery = space.cell_reader(topics.BATTERY)
         self._frames: FrameReader = space.frame_reader(topics.RGBD)
         self._log = TaskLog(space)
         self._called_up: tuple[tuple[str, str, bool], Experience] = ("", "", False), NO_EXPERIENCE
@@ -76,6 +80,7 @@ class Situation:
             scene=scene,
             here=here,
             conversation=conversation,
+            battery=self.battery(),
             heard_confidence=command.heard_confidence,
             image=self._image() if Aid.IMAGE in of_use else None,
             experience=self._experience_of(command, with_episodes=Aid.MEMORY in of_use),
@@ -138,6 +143,21 @@ class Situation:
         refusal = refusal_of(control.document() if control is not None else None)
         if refusal:
             raise NotReadyToMove(refusal)
+
+    def battery(self) -> BatteryDocument | None:
+        """Return how the battery is, None where nothing tells."""
+        sample = self._fresh(self._battery, topics.BATTERY.deadline_s)
+        return None if sample is None else sample.document()
+
+    def check_battery(self, plan: Plan) -> None:
+        """Accept a plan that the battery is full enough for.
+
+        Raises:
+            BatteryLow: it is low, and the plan does more than going to charge.
+        """
+        refusal = refusal_at_low(plan, self.battery(), self._robot.battery)
+        if refusal:
+            raise BatteryLow(refusal)
 
     def _holding(self, scene: Snapshot | None) -> Mapping[str, str | None]:
         """Return what the executor says that each hand holds, less what the fingers deny."""

@@ -63,7 +63,8 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     # --- go, turn
     ("(?:go|drive|come) back|return", "go", {"where": "back"}),
     (r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
-    (r"dock|recharge|(?:go )?charge(?: yourself)?", "go", {"where": "charging station"}),
+    (r"dock|(?:go (?:and |to )?)?(?:re)?charge(?: yourself| your battery)?|go (?:and )?dock", "go",
+     {"where": "charging station"}),
     (rf"(?:{_GO}|step) {_WAY}(?:(?: by)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
     (rf"(?:turn|rotate|spin)(?: to the)? {_SIDE}(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?",
      "turn", {}),
@@ -101,8 +102,10 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     # --- say, wait, answer
     (r"say (?P<text>[^,;:]+)|(?P<text>hello|hi|good (?:morning|evening)|goodbye|bye)", "say", {}),
     (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),
-    (r"how (?:full is your|much) battery(?: do you have(?: left)?| is left)?|"
-     r"how is your battery", "ask", {"about": "battery"}),
+    (r"how (?:full is (?:your|the)|much|low is your) battery(?: do you have(?: left)?| is left)?|"
+     r"how is your battery(?: level)?|what(?:'s| is) your battery(?: level| charge)?|"
+     r"(?:is your battery (?:full|low|empty)|are you charging)|battery (?:level|status)",
+     "ask", {"about": "battery"}),
     (r"(?:many )?thanks(?: a lot)?|thank you(?: very much)?|good (?:job|robot)", "ask",
      {"about": "thanks"}),
     (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",

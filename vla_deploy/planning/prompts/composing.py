@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
+from vla_deploy.client.battery import battery_words
 from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.interfaces import ActionNote, PlanRequest
@@ -132,7 +133,7 @@ def situation_of(request: PlanRequest) -> dict[str, Any]:
 
 def _robot(request: PlanRequest) -> dict[str, Any]:
     """Return where the robot is, in the map's frame, what it does, and how full its battery is."""
-    here, battery = request.here, request.battery_ratio
+    here, battery = request.here, request.battery
     pose = None
     if here is not None:
         x_m, y_m, yaw_rad = (round(one, 2) for one in here)
@@ -140,7 +141,7 @@ def _robot(request: PlanRequest) -> dict[str, Any]:
     return {
         "pose": pose,
         "at": plain(place_at(request)) or None,
-        "battery_ratio": NOT_MEASURED if battery is None else round(battery, 2),
+        "battery": NOT_MEASURED if battery is None else plain(battery_words(battery)),
         "task": plain(request.task, SENTENCE_CHARACTERS) or None,
     }
 

@@ -16,7 +16,7 @@ from vla_deploy.plans.plan import Action, FailureCause
 from vla_deploy.plans.symbolic.state import state_of, subject_of
 
 RECOVERY: Final = "recovery"
-BLOCKED_BY_OTHERS: Final = frozenset({"navigate_to", "move", "turn"})
+BLOCKED_BY_OTHERS: Final = frozenset({"navigate_to", "charge", "move", "turn"})
 WAIT_S: Final = 5.0
 OBJECT_PARAMETERS: Final = ("object", "destination")
 _CONFIDENCE: Final = 0.8

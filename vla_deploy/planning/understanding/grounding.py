@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.fitting import ThingUse
@@ -162,6 +163,8 @@ class _Grounder:
         match action.skill:
             case "navigate_to":
                 yield from self._navigate(given)
+            case "charge":
+                yield "charge", {"place": self._station(given.get("place"))}
             case "place":
                 yield from self._place(given)
             case "find_object" | "look_at" if isinstance(given.get("object"), str):
@@ -190,6 +193,19 @@ class _Grounder:
             return
         yield from _on_furniture(thing)
         yield "navigate_to", {"object": thing.name, **rest}
+
+    def _station(self, said: object) -> str:
+        """Return where the robot charges.
+
+        Raises:
+            NotAble: it has no place for that.
+        """
+        if isinstance(said, str):
+            return resolve_place(said, self.resolver)
+        station = self._request.world.station
+        if not station:
+            raise NotAble("I know no place where I can charge: [battery] station names it")
+        return station
 
     def _here(self, text: str) -> Parameters:
         here = self._request.here

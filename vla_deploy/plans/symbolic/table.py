@@ -135,6 +135,7 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
             },
             effect=goes,
         ),
+        "charge": Logic(needs={"area allowed": conditions.may_go_there}, effect=goes),
         "move": Logic(
             needs={
                 "area allowed": conditions.way_is_allowed,

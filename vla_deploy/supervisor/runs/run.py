@@ -14,12 +14,13 @@ from drivers.twin_page import PAGE_FILE, TIME_LINK, TimePage
 from platforms import Profile
 from platforms.power_switch import PowerSwitch
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.robots.ros_settings import RosSettings
-from vla_deploy.runtime.executors import low_priority_thread
+from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.journal import JOURNAL_SOCKET
 from vla_deploy.runtime.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
 from vla_deploy.runtime.twin_members import SUPERVISOR
 from vla_deploy.supervisor.activity_writer import ActivityWriter
+from vla_deploy.supervisor.battery import BatteryKeeper, open_battery
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.health import Health
 from vla_deploy.supervisor.processes.crash_reports import CrashReports, crash_folder
@@ -49,7 +50,7 @@ class Run:
         profile: Callable[[], Profile],
         notify: NotifyTarget,
         on_stop_signal: Callable[[], None],
-        ros: RosSettings,
+        robot: RobotDescription,
     ) -> None:
         with ExitStack() as opened:
             opened.callback(_restore_signals, _handle_stop_signals(on_stop_signal))
@@ -72,10 +73,13 @@ class Run:
                 profile, self.space, clock, self.runtime.state_dir, options.probe_root
             )
             opened.callback(self.budgets.close)
+            self.battery = self._open_battery(options, robot)
+            if self.battery is not None:
+                opened.callback(self.battery.close)
             self.switch = self._open_switch(options, profile())
             opened.callback(self.switch.close)
             self.processes = ProcessManager(
-                table, options, run_dir, self.space, clock, profile, ros
+                table, options, run_dir, self.space, clock, profile, robot.ros
             )
             opened.callback(self.processes.kill_all)
             self.report = ProcessTableWriter(run_dir.name, options, self.space, clock)
@@ -89,6 +93,15 @@ class Run:
     def close(self) -> None:
         """End the children that are left, keep the logs, remove the run, restore the signals."""
         self._opened.close()
+
+    def _open_battery(self, options: RunOptions, robot: RobotDescription) -> BatteryKeeper | None:
+        if robot.battery is None:
+            return None
+        root, executor = options.probe_root, low_priority_thread(self.clock)
+        if options.takes_devices:  # the twin's gauge: plain files, not those of this computer
+            root = options.devices_dir or self.runtime.run_dir / "dev"
+            executor = InlineExecutor()
+        return open_battery(robot.battery, self.space, self.clock, root, executor)
 
     def _open_switch(self, options: RunOptions, profile: Profile) -> ProfileSwitch:
         power, executor = PowerSwitch(), low_priority_thread(self.clock)

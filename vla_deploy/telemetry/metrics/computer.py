@@ -6,6 +6,7 @@ from vla_deploy.telemetry.metrics.metric import Metric
 from vla_deploy.telemetry.metrics.paths import PathStep, among, at, each, keys, path
 
 TOPIC: Final = "board"
+BATTERY_TOPIC: Final = "battery"
 _PRESSURES: Final = {name: f"psi_{name}_ratio" for name in ("cpu", "memory", "io")}
 
 
@@ -18,6 +19,44 @@ def _family(name: str, text: str, step: PathStep) -> Metric:
     """Declare readings that differ in a label."""
     return Metric(f"vla_{name}", text, path(keys("readings"), step), topic=TOPIC)
 
+
+BATTERY: Final[tuple[Metric, ...]] = (
+    Metric(
+        "vla_battery_charge_ratio",
+        "How full the battery is.",
+        at("charge_ratio"),
+        topic=BATTERY_TOPIC,
+        kept=True,
+    ),
+    Metric(
+        "vla_battery_voltage_volts",
+        "Voltage of the battery.",
+        at("voltage_v"),
+        topic=BATTERY_TOPIC,
+        kept=True,
+    ),
+    Metric(
+        "vla_battery_current_amperes",
+        "Current into the battery; negative while it is drained.",
+        at("current_a"),
+        topic=BATTERY_TOPIC,
+    ),
+    Metric(
+        "vla_battery_charging",
+        "1 while the battery charges.",
+        at("is_charging"),
+        topic=BATTERY_TOPIC,
+    ),
+    *(
+        Metric(
+            f"vla_battery_{level}",
+            f"1 while the battery is {level}, by the robot file.",
+            at(level),
+            topic=BATTERY_TOPIC,
+        )
+        for level in ("low", "critical")
+    ),
+)
 
 METRICS: Final[tuple[Metric, ...]] = (
     _gauge("cpu_used_ratio", "Share of all cores that is busy.", reading="cpu_ratio", kept=True),

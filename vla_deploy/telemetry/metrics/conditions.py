@@ -159,6 +159,14 @@ CONDITIONS: Final[tuple[AlertCondition, ...]] = (
         per_s=60,
     ),
     AlertCondition(
+        *("VlaBatteryLow", _WARNING, "vla_battery_low"),
+        *("The battery is low.", "Let it charge: vla-deploy say go and charge"),
+    ),
+    AlertCondition(
+        *("VlaBatteryCritical", _CRITICAL, "vla_battery_critical"),
+        *("The battery is nearly empty.", "Let it charge: vla-deploy say go and charge"),
+    ),
+    AlertCondition(
         *("VlaDiskNearlyFull", _WARNING, "vla_disk_free_ratio"),
         "A disk that the robot writes to is nearly full.",
         "Make room; the robot's own logs and recordings are bounded",

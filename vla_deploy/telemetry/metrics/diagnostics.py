@@ -25,6 +25,7 @@ _GROUPS: Final[tuple[tuple[tuple[str, ...], str], ...]] = (
     (("vla_place_",), "Place"),
     (("vla_flight_recorder_",), "Flight recorder"),
     (("vla_twin_",), "Twin"),
+    (("vla_battery_",), "Battery"),
     (("vla_budget_", "vla_ladder_", "vla_memory_peak"), "Budgets"),
     (("vla_dashboard_", "vla_metrics_", "vla_build_", "vla_robot_"), "Dashboard"),
 )

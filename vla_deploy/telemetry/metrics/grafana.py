@@ -29,6 +29,7 @@ _ROWS: Final[tuple[tuple[str, tuple[Metric, ...]], ...]] = (
     ("Control", control.TICKS),
     ("Processes and budgets", processes.METRICS),
     ("Computer", computer.METRICS),
+    ("Battery", computer.BATTERY),
     ("Buses", control.BUSES),
     ("Joints and base", control.JOINTS),
     ("Planning", model_metrics.PLANNING),

@@ -77,6 +77,7 @@ METRICS: Final[tuple[Metric, ...]] = (
     *control.METRICS,
     *processes.METRICS,
     *computer.METRICS,
+    *computer.BATTERY,
     *model_metrics.METRICS,
     *FLOW,
 )

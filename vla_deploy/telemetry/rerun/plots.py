@@ -25,6 +25,7 @@ DOCUMENT_NUMBERS: Final[Mapping[str, tuple[str, ...]]] = {
         "joints.voltage_v",
     ),
     "twin_status": ("real_time_factor",),
+    "battery": ("charge_ratio", "voltage_v", "current_a"),
 }
 """The numbers of documents that are plotted, by topic, where a document has them."""
 

@@ -45,6 +45,16 @@ def told() -> dict[str, Any]:
         "planner_status": {"commands": [], "question": None},
         "board": None,
         "twin_status": {"pace": "real", "real_time_factor": 0.6, "held_by": "perception"},
+        "battery": {
+            "charge_ratio": 0.2,
+            "voltage_v": 11.4,
+            "current_a": None,
+            "is_charging": None,
+            "is_estimate": True,
+            "low": True,
+            "critical": False,
+            "missing": {},
+        },
         "topics": 12,
         "late_topics": [{"topic": "scan", "age_s": 3.0, "deadline_s": 0.5}],
     }
@@ -63,6 +73,7 @@ def test_the_screen_fits_and_says_what_matters_without_colour(told: dict[str, An
         "250 Hz, 5 of 1000 ticks late (0.50 %)",
         "bus servos: answers p99 3.0 ms, timeouts 2",
         "late: scan 3.0 s",
+        "battery: 20 % (estimated), 11.4 V, low",
     ):
         assert words in text
 

@@ -326,3 +326,29 @@ def test_every_finding_says_what_to_try():
         for finding in Words(case).findings():
             assert finding.advice
             assert finding.text
+
+
+BATTERY = {
+    "charge_ratio": 0.2, "voltage_v": 25.0, "current_a": -1.0, "is_charging": False,
+    "is_estimate": False, "low": True, "critical": False, "missing": {},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "severity", "text"),
+    [
+        ({}, AlarmSeverity.WARNING, "the battery is low: 20 %, 25.0 V, -1.0 A, low"),
+        ({"critical": True}, AlarmSeverity.ERROR, "the battery is nearly empty: 20 %"),
+        ({"is_charging": True}, AlarmSeverity.INFO, "the battery is low: 20 %"),
+        ({"low": False, "charge_ratio": None, "missing": {"charge_ratio": "no gauge"}},
+         AlarmSeverity.WARNING, "the battery's charge unknown (no gauge)"),
+    ],
+)  # fmt: skip
+def test_a_battery_that_is_low_or_that_nobody_can_judge_is_told(words, changes, severity, text):
+    words.documents["battery"] = {**BATTERY, **changes}
+    words.ages_s["battery"] = 1.0
+    found = words.only()
+    assert found.severity is severity
+    assert text in found.text
+    words.documents["battery"] = {**BATTERY, "low": False}
+    assert words.findings() == []

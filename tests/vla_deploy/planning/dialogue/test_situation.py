@@ -27,7 +27,7 @@ def test_a_back_end_is_told_the_task_and_how_the_last_actions_ended(
     assert (ended.skill, ended.status, ended.error) == (
         "navigate_to", "aborted", "the way is blocked",
     )  # fmt: skip
-    assert request.battery_ratio is None
+    assert request.battery is None
     desk.executor_is("idle", left=None, right=None)
     desk.answers_to("sing another one")
     assert listening.asked[-1].task == ""

@@ -166,7 +166,7 @@ def test_the_context_says_how_the_robot_is_and_what_it_may_not_do(ask):
     assert situation["robot"] == {
         "pose": {"x_m": 0.25, "y_m": -0.5, "yaw_rad": 1.57},
         "at": place_at(request) or None,
-        "battery_ratio": "not measured",
+        "battery": "not measured",
         "task": "tidy up: place",
     }
     assert situation["last_actions"] == 5 * [
@@ -174,9 +174,12 @@ def test_the_context_says_how_the_robot_is_and_what_it_may_not_do(ask):
     ]
     assert situation["forbidden"] == ["touch the keys"]
     assert situation["hands"] == {"left": "ball", "right": None}
-    lost = ask("go", here=None, battery_ratio=0.666)
+    gauge = {"charge_ratio": 0.66, "voltage_v": 11.4, "current_a": None, "is_estimate": True,
+             "is_charging": False, "low": False, "critical": False}  # fmt: skip
+    lost = ask("go", here=None, battery=gauge)
     robot = parts(chat_for(lost, "butler"))[0]["robot"]
-    assert robot == {"pose": None, "at": None, "battery_ratio": 0.67, "task": None}
+    assert robot["battery"] == "66 % (estimated), 11.4 V"
+    assert (robot["pose"], robot["at"], robot["task"]) == (None, None, None)
 
 
 def test_the_place_is_the_known_one_that_the_robot_stands_at(ask):

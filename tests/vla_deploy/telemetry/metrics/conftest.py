@@ -145,6 +145,15 @@ DOCUMENTS: dict[str, dict[str, Any]] = {
     },
     "recorder_status": {"writing": False, "held_bytes": 1000},
     "twin_status": {"real_time_factor": 0.99},
+    "battery": {
+        "charge_ratio": 0.63,
+        "voltage_v": 25.9,
+        "current_a": -2.1,
+        "is_charging": False,
+        "low": False,
+        "critical": False,
+        "missing": {},
+    },
 }
 
 

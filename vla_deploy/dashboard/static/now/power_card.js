@@ -1,6 +1,6 @@
 /** Show supply, power and heat, as far as they are known; what is not known says why. */
 
-import { number, words } from "../format.js";
+import { number, percent, words } from "../format.js";
 import { useTopic } from "../following.js";
 import { Bar, Card, Empty, More } from "../parts.js";
 import { html } from "../ui.js";
@@ -23,10 +23,30 @@ export function PowerCard() {
     <${Card} title="Power and load" stale=${stale} age_s=${age_s} actions=${html`<${More} href="#/budgets">Budgets<//>`}>
       ${rows.length === 0 && html`<${Empty}>The supervisor tells nothing yet.<//>`}
       <div class="loads">
+        <${Battery} />
         <${Supply} joints=${joints} />
         ${rows.map((row) => html`<${Load} key=${row.metric} row=${row} />`)}
       </div>
       ${data?.hint && html`<p class="quiet small">${data.hint}</p>`}
+    <//>
+  `;
+}
+
+function Battery() {
+  const { data, stale } = useTopic("battery");
+  if (!data) return null;
+  if (stale) return html`<${Reading} name="Battery" value="unknown" note="nothing measures it now" tone="warn" />`;
+  const tone = data.critical ? "bad" : data.low ? "warn" : undefined;
+  const note = [
+    data.is_charging && "charging",
+    data.is_estimate && "estimated",
+    Number.isFinite(data.voltage_v) && `${number(data.voltage_v, 1)} V`,
+    Number.isFinite(data.current_a) && `${number(data.current_a, 1)} A`,
+    data.charge_ratio === null && data.missing.charge_ratio,
+  ].filter(Boolean);
+  return html`
+    <${Reading} name="Battery" value=${data.charge_ratio === null ? "unknown" : percent(data.charge_ratio)} note=${note.join(", ")} tone=${tone}>
+      ${data.charge_ratio !== null && html`<${Bar} name="Battery" ratio=${data.charge_ratio} tone=${tone} />`}
     <//>
   `;
 }

@@ -104,8 +104,13 @@ class ContextTopics(GatewayPart):
             "location": place or "unknown",
             "gripper_state": "closed" if held else "open",
             "held_object": held[0] if held else None,
-            "battery": None,
+            "battery": self._battery_percent(),
         }
+
+    def _battery_percent(self) -> float | None:
+        """Return the charge in per cent, as planning nodes read it; None where it is not known."""
+        charge = (self._gateway.battery() or {}).get("charge_ratio")
+        return None if charge is None else round(100.0 * float(charge), 1)
 
     def _robot_state(self) -> dict[str, Any]:
         gateway, commands = self._gateway, self._gateway.commands
@@ -117,7 +122,7 @@ class ContextTopics(GatewayPart):
             "orientation": orientation,
             "detected_objects": [described(one) for one in latest_last(scene.get("objects", ()))],
             "available_tools": [hand.gripper for hand in hands],
-            "battery_level": None,
+            "battery_level": self._battery_percent(),
             "current_task": commands.current.text,
             "recent_actions": [self._recent(one) for one in commands.recent],
             **self._brief(),

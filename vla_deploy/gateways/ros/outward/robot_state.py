@@ -27,6 +27,7 @@ _EXECUTOR_AGE_S: Final = 1.0
 _POSE_AGE_S: Final = 0.5
 _PLACES: Final = ("tracking", "unsure", "lost")
 _UNMEASURED: Final = math.nan
+_FULL: Final = 0.99
 _NOT_MEASURED: Final = (
     *("temperature", "current", "charge", "capacity", "design_capacity", "percentage"),
 )
@@ -71,6 +72,7 @@ class StateTopic(GatewayPart):
     ) -> RobotState:
         gateway, known = self._gateway, control or {}
         pose = gateway.link.fresh(topics.POSE, _POSE_AGE_S)
+        charge = (gateway.battery() or {}).get("charge_ratio")
         return RobotState(
             stamp=gateway.time.now(),
             robot=gateway.robot.name,
@@ -84,7 +86,7 @@ class StateTopic(GatewayPart):
             command_id=str(executor.get("command_id") or ""),
             action_id=str(executor.get("action_id") or ""),
             skill=str(executor.get("skill") or ""),
-            battery_ratio=_UNMEASURED,  # no board or drive of ours measures a charge
+            battery_ratio=_UNMEASURED if charge is None else float(charge),
             localisation="" if pose is None else _PLACES[min(int(pose.data["state"]), 2)],
         )
 
@@ -97,7 +99,7 @@ def _what_changes(control: Mapping[str, Any], executor: Mapping[str, Any]) -> tu
 
 
 class SupplyTopic(GatewayPart):
-    """Publish /battery_state where the servos measure their supply; nobody measures its charge."""
+    """Publish /battery_state: the battery, or where none is declared the supply of the servos."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
@@ -108,11 +110,25 @@ class SupplyTopic(GatewayPart):
         """Publish what is due."""
         if not self._due.is_now(now_ns):
             return
+        battery = self._gateway.battery()
+        if battery is not None:
+            self._battery.publish(self._message_of(battery))
+        if self._gateway.robot.battery is not None:
+            return
         control = self._gateway.control_status() or {}
         measured = control.get("joints", {}).get("voltage_v", ())
         volts = [float(one) for one in measured if one is not None]
         if volts:
             self._battery.publish(self._message(statistics.median(volts)))
+
+    def _message_of(self, battery: Mapping[str, Any]) -> BatteryState:
+        """Return the battery as it is measured; what is not, is NaN. A current out is negative."""
+        message = self._message(_or_nan(battery["voltage_v"]))
+        message.current = _or_nan(battery["current_a"])
+        message.percentage = _or_nan(battery["charge_ratio"])
+        message.power_supply_status = _status_of(battery)
+        message.location = f"battery, by {battery['source']}"
+        return message
 
     def _message(self, volts: float) -> BatteryState:
         message = BatteryState(
@@ -126,6 +142,21 @@ class SupplyTopic(GatewayPart):
         )
         message.header.stamp = self._gateway.time.now()
         return message
+
+
+def _or_nan(value: float | None) -> float:
+    return _UNMEASURED if value is None else float(value)
+
+
+def _status_of(battery: Mapping[str, Any]) -> int:
+    charging, charge = battery["is_charging"], battery["charge_ratio"]
+    if charging is None:
+        return int(BatteryState.POWER_SUPPLY_STATUS_UNKNOWN)
+    if charging:
+        return int(BatteryState.POWER_SUPPLY_STATUS_CHARGING)
+    if charge is not None and charge >= _FULL and not (battery["current_a"] or 0.0) < 0.0:
+        return int(BatteryState.POWER_SUPPLY_STATUS_FULL)
+    return int(BatteryState.POWER_SUPPLY_STATUS_DISCHARGING)
 
 
 class HealthTopic(GatewayPart):
