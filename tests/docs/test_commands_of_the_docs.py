@@ -17,7 +17,9 @@ PAGES = (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob
 # What may stand before a command in a line: a prompt, another user, a variable, a folder.
 BEFORE = r"(?:\$ |sudo (?:-u \S+ )?|[A-Z_]+=\S+ |[\w./-]*/)*"
 LINE = re.compile(rf"^\s*{BEFORE}(?:vla-deploy|\$vla) +(?P<words>.*)")
-BEHIND = re.compile(r" {2,}.*| #.*| [|>&] .*| &$|;.*")
+BEHIND = re.compile(
+    r' {2,}.*| #.*| [|>&] .*| &$|;(?=(?:[^"]*"[^"]*")*[^"]*$).*'
+)  # not within quotes
 FENCED = r"^```(?P<language>.*)\n(?P<fenced>[\s\S]*?)^```"
 BLOCK = re.compile(rf"{FENCED}|(?P<indented>(?:^ {{4}}.*\n)+)", re.M)
 INLINE = re.compile(rf"`{BEFORE}vla-deploy +([^`]*)`")

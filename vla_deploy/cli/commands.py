@@ -65,14 +65,14 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "disarm": CommandEntry("operation.operate", "take power off the joints"),
     "stop": CommandEntry("operation.operate", "stop what the robot does; it stays ready"),
-    "mission": CommandEntry(
-        "operation.mission", "give a mission of several objectives, and see how far it is"
-    ),
     "pause": CommandEntry("operation.operate", "have the robot come to rest where it is"),
     "resume": CommandEntry("operation.operate", "have the robot go on with what was paused"),
     "shutdown": CommandEntry(
         "operation.operate",
         "end the run in order, as Ctrl-C does; power goes off, so support the arms",
+    ),
+    "mission": CommandEntry(
+        "operation.mission", "give a mission of several objectives, and see how far it is"
     ),
     "joint": CommandEntry("operation.joint", "show where the joints are, and move one of them"),
     "profile": CommandEntry("maintenance.profile", "choose how the stack uses this computer"),

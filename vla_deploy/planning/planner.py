@@ -13,7 +13,6 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.payloads.tasks import BackEndsStatus
 from vla_deploy.planning.comparison import move_the_same
-from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Ambiguous, Declined, NotUnderstood
 from vla_deploy.planning.interfaces import (
     Aid,
@@ -29,6 +28,7 @@ from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.prohibitions import held_to
 from vla_deploy.planning.scope import guarded, moves_anything, scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
+from vla_deploy.plans.dialects import Json, parse_plan
 from vla_deploy.plans.errors import PlanError, PlanInvalid
 from vla_deploy.plans.plan import Plan
 from vla_deploy.plans.validator import check_plan

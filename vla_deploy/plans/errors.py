@@ -11,9 +11,16 @@ PlanError
 
 from collections.abc import Iterable, Sequence
 
+from vla_deploy.runtime.one_line import one_line
+
 
 class PlanError(Exception):
-    """Base of every refusal to make or to carry out a plan."""
+    """Base of every refusal to make or to carry out a plan.
+
+    `action_id` is the action of the plan that it is about, "" where it is about no single one.
+    """
+
+    action_id = ""
 
 
 class UnknownPlace(PlanError):
@@ -44,8 +51,12 @@ class DependsOnView(UnknownObject):
 
 
 class PlanInvalid(PlanError):
-    """Say everything that is wrong with a plan, in one line."""
+    """Say everything that is wrong with a plan, in one line.
 
-    def __init__(self, faults: Sequence[str]) -> None:
-        self.faults = tuple(faults)
-        super().__init__("the plan was refused: " + "; ".join(self.faults))
+    `dependency_faults` are those of `faults` that are about the order of its actions.
+    """
+
+    def __init__(self, faults: Sequence[str], dependency_faults: Sequence[str] = ()) -> None:
+        self.faults = (*faults, *dependency_faults)
+        self.dependency_faults = tuple(dependency_faults)
+        super().__init__(one_line("the plan was refused: " + "; ".join(self.faults)))

@@ -77,6 +77,7 @@ class Plan(BaseModel):
     """Answer one command with actions, or say why it is not feasible.
 
     The planner fills in `keeps_out`: the places that nothing may enter while it is carried out.
+    `notes` say what its author wrote in another dialect that is not used as it was written.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -89,6 +90,7 @@ class Plan(BaseModel):
     safety_concerns: tuple[str, ...] = ()
     success_criteria: tuple[str, ...] = ()
     keeps_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     options: ExecutionOptions = ExecutionOptions()
 
 

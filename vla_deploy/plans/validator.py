@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
-from vla_deploy.plans.errors import PlanInvalid, UnknownObject
+from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownObject
 from vla_deploy.plans.knowledge import World, match_place, parse_object
 from vla_deploy.plans.plan import Action, Plan, dependency_faults
 from vla_deploy.plans.symbolic.simulation import (
@@ -25,13 +25,23 @@ def check_plan(
     Raises:
         PlanInvalid: carries all faults.
     """
-    faults = _form_faults(plan, world)
-    if not faults:
+    faults, order = _form_faults(plan, world), dependency_faults(plan.actions)
+    if not faults and not order:
         # A plan whose actions are all right one by one is gone through symbol by symbol.
         faults = bounds_faults(plan.actions, world)
         faults += symbolic_faults(plan.actions, world, scene, here)
-    if faults:
-        raise PlanInvalid(faults)
+    if faults or order:
+        raise PlanInvalid(faults, order)
+
+
+def refusal_document(error: PlanError) -> dict[str, list[str]]:
+    """Return why a plan was refused, for JSON: faults of its actions, and of their order."""
+    order = error.dependency_faults if isinstance(error, PlanInvalid) else ()
+    faults = error.faults if isinstance(error, PlanInvalid) else (str(error),)
+    return {
+        "validation_errors": [one for one in faults if one not in order],
+        "dependency_errors": list(order),
+    }
 
 
 def _form_faults(plan: Plan, world: World) -> list[str]:
@@ -44,7 +54,7 @@ def _form_faults(plan: Plan, world: World) -> list[str]:
         faults.append("it has no actions")
     for action in plan.actions:
         faults += [f'action "{action.id}": {fault}' for fault in action_faults(action, world)]
-    return faults + dependency_faults(plan.actions)
+    return faults
 
 
 def action_faults(action: Action, world: World) -> list[str]:

@@ -159,6 +159,10 @@ HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}
 PLACE: Shape = {**FLOOR_POSE, "aliases": TEXTS, "viewpoints": TABLES}
 ZONE: Shape = {"name": TEXT, "reason": TEXT, "polygon_m": POLYGON}
+MAP_BOUNDS = ValueCheck(
+    expected="the least x and y and the most x and y in m, such as [-10.0, -10.0, 10.0, 10.0]",
+    holds=lambda value: numbers(4).holds(value) and value[0] < value[2] and value[1] < value[3],
+)
 PLANNING: Shape = {
     "payload_kg": POSITIVE.optional,
     "max_actions": integer(1, 100).optional,
@@ -166,4 +170,5 @@ PLANNING: Shape = {
     "require_confirmation": one_of("never", "risky", "always").optional,
     "further_plans": integer(0, 20).optional,
     "action_timeout_s": POSITIVE.optional,
+    "map_bounds_m": MAP_BOUNDS.optional,
 }

@@ -113,6 +113,7 @@ def test_each_fault_alone_is_reported_too(
         ((r"^\[can_bus\]", "[can_bus_2]"), "can_bus", "a table"),
         ((r"^payload_kg = 0.6", "payload_kg = 0"), "planning.payload_kg", "above 0"),
         ((r"^max_actions = 60", "max_actions = 500"), "planning.max_actions", "in 1..100"),
+        ((r"^map_bounds_m = \[-10.0", "map_bounds_m = [20.0"), "planning.map_bounds_m", "least x"),
         ((r'^require_confirmation = "risky"', 'require_confirmation = "no"'),
          "planning.require_confirmation", "never, risky, always"),
         ((r"node_id = 1,", "node_id = 0,"), "can_bus.drives[0].node_id",

@@ -134,7 +134,15 @@ def read_scene(path: Path) -> Snapshot:
         UsageError: it cannot be read, or is no JSON.
         SceneUnreadable: it is no scene.
     """
-    document = read_json(path, "scene")
+    return snapshot_of(read_json(path, "scene"))
+
+
+def snapshot_of(document: Any) -> Snapshot:
+    """Return the scene of either document.
+
+    Raises:
+        SceneUnreadable: it is no scene.
+    """
     if isinstance(document, dict) and "things" in document:
         return read_report(document)
     return read_snapshot(document)

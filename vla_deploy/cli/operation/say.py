@@ -174,7 +174,8 @@ def _plan_line(event: PlanEvent) -> str:
     steps = "; ".join(action_words(one["skill"], one["parameters"]) for one in actions)
     back_end = event.get("rung", "")
     by = "" if back_end in ("", "patterns", "given") else f"  (by {back_end})"
-    return f"plan: {steps}{by}"
+    notes = [f"\n  note: {one}" for one in event["plan"].get("notes", ())]
+    return f"plan: {steps}{by}" + "".join(notes)
 
 
 def _action_line(event: ActionEvent) -> str:
@@ -198,3 +199,5 @@ def read_json(path: Path, what: str) -> Any:
         raise UsageError(f"cannot read the {what} {path}: {error.strerror}") from error
     except ValueError as error:
         raise UsageError(f"the {what} {path} is no JSON: {error}") from error
+    except RecursionError:
+        raise UsageError(f"the {what} {path} is no JSON: it is nested too deeply") from None

@@ -5,9 +5,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
-from vla_deploy.planning.dialects import PLAN_LISTS, parse_plan
 from vla_deploy.planning.prompts.composing import plain
 from vla_deploy.plans.catalogue import SKILLS, SkillParameter, SkillSpec, Type
+from vla_deploy.plans.dialects import LISTS, parse_plan
 from vla_deploy.plans.plan import MOST_ACTIONS, Plan
 
 _REASON_CHARACTERS: Final = 400
@@ -41,9 +41,7 @@ class PlanAnswer(BaseModel):
         inner = document.get("plan")
         if isinstance(inner, Mapping):
             document = {**document, **inner}
-        found = next(
-            (document[key] for key in PLAN_LISTS if isinstance(document.get(key), list)), None
-        )
+        found = next((document[key] for key in LISTS if isinstance(document.get(key), list)), None)
         return document if found is None else {**document, "steps": found}
 
     def plan(self, goal: str) -> Plan:

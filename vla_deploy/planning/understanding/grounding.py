@@ -24,7 +24,7 @@ from vla_deploy.planning.understanding.places import (
 from vla_deploy.planning.understanding.remembered import hand_to_take, place_to_look
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.plans.catalogue import SKILLS
-from vla_deploy.plans.errors import PlanInvalid, UnknownPlace
+from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownPlace
 from vla_deploy.plans.plan import (
     MOST_ACTIONS,
     PUT_IN,
@@ -65,10 +65,14 @@ def ground_plan(plan: Plan, request: PlanRequest) -> Plan:
     """
     faults = dependency_faults(plan.actions)
     if faults:
-        raise PlanInvalid(faults)
+        raise PlanInvalid([], faults)
     grounder = _Grounder(request)
     for action in execution_order(plan.actions):
-        grounder.add(action)
+        try:
+            grounder.add(action)
+        except PlanError as error:
+            error.action_id = action.id
+            raise
     if len(grounder.done) > MOST_ACTIONS:
         raise PlanInvalid([f"it would need {len(grounder.done)} actions, {MOST_ACTIONS} at most"])
     texts = (plan.reasoning, *dict.fromkeys(grounder.resolver.reasons))

@@ -198,17 +198,24 @@ def may_go_there(state: SymbolicState, setting: Setting) -> Answer:
     world = setting.world
     place, subject = setting.place("place"), setting.subject("object")
     if subject is not None and subject.thing is not None:
-        return _refusal(_zone_around(subject.thing.position_m, world), f"the {subject.words}")
+        what, thing = f"the {subject.words}", subject.thing
+        return _outside(thing.xy_m, what, world) or _refusal(
+            _zone_around(thing.position_m, world), what
+        )
     if place is not None and place in world.sites:
         pose = world.sites[place].pose
-        return _refusal(_zone_at((pose.x_m, pose.y_m), world), f"the {place}")
+        spot = (pose.x_m, pose.y_m)
+        return _outside(spot, f"the {place}", world) or _refusal(
+            _zone_at(spot, world), f"the {place}"
+        )
     if "x_m" in setting.parameters and "y_m" in setting.parameters:
         return _may_stand(float(setting.parameters["x_m"]), float(setting.parameters["y_m"]), world)
     return None
 
 
 def _may_stand(x_m: float, y_m: float, world: World) -> Answer:
-    refusal = _refusal(_zone_at((x_m, y_m), world), f"the point {x_m:g}, {y_m:g} m")
+    what = f"the point {x_m:g}, {y_m:g} m"
+    refusal = _outside((x_m, y_m), what, world) or _refusal(_zone_at((x_m, y_m), world), what)
     if refusal:
         return refusal
     if world.is_free is not None and not world.is_free(x_m, y_m):
@@ -223,11 +230,24 @@ def way_is_allowed(state: SymbolicState, setting: Setting) -> Answer:
     x_m, y_m, yaw_rad = state.pose
     way_m = float(setting.parameters["distance_m"])
     end = (x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad))
-    refusal = _refusal(_zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
+    what = f"the way of {way_m:g} m"
+    refusal = _outside(end, what, setting.world) or _refusal(
+        _zone_on_way((x_m, y_m), end, setting.world), what
+    )
     if refusal or setting.world.is_free is None or abs(way_m) < SMALL_MOVE_M:
         return refusal
     free_m = _blocked_on_way((x_m, y_m), end, setting.world.is_free)
     return MET if free_m is None else f"{way_m:g} m asked, the map shows {free_m:.1f} m of room"
+
+
+def _outside(spot: Point, what: str, world: World) -> Answer:
+    if world.bounds.holds(*spot):
+        return MET
+    low_x, low_y, high_x, high_y = world.bounds.map_bounds_m
+    return (
+        f"{what} is outside of x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m, the "
+        "map_bounds_m in force"
+    )
 
 
 def _refusal(zone: KeepOutZone | None, what: str) -> Answer:

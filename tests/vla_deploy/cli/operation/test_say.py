@@ -67,6 +67,10 @@ def action(status: str, error: str | None = None) -> dict:
             "plan: pick up red cup  (by server bench)",
         ),
         (
+            {"event": "plan", "plan": {"actions": [PICK], "notes": ["a1: force 3: not used"]}},
+            "plan: pick up red cup\n  note: a1: force 3: not used",
+        ),
+        (
             {"event": "planning", "rungs": ["parser", "server bench"]},
             "asking parser, server bench ...",
         ),
@@ -86,7 +90,7 @@ def action(status: str, error: str | None = None) -> dict:
         ({"event": "finished", "success": False, "error": "no way"}, "failed: no way"),
     ],
 )
-def test_every_event_is_told_in_one_line_or_not_at_all(event, line):
+def test_every_event_is_told_briefly_or_not_at_all(event, line):
     assert line_of(event) == line
 
 

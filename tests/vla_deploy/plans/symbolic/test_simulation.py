@@ -209,6 +209,23 @@ def test_what_lies_deep_in_a_zone_is_out_of_bounds(butler: World) -> None:
     assert "the cup_1 is in the pet_corner" in found[0]
 
 
+@pytest.mark.parametrize(
+    ("step", "what"),
+    [
+        (("navigate_to", {"x_m": 4.1, "y_m": 2.0}), "the point 4.1, 2 m"),
+        (("navigate_to", {"place": "kitchen"}), "the kitchen"),
+        (("navigate_to", {"object": "box_1"}), "the box_1"),
+        (("move", {"distance_m": 2.5}), "the way of 2.5 m"),
+    ],
+)
+def test_beyond_the_bounds_of_the_map_the_robot_is_not_sent(
+    butler: World, step: tuple[str, dict[str, Any]], what: str
+) -> None:
+    bounds = replace(butler.bounds, map_bounds_m=(0.0, 0.0, 4.0, 4.0))
+    found = symbolic_faults(chain(step), replace(butler, bounds=bounds), seen(BOX), HERE)
+    assert [f"{what} is outside of x 0 to 4 m, y 0 to 4 m" in one for one in found] == [True]
+
+
 def test_hands_of_which_nobody_knows_are_not_judged(butler: World) -> None:
     dark = replace(butler, holding={})
     assert symbolic_faults(chain(("place", INTO_BOX)), dark) == []
