@@ -87,7 +87,7 @@ class MemoryKeeper:
         for event in self._events.drain():
             self._follow(event.payload)
         for said in heard:  # once it is known what has ended by now
-            self._judge(read_judgement(str(said.payload.get("text") or "")))
+            self._judge(said.payload)
         now_ns = self._clock.now_ns()
         if now_ns >= self._look_due_ns:
             self._look_due_ns = now_ns + LOOK_EVERY_NS
@@ -145,9 +145,11 @@ class MemoryKeeper:
         self._ended.append(self._last)
         del self._ended[:-_MOST_KEPT]
 
-    def _judge(self, judgement: Judgement | None) -> None:
-        """Let a person correct what came of the command that ended last."""
-        if judgement is not None and self._last is not None:
+    def _judge(self, told: Utterance) -> None:
+        """Let a person correct what came of the command that ended last, if surely understood."""
+        judgement = read_judgement(str(told.get("text") or ""))
+        is_doubted = told.get("heard", {}).get("doubted", False)
+        if judgement is not None and self._last is not None and not is_doubted:
             self._judged.append((self._last, judgement))
             del self._judged[:-_MOST_KEPT]
 

@@ -48,8 +48,8 @@ class Desk:
             wall_s=lambda: 1000.0 + self.clock.ns / NS_PER_S,
         )
 
-    def say(self, text: str, command_id: str = "c1") -> None:
-        self._utterances.publish({"command_id": command_id, "text": text, "source": "cli"})
+    def say(self, text: str, command_id: str = "c1", **more: Any) -> None:
+        self._utterances.publish({"command_id": command_id, "text": text, "source": "cli"} | more)
 
     def tell(self, event: str, command_id: str = "c1", **details: Any) -> None:
         self._events.publish({"command_id": command_id, "event": event} | details)
@@ -257,7 +257,8 @@ def test_that_was_wrong_is_about_the_command_that_ended_last(desk: Desk) -> None
         desk.say(command, f"c{number}")
         desk.tell("finished", f"c{number}", success=True, error=None)
         desk.step()
-    desk.say("that was wrong: I meant the bedroom", "c3")
+    desk.say("that was right: heard badly", "c3", heard={"doubted": True, "confidence": 0.4})
+    desk.say("that was wrong: I meant the bedroom", "c4")
     desk.step()
     outcomes = [(one.command, one.outcome.value, one.why) for one in desk.store.newest()]
     assert outcomes == [
