@@ -25,6 +25,7 @@ from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import CellWriter, SharedSpace, topics
 from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.payloads.tasks import UtteranceContent
+from vla_deploy.missions.store import FILE_NAME, MissionStore
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
@@ -190,7 +191,7 @@ class LockstepStack(LockstepControl):
         self._outcomes: dict[str, dict[str, Any]] = {}
         context, devices = self.lockstep.context, self.lockstep.devices
         self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
-        self.planner: Node = PlannerNode(context, self.robot)
+        self.planner: Node = self._new_planner()
         rate_hz = self._profile.executor_rate_hz
         self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
         for node in (self.perception, self.planner, self.executor):
@@ -199,6 +200,16 @@ class LockstepStack(LockstepControl):
             self.lockstep.add(BatteryNode(context, self.robot.battery, self.space))
         if speech:
             self.lockstep.add(self._speech())
+
+    def restart_planner(self) -> None:
+        """Start the planner anew, as the supervisor does after it died."""
+        self.planner = self._new_planner()
+        self.lockstep.add(self.planner)
+
+    def _new_planner(self) -> Node:
+        context = self.lockstep.context
+        missions = MissionStore(context.run_dir / FILE_NAME)
+        return PlannerNode(context, self.robot, missions=missions)
 
     def _speech(self) -> Node:
         context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot
