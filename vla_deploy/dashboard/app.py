@@ -12,6 +12,7 @@ from vla_deploy.dashboard.access.request import API_PREFIX
 from vla_deploy.dashboard.api import (
     analysis,
     commands,
+    memory,
     metrics,
     operate,
     profile,
@@ -31,6 +32,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     state.router,
     analysis.router,
     commands.router,
+    memory.router,
     operate.router,
     profile.router,
     recordings.router,
