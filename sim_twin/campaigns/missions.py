@@ -183,14 +183,13 @@ def _pause(stack: LockstepStack) -> float:
     stack.lockstep.run_for(PAUSE_S - 2.0)
     after = stack.lockstep.truth()["joints"]
     stack.give(pause=False)
-    return max(abs(after[name]["position"] - before[name]["position"]) for name in before)
+    moved = (abs(after[name]["position"] - before[name]["position"]) for name in before)
+    return float(max(moved))
 
 
 def _one_after_another() -> list[dict[str, Any]]:
-    return [
-        one | ({"depends_on": [before["id"]]} if before else {})
-        for before, one in pairwise((None, *EIGHT))
-    ]
+    first = EIGHT[0]
+    return [first, *(one | {"depends_on": [before["id"]]} for before, one in pairwise(EIGHT))]
 
 
 @contextmanager

@@ -39,10 +39,8 @@ EIGHT: list[dict[str, Any]] = [
 
 
 def one_after_another(objectives: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [
-        one | ({"depends_on": [before["id"]]} if before else {})
-        for before, one in pairwise((None, *objectives))
-    ]
+    rest = (one | {"depends_on": [before["id"]]} for before, one in pairwise(objectives))
+    return [objectives[0], *rest]
 
 
 def carried_out(stack: LockstepStack, objectives: list[dict[str, Any]]) -> float:
