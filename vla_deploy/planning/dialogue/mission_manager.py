@@ -20,7 +20,7 @@ from vla_deploy.missions.mission import (
     read_mission,
 )
 from vla_deploy.missions.progress import MOST_SPANS, ActionSpan, MissionRun, MissionState, PartState
-from vla_deploy.missions.store import MissionStore
+from vla_deploy.missions.store import MissionStore, newest
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
@@ -316,7 +316,7 @@ class MissionManager:
                 "event": "finished",
                 "success": is_success,
                 "error": None if is_success else run.error or run.report(),
-                "summary": summary_of(self._outcomes.get(run.mission_id, ())),
+                "summary": summary_of(self._outcomes.pop(run.mission_id, ())),
                 "actions": [],
             }
         )
@@ -325,6 +325,7 @@ class MissionManager:
 
     def _changed(self) -> None:
         """Keep and show how the missions stand."""
+        self._runs = {one.mission_id: one for one in newest(list(self._runs.values()))}
         try:
             self._store.save(list(self._runs.values()))
             self._trouble = ""
@@ -332,8 +333,8 @@ class MissionManager:
             if not self._trouble:
                 _log.warning("%s", error)
             self._trouble = str(error)
-        newest = list(self._runs.values())[-MOST_SHOWN:]
-        missions = [one.model_dump(mode="json") for one in reversed(newest)]
+        shown = list(self._runs.values())[-MOST_SHOWN:]
+        missions = [one.model_dump(mode="json") for one in reversed(shown)]
         self._shown.put_document({"missions": missions, "trouble": self._trouble})
 
     def _load(self) -> None:
