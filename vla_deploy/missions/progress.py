@@ -77,6 +77,7 @@ class MissionRun(BaseModel):
     run_id: str = ""
     mission: Mission
     source: str = ""
+    heard_confidence: float | None = None
     given_unix_s: float
     state: MissionState = MissionState.PLANNING
     due_unix_s: float | None = None

@@ -71,6 +71,7 @@ class MissionManager:
         self._runs: dict[str, MissionRun] = {}
         self._outcomes: dict[str, list[str]] = {}
         self._trouble = ""
+        self._is_changed = False
         self._due_ns = 0
         self._load()
 
@@ -99,8 +100,10 @@ class MissionManager:
         return True
 
     def _of_words(self, command: UserCommand, now: datetime, facts: Facts) -> Mission | None:
-        if command.plan is not None or command.is_doubted or command.is_answer:
+        if command.plan is not None or command.is_answer:
             return None
+        if command.is_doubted or command.is_unsure or command.awaits_word:
+            return None  # such words are read back or held as a whole
         found = mission_from_words(command.text, now)
         if found is not None and found.schedule.when:
             try:
@@ -115,6 +118,7 @@ class MissionManager:
             run_id=self._run_id,
             mission=mission,
             source=command.source,
+            heard_confidence=command.heard_confidence,
             given_unix_s=self._wall_s(),
             due_unix_s=mission.schedule.at_unix_s,
         )
@@ -125,7 +129,7 @@ class MissionManager:
         else:
             self._tell_said(run, _appointment(run, self._wall_s()))
             self._tell_finished(run)
-        self._changed()
+        self._keep()
 
     def cancel(self, mission_id: str, why: str) -> bool:
         """End a mission; return False where there is none that has not ended."""
@@ -141,7 +145,7 @@ class MissionManager:
             self._manager.drop(_command_id(run, name))
         if was_executing:
             self._tell_finished(run)
-        self._changed()
+        self._keep()
         return True
 
     def stop(self, why: str) -> None:
@@ -176,7 +180,7 @@ class MissionManager:
     def _ended(self, run: MissionRun, name: str, error: str, *, is_lost: bool = False) -> None:
         run.end(name, self._wall_s(), error, is_lost=is_lost)
         self._tell_part(run, name)
-        self._changed()
+        self._is_changed = True
 
     # --- what goes on ---------------------------------------------------------------------------
 
@@ -188,11 +192,13 @@ class MissionManager:
         self._due_ns = now_ns + _PERIOD_NS
         for run in list(self._runs.values()):
             self._advance(run)
+        if self._is_changed:
+            self._keep()
 
     def _advance(self, run: MissionRun) -> None:
         if self._is_due(run):
             self._begin(run)
-            self._changed()
+            self._is_changed = True
         if run.state in (MissionState.EXECUTING, MissionState.PAUSED):
             self._note_pause(run)
         if run.state is not MissionState.EXECUTING:
@@ -202,7 +208,7 @@ class MissionManager:
             self._tell_finished(run)
             if run.repeats():
                 run.state = MissionState.PLANNING
-            self._changed()
+            self._is_changed = True
             return
         for name, subtask in run.ready():
             self._give(run, name, subtask)
@@ -225,7 +231,7 @@ class MissionManager:
         state = MissionState.PAUSED if is_paused else MissionState.EXECUTING
         if run.state is not state:
             run.state = state
-            self._changed()
+            self._is_changed = True
 
     def _begin(self, run: MissionRun) -> None:
         self._outcomes[run.mission_id] = []
@@ -245,13 +251,14 @@ class MissionManager:
                 command_id=_command_id(run, name),
                 told_ns=self._clock.now_ns(),
                 source=run.source,
+                heard_confidence=run.heard_confidence,
                 text=subtask.words,
                 plan=plan,
                 mission=run.mission_id,
             )
         )
         self._tell_part(run, name)
-        self._changed()
+        self._is_changed = True
 
     def _check(self, run: MissionRun) -> None:
         """Judge the criteria of what has ended; the world has a moment to show them met."""
@@ -268,7 +275,7 @@ class MissionManager:
                 continue
             run.conclude(name, now_s, "; ".join(unmet), "; ".join(unknown))
             self._tell_part(run, name)
-            self._changed()
+            self._is_changed = True
 
     # --- what is told ---------------------------------------------------------------------------
 
@@ -323,8 +330,9 @@ class MissionManager:
         if run.state in (MissionState.COMPLETED, MissionState.FAILED):
             self._say(run, run.report())
 
-    def _changed(self) -> None:
+    def _keep(self) -> None:
         """Keep and show how the missions stand."""
+        self._is_changed = False
         self._runs = {one.mission_id: one for one in newest(list(self._runs.values()))}
         try:
             self._store.save(list(self._runs.values()))
@@ -352,7 +360,7 @@ class MissionManager:
                 run.cancel("the robot was shut down meanwhile", self._wall_s())
             elif is_open:
                 run.state = MissionState.EXECUTING
-        self._changed()
+        self._keep()
 
     def take_up(self, events: Iterable[Event[TaskEvent]]) -> None:
         """Go on with what another planner of this run began; `events` came in the meantime."""
@@ -364,7 +372,7 @@ class MissionManager:
                 if part.state is PartState.EXECUTING and _command_id(run, name) not in executing:
                     why = "the planner was started again"
                     run.end(name, self._wall_s(), why, is_lost=True)
-        self._changed()
+        self._keep()
 
 
 def _command_id(run: MissionRun, name: str) -> str:

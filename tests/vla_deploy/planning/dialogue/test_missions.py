@@ -242,3 +242,12 @@ def test_a_command_waits_for_the_mission_and_an_answer_does_not(flat) -> None:
     assert events(flat.desk.answers_to("go to the bedroom", source="voice")) == [("c2", "queued")]
     assert events(flat.desk.answers_to("what do you see"))[-1] == ("c3", "plan")
     assert flat.desk.said_aloud() == [Says.AFTERWARDS]
+
+
+def test_words_that_were_heard_badly_are_no_mission_and_those_heard_well_keep_their_doubt(flat):
+    flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.4})
+    flat.pass_s()
+    assert flat.desk.missions() == []
+    flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.9})
+    flat.pass_s()
+    assert flat.desk.missions()[0]["heard_confidence"] == 0.9
