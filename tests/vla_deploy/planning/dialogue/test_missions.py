@@ -248,6 +248,7 @@ def test_words_that_were_heard_badly_are_no_mission_and_those_heard_well_keep_th
     flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.4})
     flat.pass_s()
     assert flat.desk.missions() == []
+    flat.desk.answers_to("stop")
     flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.9})
     flat.pass_s()
     assert flat.desk.missions()[0]["heard_confidence"] == 0.9
