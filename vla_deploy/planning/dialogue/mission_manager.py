@@ -9,7 +9,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import summary_of
 from vla_deploy.ipc import CellWriter, Event
-from vla_deploy.ipc.payloads.tasks import MissionsDocument, TaskEvent
+from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
 from vla_deploy.missions.criteria import Facts, judge
 from vla_deploy.missions.errors import MissionInvalid, MissionsUnusable
 from vla_deploy.missions.mission import (
@@ -169,6 +169,9 @@ class MissionManager:
             return
         if event["event"] == "action":
             _note_span(run, name, event, stamp_s)
+        elif event["event"] == "said":
+            said: SaidEvent = {"command_id": run.mission_id, "event": "said", "text": event["text"]}
+            self._publisher.publish(said)
         elif event["event"] == "rejected":
             self._ended(run, name, event["reason"])
         elif event["event"] == "finished":

@@ -124,6 +124,8 @@ def test_a_report_says_what_is_done_and_what_is_not(flat) -> None:
     flat.ends("c1/a.s1")
     (plan,) = flat.desk.plans()
     text = plan["plan"]["actions"][0]["parameters"]["text"]
+    flat.desk.executor_tells(command_id="c1/c.s1", event="said", text=text)
+    assert ("c1", "said") in events(flat.pass_s())
     assert text.startswith("Done: look left. Not done: bring me the unicorn, because ")
 
 
