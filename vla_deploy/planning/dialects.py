@@ -107,6 +107,14 @@ _SKILL_NAMES: Final[tuple[tuple[str, ParameterMap, tuple[str, ...]], ...]] = (
     ("hand_over", _OBJECT, ("hand_over", "handover", "give")),
     ("find_object", _OBJECT, ("find_object", "detect_object", "search")),
     ("look_at", _OBJECT, ("look_at",)),
+    *(
+        (
+            f"turn_{state}",
+            _rename(name="device", target="device"),
+            (f"turn_{state}", f"switch_{state}"),
+        )
+        for state in ("on", "off")
+    ),
     ("speak", _rename(message="text", speech="text"), ("speak", "say")),
     ("wait", _rename(duration="duration_s", seconds="duration_s", time="duration_s"), ("wait",)),
 )

@@ -9,6 +9,7 @@ from functools import lru_cache
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
+from vla_deploy.robots.home_devices import HomeDevice
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
@@ -64,6 +65,7 @@ def match_place(text: str, places: Mapping[str, str]) -> str | None:
 class World:
     """Say what a plan may refer to, and what bounds it.
 
+    `devices` maps every spoken name to its device of the home, and
     `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
@@ -82,6 +84,7 @@ class World:
     opening_max_m: float | None = None
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
+    devices: Mapping[str, str] = field(default_factory=dict)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -122,6 +125,22 @@ def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
     }
 
 
+def spoken_devices(devices: Mapping[str, HomeDevice]) -> dict[str, str]:
+    """Map every name by which a device may be called, in lower case, to the device."""
+    return {
+        " ".join(words_of(spoken.replace("_", " "))): device.name
+        for device in devices.values()
+        for spoken in (device.name, *device.aliases)
+    }
+
+
+def match_device(text: object, devices: Mapping[str, str]) -> str | None:
+    """Return the device that `text` names, or None; `devices` maps spoken names to devices."""
+    if not isinstance(text, str):
+        return None
+    return devices.get(" ".join(words_of(text.replace("_", " "))))
+
+
 def world_of(
     robot: RobotDescription, holding: Mapping[str, str | None], is_free: IsFree | None = None
 ) -> World:
@@ -141,4 +160,5 @@ def world_of(
         opening_max_m=max(openings_m, default=None),
         bounds=robot.planning,
         is_free=is_free,
+        devices=spoken_devices(robot.devices),
     )

@@ -40,6 +40,8 @@ ROBOT: Shape = {
     "speaker": TABLE.optional,
     "voice": TABLE.optional,
     "ros": TABLE.optional,
+    "mqtt": TABLE.optional,
+    "devices": TABLES.optional,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,

@@ -8,6 +8,7 @@ from drivers.clock import NS_PER_S
 from platforms import Profile
 from vla_deploy.client.action_status import ActionStatus
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.devices import HomeDevices
 from vla_deploy.ipc import (
     Announcer,
     CellReader,
@@ -19,6 +20,7 @@ from vla_deploy.ipc import (
     SharedSpace,
     topics,
 )
+from vla_deploy.ipc.payloads.services import DevicesStatus
 from vla_deploy.ipc.payloads.tasks import (
     ExecutorStatus,
     GripDocument,
@@ -41,6 +43,7 @@ from vla_deploy.skills.resources import body_of
 from vla_deploy.skills.ros_goals import RosGoals
 
 STATUS_PERIOD_NS = NS_PER_S // 10
+DEVICE_PERIOD_NS = NS_PER_S // 2
 _SHOWN_POINTS = 200
 PLANNER_AGE_S = 2.0
 PLAN_WITHIN_S: Final = 20.0
@@ -67,22 +70,27 @@ class ExecutorNode:
         robot: RobotDescription,
         rate_hz: float,
         plan_within_s: float = PLAN_WITHIN_S,
+        devices: HomeDevices | None = None,
     ) -> None:
+        """Take the devices of the home, which are closed with the node."""
         self.period_s = 1.0 / rate_hz
         self._plan_within_s = plan_within_s
         self._clock = context.clock
         self._robot = robot
+        self._devices = devices
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
         self._adviser: Adviser
         self._plans: RingReader[PlanMessage]
         self._events: RingWriter[TaskEvent]
         self._status: CellWriter[ExecutorStatus]
+        self._device_status: CellWriter[DevicesStatus]
         self._planner: CellReader[PlannerStatus]
         self._execution: PlanExecution | None = None
         self._recovery = Recovery()
         self._command_id = ""
         self._status_ns = 0
+        self._device_status_ns = 0
         self._knows_hands = False
         self._told_hands: dict[str, Held] = {}
 
@@ -96,6 +104,7 @@ class ExecutorNode:
             say=self._say,
             voice=Announcer(self._space, "speak", self._clock),
             claims=ClaimBook(self._space, self._clock),
+            devices=self._devices,
             ros=RosGoals(self._space, self._clock) if self._robot.ros.is_needed else None,
         )
         self._adviser = Adviser(self._skills)
@@ -105,6 +114,7 @@ class ExecutorNode:
         with closing(self._space.cell_reader(topics.EXECUTOR_STATUS)) as before:
             self._told_hands = _told_hands(before.latest())
         self._status = self._space.cell_writer(topics.EXECUTOR_STATUS)
+        self._device_status = self._space.cell_writer(topics.DEVICE_STATUS)
         self._planner = self._space.cell_reader(topics.PLANNER_STATUS)
 
     def step(self) -> None:
@@ -112,6 +122,7 @@ class ExecutorNode:
         self._skills.link.refresh()
         if self._skills.ros is not None:
             self._skills.ros.refresh()
+        self._refresh_devices()
         if not self._knows_hands:
             self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
@@ -135,6 +146,8 @@ class ExecutorNode:
             self._conclude()
         if self._skills.ros is not None:
             self._skills.ros.close()
+        if self._devices is not None:
+            self._devices.close()
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> tuple[float, float]:
@@ -273,6 +286,16 @@ class ExecutorNode:
         if self._execution is not None:
             return "executing"
         return "recovering" if self._recovery.is_awaited else "idle"
+
+    def _refresh_devices(self) -> None:
+        """Take in what devices of the home have told, and publish it."""
+        if self._devices is None:
+            return
+        self._devices.refresh()
+        now_ns = self._clock.now_ns()
+        if now_ns - self._device_status_ns >= DEVICE_PERIOD_NS:
+            self._device_status_ns = now_ns
+            self._device_status.put_document(self._devices.document())
 
     def _tell_status(self) -> None:
         now_ns = self._clock.now_ns()

@@ -81,7 +81,7 @@ class Steps:
     def things(self, step: Step) -> tuple[list[Skill], list[str]]:
         """Return the way to what a step is about, and that, with where it is to be taken from."""
         what, _, inner = self._chosen(step).partition(" from ")
-        parts = _parts_of(what)
+        parts = parts_of(what)
         if "except" in step:
             parts = [f"{what} but {self.spoken(step, 'except')}"]
         where = self.spoken(step, "from") if "from" in step else inner
@@ -141,9 +141,14 @@ def way_back(request: PlanRequest) -> Skill:
     return "navigate_to", pose_parameters(poses[-1])
 
 
-def _parts_of(text: str) -> list[str]:
+def parts_of(text: str) -> list[str]:
     """Return the things of "the cup, the ball and the book"."""
     return [part for part in _AND.split(text) if part]
+
+
+def _switch(spoken: Steps, step: Step) -> list[Skill]:
+    del spoken
+    return [(f"turn_{step['way']}", {"device": one}) for one in parts_of(step["device"])]
 
 
 def _go(spoken: Steps, step: Step) -> list[Skill]:
@@ -155,7 +160,7 @@ def _go(spoken: Steps, step: Step) -> list[Skill]:
     if where == "back" or where in _SPEAKERS:
         return [("navigate_to", {"place": "here"})]
     places = re.sub(r" with (?:it|them|that|this)$", "", spoken.spoken(step, "where"))
-    return [("navigate_to", {"place": _NEAR.sub("", one)}) for one in _parts_of(places)]
+    return [("navigate_to", {"place": _NEAR.sub("", one)}) for one in parts_of(places)]
 
 
 def _pick(spoken: Steps, step: Step) -> list[Skill]:
@@ -274,6 +279,7 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "open": lambda _, step: [("open_gripper", _arm(step))],
     "close": lambda _, step: [("close_gripper", _arm(step))],
     "pose": _pose,
+    "switch": _switch,
     "say": _say,
     "wait": lambda spoken, step: [
         ("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})

@@ -7,7 +7,7 @@ MOST_CLAUSES: Final = 6
 MOST_LETTERS: Final = 300
 _VERBS: Final = (
     "go|drive|come|move|turn|look|pick|grab|take|get|put|place|set|drop|bring|fetch|give|hand|carry|"
-    "find|search|open|close|wait|say|tuck|tidy|tell|stop|return|lay|hold|locate|lift"
+    "find|search|open|close|wait|say|tuck|tidy|tell|stop|return|lay|hold|locate|lift|switch"
 )
 _BEFORE: Final = re.compile(
     r"^(?:(?:please|robot|butler|hey|hello|hi|ok|okay|well|so|now|just|and|then|next|also|"

@@ -48,6 +48,8 @@ _THING: Final = rf"(?P<what>{THING})"
 # What is moved where: a thing that is told by where it stands leaves it open what goes where.
 _MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
 _WHERE: Final = rf"(?P<where>{WORDS})"
+# Not "turn on the spot".
+_DEVICE: Final = r"(?!(?:the )?spot\b)(?P<device>[a-z][a-z']*(?:,? [a-z']+){0,7}?)"
 _INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
 _TAKE: Final = "(?:pick up|grab|take|get|lift|hold)"
 _PUT: Final = "(?:put|place|set|lay|drop|leave)"
@@ -70,6 +72,9 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?: (?:to the )?{_SIDE})?", "turn", {}),
     (rf"(?:{_GO}|head|navigate|return)(?: back| over)?(?: to| into)? {_WHERE}", "go", {}),
     ("(?:turn|spin) (?:a?round once|in a circle)", "turn", {"by": "360 degrees"}),
+    # --- switch devices of the home; what is no device of it is refused by name
+    (rf"(?:turn|switch) (?P<way>on|off) {_DEVICE}|(?:turn|switch|put) {_DEVICE} (?P<way>on|off)",
+     "switch", {}),
     # --- look
     ("look a?round", "look", {"way": "around"}),
     (r"look(?: to the)? (?P<way>left|right|up|down|ahead)", "look", {}),

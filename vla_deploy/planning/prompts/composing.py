@@ -13,7 +13,7 @@ from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding import ConversationTurn
-from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.catalogue import SKILLS, SWITCHING
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.vocabulary import OBJECT_CLASSES, size_word
@@ -30,7 +30,7 @@ def chat_for(request: PlanRequest, robot: str, room: int = ROOM, jpeg: bytes | N
     extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
         "robot": plain(robot),
-        "skills": skills_in_words(),
+        "skills": skills_in_words(has_devices=bool(request.world.devices)),
         "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
     system = "\n\n".join(filled(part, **fields) for part in ("plan", *extra))
@@ -54,10 +54,12 @@ def _template(name: str) -> Template:
 
 
 @cache
-def skills_in_words() -> str:
-    """Return every skill on a line: its name, its parameters, what it does."""
+def skills_in_words(*, has_devices: bool) -> str:
+    """Return every skill that there is on a line: its name, its parameters, what it does."""
     return "\n".join(
-        f"- {name}({', '.join(spec.parameters)}): {spec.summary}" for name, spec in SKILLS.items()
+        f"- {name}({', '.join(spec.parameters)}): {spec.summary}"
+        for name, spec in SKILLS.items()
+        if has_devices or name not in SWITCHING
     )
 
 
@@ -71,6 +73,9 @@ def limits(world: World) -> Iterator[str]:
         yield f"a hand opens {world.opening_max_m:.2f} m wide; what is wider cannot be taken"
     if world.poses:
         yield f"poses of the arms: {', '.join(sorted(map(plain, world.poses)))}"
+    if world.devices:
+        names = sorted({plain(one) for one in world.devices.values()})
+        yield f"devices of the home that it can switch: {', '.join(names)}"
     for zone in world.zones:
         yield f"it must not enter {plain(zone.name)}: {plain(zone.reason, 120)}"
     yield "it handles no people, animals, fire, blades, medicine or hot liquids"

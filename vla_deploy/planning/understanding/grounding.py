@@ -22,7 +22,8 @@ from vla_deploy.planning.understanding.places import (
 )
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.plans.catalogue import SKILLS
-from vla_deploy.plans.errors import PlanInvalid, UnknownPlace
+from vla_deploy.plans.errors import PlanInvalid, UnknownDevice, UnknownPlace
+from vla_deploy.plans.knowledge import match_device
 from vla_deploy.plans.plan import (
     MOST_ACTIONS,
     PUT_IN,
@@ -58,6 +59,7 @@ def ground_plan(plan: Plan, request: PlanRequest) -> Plan:
         PlanInvalid: its ids are not unique, or its dependencies no order.
         UnknownObject: an expression names nothing that the robot knows.
         UnknownPlace: a place is not known.
+        UnknownDevice: a device is not known.
         Ambiguous: only the speaker can tell what is meant.
     """
     faults = dependency_faults(plan.actions)
@@ -156,6 +158,8 @@ class _Grounder:
                 yield from self._pick(given)
             case "hand_over" if isinstance(given.get("object"), str):
                 yield from self._hand_over(given)
+            case "turn_on" | "turn_off" if isinstance(given.get("device"), str):
+                yield action.skill, {**given, "device": self._device(given["device"])}
             case _:
                 yield action.skill, given
 
@@ -174,6 +178,13 @@ class _Grounder:
             return
         yield from _on_furniture(thing)
         yield "navigate_to", {"object": thing.name, **rest}
+
+    def _device(self, text: str) -> str:
+        devices = self._request.world.devices
+        name = match_device(text, devices)
+        if name is None:
+            raise UnknownDevice(text, set(devices.values()))
+        return name
 
     def _here(self, text: str) -> Parameters:
         here = self._request.here
