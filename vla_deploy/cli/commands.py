@@ -44,6 +44,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "scene": CommandEntry(
         "observation.scene", "show what the robot knows about the things around it"
     ),
+    "devices": CommandEntry(
+        "observation.devices", "show the devices of the home that the robot switches"
+    ),
     "memory": CommandEntry("observation.memory", "show what the robot remembers, and delete it"),
     "budget": CommandEntry(
         "observation.budget",

@@ -89,12 +89,12 @@ class HttpLink:
         try:
             with _Deadline(connection, self._ended) as deadline:
                 connection.request(method, target, headers=self._headers())
-                answer = connection.getresponse()
-                body = _body(answer, parts)
+                with connection.getresponse() as answer:
+                    body, missing = _body(answer, parts), answer.length
         except (OSError, http.client.HTTPException, ValueError) as error:
             why = getattr(error, "strerror", None) or shown(error) or type(error).__name__
             raise DeviceAway(f"{_shown(parts)}: no answer: {why}") from error
-        if deadline.has_passed or answer.length:
+        if deadline.has_passed or missing:
             raise DeviceAway(f"{_shown(parts)}: no whole answer within {REQUEST_S:g} s")
         _expect_success(answer.status, parts)
         return body

@@ -4,6 +4,7 @@ Every device has a connection of its own: what one of them sends, however much, 
 Nothing runs between two calls; the broker's messages wait in the socket meanwhile.
 """
 
+import socket
 import ssl
 import threading
 from collections.abc import Callable
@@ -174,7 +175,9 @@ class MqttLink:
         try:
             self._connect()
             self._topics = topics = self._find_topics()
-            self._subscribe(topics.state_topic, *(one.topic for one in topics.availability))
+            # In this order: whether it is there is known when its state is.
+            self._subscribe(*(one.topic for one in topics.availability))
+            self._subscribe(topics.state_topic)
             self._pump(lambda: self._is_on is not None, FIRST_STATE_S, "its state")
         except BaseException:
             self.close()
@@ -195,8 +198,11 @@ class MqttLink:
             why = getattr(error, "strerror", None) or error
             raise DeviceAway(f"{self.where}: the broker cannot be reached: {why}") from error
         self._pump(lambda: self._refused is not None, CONNECT_S, "the broker's greeting")
+        self._expect_welcome()
         if self._refused is None:
             raise DeviceAway(f"{self.where}: the broker did not answer within {CONNECT_S:g} s")
+
+    def _expect_welcome(self) -> None:
         if self._refused:
             raise DeviceNotUsable(
                 f"{self.where}: the broker refuses us (code {self._refused}); "
@@ -226,9 +232,11 @@ class MqttLink:
             raise StateUnreadable(f"{self.where}: {error}") from error
 
     def _subscribe(self, *topics: str) -> None:
-        before = self._subscribed
-        self._client.subscribe([(topic, _QOS) for topic in dict.fromkeys(topics)])
-        self._pump(lambda: self._subscribed > before, CONNECT_S, "the broker's consent")
+        before, wanted = self._subscribed, dict.fromkeys(topics)
+        for topic in wanted:
+            self._client.subscribe(topic, _QOS)
+        consent = before + len(wanted)
+        self._pump(lambda: self._subscribed >= consent, CONNECT_S, "the broker's consent")
 
     def _take_in(self) -> bool:
         """Take in all that has arrived; return whether the connection is still of use.
@@ -254,6 +262,7 @@ class MqttLink:
     def _loop(self, timeout_s: float, awaited: str) -> None:
         code = int(self._client.loop(timeout_s))
         if code:
+            self._expect_welcome()
             flood = self._client.flooded
             self.close()
             why = f"more than {MOST_PACKET_BYTES} bytes came at once" if flood else "it broke off"
@@ -282,8 +291,19 @@ def _client_class(paho: ModuleType) -> Callable[[BrokerAddress], Any]:
             self.connect_timeout = CONNECT_S
             self.flooded = False
             self.received = 0
+            self._path = broker.host
             if broker.tls:
                 self.tls_set_context(ssl.create_default_context())
+
+        def _create_unix_socket_connection(self) -> socket.socket:
+            """Leave no socket open where nobody listens, as the library's own does."""
+            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            try:
+                line.connect(self._path)
+            except OSError:
+                line.close()
+                raise
+            return line
 
         def _sock_recv(self, bufsize: int) -> bytes:
             if bufsize > MOST_PACKET_BYTES:

@@ -1,6 +1,7 @@
 """Read whether a device is on in what it has sent, which may be anything."""
 
 import json
+import re
 import unicodedata
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,6 +11,7 @@ from vla_deploy.devices.errors import StateUnreadable
 MOST_BYTES: Final = 65_536
 """No device that is switched has more to say."""
 _MOST_SHOWN: Final = 60
+_INDEX: Final = re.compile("[0-9]{1,6}")
 
 
 def shown(said: object, most: int = _MOST_SHOWN) -> str:
@@ -54,12 +56,13 @@ class StateWords:
         """
         if len(payload) > MOST_BYTES:
             raise StateUnreadable(f"{len(payload)} bytes came, expected {MOST_BYTES} at most")
-        said = _plain(_pointed(document_in(payload), self.pointer) if self.pointer else payload)
+        value = _pointed(document_in(payload), self.pointer) if self.pointer else payload
+        said = _plain(value)
         for word, is_on in ((self.on, True), (self.off, False)):
             if said == _plain(word):
                 return is_on
         where = f" at {self.pointer}" if self.pointer else ""
-        raise StateUnreadable(f'expected "{self.on}" or "{self.off}"{where}, got "{shown(said)}"')
+        raise StateUnreadable(f'expected "{self.on}" or "{self.off}"{where}, got "{shown(value)}"')
 
 
 def _plain(value: object) -> str:
@@ -74,7 +77,7 @@ def _pointed(document: Any, pointer: str) -> Any:
         key = part.replace("~1", "/").replace("~0", "~")
         if isinstance(document, dict) and key in document:
             document = document[key]
-        elif isinstance(document, list) and key.isdecimal() and int(key[:9]) < len(document):
+        elif isinstance(document, list) and _INDEX.fullmatch(key) and int(key) < len(document):
             document = document[int(key)]
         else:
             raise StateUnreadable(f'expected a value at {pointer}, there is no "{shown(key)}"')

@@ -4,7 +4,6 @@ Nothing here waits: what is asked for is done by an executor, one task after the
 by `refresh`. The state is what was read back, never what was asked for.
 """
 
-import logging
 from collections import deque
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from vla_deploy.robots.home_devices import HomeDevice
 
 FIRST_BACK_OFF_S: Final = 1.0
 LONGEST_BACK_OFF_S: Final = 60.0
-_log = logging.getLogger(__name__)
+_NOT_YET: Final = "it was not looked at yet"
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -44,7 +43,12 @@ class SwitchState:
 
     is_on: bool | None = None
     read_ns: int = 0
-    fault: str = "nobody has looked yet"
+    fault: str = _NOT_YET
+
+    @property
+    def was_asked(self) -> bool:
+        """Return whether the device was asked at all."""
+        return self.fault is not _NOT_YET
 
     def age_s(self, now_ns: int) -> float:
         """Return how old the reading is."""
@@ -131,8 +135,6 @@ class SwitchedDevice:
             task.reading = work.result()
         except DeviceError as error:
             task.fault = error
-            if str(error) != self.state.fault:
-                _log.warning("%s: %s", self.device.name, error)
             self.state = SwitchState(fault=str(error), read_ns=self.state.read_ns)
             self._next_look_ns = now_ns + round(self._back_off_s * NS_PER_S)
             self._back_off_s = min(2.0 * self._back_off_s, LONGEST_BACK_OFF_S)

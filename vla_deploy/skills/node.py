@@ -1,5 +1,6 @@
 """Run the executor: plans in, motions out, and a word about every action."""
 
+import logging
 from collections.abc import Sequence
 from contextlib import closing
 from typing import Final, Literal
@@ -49,6 +50,7 @@ PLANNER_AGE_S = 2.0
 PLAN_WITHIN_S: Final = 20.0
 # Another plan is waited for as long as the planner may take, and a moment besides.
 _MOMENT_S: Final = 2.0
+_log = logging.getLogger(__name__)
 _FAILED = frozenset({ActionStatus.ABORTED, ActionStatus.REJECTED, ActionStatus.LOST})
 
 
@@ -91,6 +93,7 @@ class ExecutorNode:
         self._command_id = ""
         self._status_ns = 0
         self._device_status_ns = 0
+        self._device_faults: dict[str, str] = {}
         self._knows_hands = False
         self._told_hands: dict[str, Held] = {}
 
@@ -296,6 +299,14 @@ class ExecutorNode:
         if now_ns - self._device_status_ns >= DEVICE_PERIOD_NS:
             self._device_status_ns = now_ns
             self._device_status.put_document(self._devices.document())
+            self._log_device_faults(self._devices)
+
+    def _log_device_faults(self, devices: HomeDevices) -> None:
+        for one in devices:
+            name, state = one.device.name, one.state
+            if state.was_asked and state.fault != self._device_faults.get(name, ""):
+                _log.warning("device %s: %s", name, state.fault or "it answers again")
+                self._device_faults[name] = state.fault
 
     def _tell_status(self) -> None:
         now_ns = self._clock.now_ns()
