@@ -69,13 +69,17 @@ class EmulatedBroker:
         """Pass a message on to all who listen; it may come from any thread."""
         self._pass_on(MqttMessage(topic=topic, payload=payload, retain=retain))
 
+    def abandon(self) -> None:
+        """Cut every connection at once, as a broker that dies; it may come from any thread."""
+        for client in list(self._clients.values()):
+            self._drop(client)
+
     def close(self) -> None:
         """End every connection; closing twice is allowed."""
         with contextlib.suppress(OSError):  # it has been closed
             self._waker.send(b"x")
         self._thread.join()
-        for client in list(self._clients.values()):
-            self._drop(client)
+        self.abandon()
         self._selector.close()
         for one in (self._listener, self._wake, self._waker):
             one.close()

@@ -10,7 +10,7 @@ from drivers.clock import Clock
 from vla_deploy.devices.errors import DeviceNotUsable
 from vla_deploy.devices.gpio_link import GpioLink
 from vla_deploy.devices.http_link import HttpLink
-from vla_deploy.devices.login import Login, read_login
+from vla_deploy.devices.login import DeviceLogin, read_login
 from vla_deploy.devices.mqtt_link import BrokerAddress, MqttLink
 from vla_deploy.devices.switched_device import SwitchedDevice
 from vla_deploy.devices.transport import DeviceReading, SwitchTransport
@@ -111,7 +111,7 @@ def transport_of(
     return GpioLink(device.gpio)
 
 
-def _login(file: Path | None) -> Callable[[], Login] | None:
+def _login(file: Path | None) -> Callable[[], DeviceLogin] | None:
     return None if file is None else partial(read_login, file)
 
 

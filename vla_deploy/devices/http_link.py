@@ -15,7 +15,7 @@ from urllib.parse import SplitResult, urlsplit
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.devices.errors import DeviceAway, DeviceNotUsable, StateUnreadable
-from vla_deploy.devices.login import Login
+from vla_deploy.devices.login import DeviceLogin
 from vla_deploy.devices.state_text import MOST_BYTES, StateWords, shown
 from vla_deploy.devices.transport import DeviceReading
 from vla_deploy.robots.home_devices import HttpRequests
@@ -35,7 +35,7 @@ class HttpLink:
     look_period_s = 10.0
 
     def __init__(
-        self, declared: HttpRequests, read_login: Callable[[], Login] | None = None
+        self, declared: HttpRequests, read_login: Callable[[], DeviceLogin] | None = None
     ) -> None:
         """Prepare; nothing is sent yet. `read_login` returns user and password, where needed."""
         self.where = _shown(urlsplit(declared.state))

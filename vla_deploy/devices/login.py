@@ -14,14 +14,14 @@ _EXAMPLE: Final = 'two lines, user = "robot" and password = "..."'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Login:
+class DeviceLogin:
     """Hold a user's name and password."""
 
     user: str
     password: Secret
 
 
-def read_login(file: Path) -> Login:
+def read_login(file: Path) -> DeviceLogin:
     """Return what a credentials file holds.
 
     Raises:
@@ -43,4 +43,4 @@ def read_login(file: Path) -> Login:
     user, password = document.get("user"), document.get("password")
     if not (isinstance(user, str) and isinstance(password, str) and user and password):
         raise DeviceNotUsable(f"{file}: expected {_EXAMPLE}")
-    return Login(user=user, password=Secret(password))
+    return DeviceLogin(user=user, password=Secret(password))

@@ -15,7 +15,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.devices.discovery import SwitchTopics, config_topics, read_discovery, topics_of
 from vla_deploy.devices.errors import DeviceAway, DeviceNotUsable, StateUnreadable
-from vla_deploy.devices.login import Login
+from vla_deploy.devices.login import DeviceLogin
 from vla_deploy.devices.state_text import shown
 from vla_deploy.devices.transport import DeviceReading
 from vla_deploy.robots.home_devices import MqttTopics
@@ -55,7 +55,7 @@ class MqttLink:
         self,
         declared: MqttTopics,
         broker: BrokerAddress,
-        read_login: Callable[[], Login] | None = None,
+        read_login: Callable[[], DeviceLogin] | None = None,
     ) -> None:
         """Prepare; the broker is called when the device is.
 

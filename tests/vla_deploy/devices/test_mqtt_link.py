@@ -17,7 +17,7 @@ from tests.vla_deploy.devices.conftest import (
     Mosquitto,
 )
 from vla_deploy.devices import DeviceAway, DeviceError, DeviceNotUsable, StateUnreadable, mqtt_link
-from vla_deploy.devices.login import Login
+from vla_deploy.devices.login import DeviceLogin
 from vla_deploy.devices.mqtt_link import BrokerAddress, MqttLink
 from vla_deploy.robots.home_devices import MqttTopics
 from vla_deploy.runtime.secret import Secret
@@ -197,7 +197,9 @@ def test_a_broker_wants_user_and_password_which_no_message_has(
 ) -> None:
     broker = Mosquitto(tmp_path, login=True)
     broker.start()
-    link = MqttLink(TOPICS, broker.address, lambda: Login(user=USER, password=Secret(password)))
+    link = MqttLink(
+        TOPICS, broker.address, lambda: DeviceLogin(user=USER, password=Secret(password))
+    )
     expected: tuple[type[DeviceError], str] = (StateUnreadable, "told no state yet")
     if password != PASSWORD:
         expected = DeviceNotUsable, r"refuses us .*; see credentials in \[mqtt\]"
