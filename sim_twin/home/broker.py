@@ -116,6 +116,8 @@ class EmulatedBroker:
                 if not data:
                     raise ConnectionResetError("it has hung up")
                 client.heard += data
+                if not client.is_greeted and client.heard[0] >> 4 != PacketType.CONNECT:
+                    raise PacketInvalid("a client begins with CONNECT")
                 for head, body in packets_in(client.heard):
                     self._take(client, head, body)
         except BlockingIOError:
@@ -125,8 +127,8 @@ class EmulatedBroker:
 
     def _take(self, client: "_Client", head: int, body: bytes) -> None:
         kind = head >> 4
-        if not client.is_greeted and kind != PacketType.CONNECT:
-            raise PacketInvalid("a client begins with CONNECT")
+        if client.is_greeted is (kind == PacketType.CONNECT):
+            raise PacketInvalid("a client begins with CONNECT, and says it once")
         match kind:
             case PacketType.CONNECT:
                 self._greet(client, body)

@@ -9,7 +9,6 @@ from functools import lru_cache
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
-from vla_deploy.robots.home_devices import HomeDevice
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
@@ -57,8 +56,7 @@ def object_or_none(text: object) -> Query | None:
 
 def match_place(text: str, places: Mapping[str, str]) -> str | None:
     """Return the place that `text` names, or None; `places` maps every spoken name to a place."""
-    spoken = " ".join(words_of(text.replace("_", " ")))
-    return places.get(spoken)
+    return places.get(_said(text))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,26 +117,41 @@ class World:
 def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
     """Map every name by which a place may be called, in lower case, to the place."""
     return {
-        " ".join(words_of(spoken.replace("_", " "))): place.name
+        _said(spoken): place.name
         for place in places.values()
         for spoken in (place.name, *place.aliases)
     }
 
 
-def spoken_devices(devices: Mapping[str, HomeDevice]) -> dict[str, str]:
-    """Map every name by which a device may be called, in lower case, to the device."""
-    return {
-        " ".join(words_of(spoken.replace("_", " "))): device.name
-        for device in devices.values()
+def spoken_devices(robot: RobotDescription) -> dict[str, str]:
+    """Map every name by which a device of the home may be called, in lower case, to the device.
+
+    A lamp of the kitchen is "the kitchen lamp" and "the lamp in the kitchen", too.
+    """
+    names = {
+        _said(spoken): device.name
+        for device in robot.devices.values()
         for spoken in (device.name, *device.aliases)
     }
+    with_place = {
+        _said(words.format(spoken, place)): name
+        for spoken, name in names.items()
+        for place, where in spoken_places(robot.places).items()
+        if where == robot.devices[name].place
+        for words in ("{1} {0}", "{0} in the {1}")
+    }
+    return with_place | names
+
+
+def _said(name: str) -> str:
+    return " ".join(words_of(name.replace("_", " ")))
 
 
 def match_device(text: object, devices: Mapping[str, str]) -> str | None:
     """Return the device that `text` names, or None; `devices` maps spoken names to devices."""
     if not isinstance(text, str):
         return None
-    return devices.get(" ".join(words_of(text.replace("_", " "))))
+    return devices.get(_said(text))
 
 
 def world_of(
@@ -160,5 +173,5 @@ def world_of(
         opening_max_m=max(openings_m, default=None),
         bounds=robot.planning,
         is_free=is_free,
-        devices=spoken_devices(robot.devices),
+        devices=spoken_devices(robot),
     )

@@ -36,7 +36,7 @@ def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
 
 def _parts(resource: str, action: Action, robot: RobotDescription) -> tuple[str, ...]:
     if resource == DEVICE:
-        named = match_device(action.parameters.get("device"), spoken_devices(robot.devices))
+        named = match_device(action.parameters.get("device"), spoken_devices(robot))
         return (f"{DEVICE} {named}",) if named is not None else ()
     if resource not in (ARMS, ONE_ARM):
         return (resource,)

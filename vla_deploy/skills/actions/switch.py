@@ -37,7 +37,7 @@ def turn_off(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def _device(context: SkillContext, parameters: Mapping[str, Any]) -> SwitchedDevice:
-    known = spoken_devices(context.robot.devices)
+    known = spoken_devices(context.robot)
     name = match_device(parameters["device"], known)
     device = None if name is None or context.devices is None else context.devices.named(name)
     if device is None:
