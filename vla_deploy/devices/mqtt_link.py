@@ -6,6 +6,7 @@ Nothing runs between two calls; the broker's messages wait in the socket meanwhi
 
 import socket
 import ssl
+import struct
 import threading
 from collections.abc import Callable
 from importlib import import_module
@@ -245,7 +246,7 @@ class MqttLink:
         """
         for _ in range(_MOST_READS):
             before = self._client.received
-            if self._client.loop(0.0):
+            if self._exchange(0.0):
                 return False
             if self._client.received == before:
                 break
@@ -260,13 +261,22 @@ class MqttLink:
             self._loop(_SLICE_S, awaited)
 
     def _loop(self, timeout_s: float, awaited: str) -> None:
-        code = int(self._client.loop(timeout_s))
-        if code:
+        why = self._exchange(timeout_s)
+        if why:
             self._expect_welcome()
-            flood = self._client.flooded
             self.close()
-            why = f"more than {MOST_PACKET_BYTES} bytes came at once" if flood else "it broke off"
             raise DeviceAway(f"{self.where}: the connection ended waiting for {awaited}: {why}")
+
+    def _exchange(self, timeout_s: float) -> str:
+        """Exchange packets for a moment; return why the connection has ended, "" while it holds."""
+        try:
+            code = int(self._client.loop(timeout_s))
+        except (ValueError, LookupError, struct.error) as error:
+            # What is no packet of MQTT leaves the library as whatever it stumbled over.
+            return f"the broker breaks the protocol: {shown(error)}"
+        if self._client.flooded:
+            return f"more than {MOST_PACKET_BYTES} bytes came at once"
+        return "it broke off" if code else ""
 
 
 def _paho() -> ModuleType:

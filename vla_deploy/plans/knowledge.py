@@ -5,6 +5,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from types import MappingProxyType
+from typing import Final
 
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
@@ -14,6 +16,8 @@ from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
 from vla_deploy.world.query import FROM_A_VIEW
 from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
+
+NOTHING_KNOWN: Final[Mapping[str, bool]] = MappingProxyType({})
 
 
 def words_of(text: str) -> list[str]:
@@ -63,7 +67,8 @@ def match_place(text: str, places: Mapping[str, str]) -> str | None:
 class World:
     """Say what a plan may refer to, and what bounds it.
 
-    `devices` maps every spoken name to its device of the home, and
+    `devices` maps every spoken name to its device of the home, `devices_on` those that answer to
+    whether they are on, and
     `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
@@ -83,6 +88,7 @@ class World:
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
     devices: Mapping[str, str] = field(default_factory=dict)
+    devices_on: Mapping[str, bool] = field(default_factory=dict)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -155,7 +161,10 @@ def match_device(text: object, devices: Mapping[str, str]) -> str | None:
 
 
 def world_of(
-    robot: RobotDescription, holding: Mapping[str, str | None], is_free: IsFree | None = None
+    robot: RobotDescription,
+    holding: Mapping[str, str | None],
+    is_free: IsFree | None = None,
+    devices_on: Mapping[str, bool] = NOTHING_KNOWN,
 ) -> World:
     """Return what plans for this robot may refer to; `is_free` is its map, where one is at hand."""
     openings_m = [
@@ -174,4 +183,5 @@ def world_of(
         bounds=robot.planning,
         is_free=is_free,
         devices=spoken_devices(robot),
+        devices_on=devices_on,
     )

@@ -1,6 +1,7 @@
 """A device on MQTT, on the twin's broker and on a real one: believed is what it says itself."""
 
 import json
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -208,6 +209,39 @@ def test_a_broker_wants_user_and_password_which_no_message_has(
     assert password not in str(refused.value)
     link.close()
     broker.kill()
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        b"HTTP/1.1 400 Bad Request\r\n\r\n",
+        b"\x20\x02\x00\x00\x30\x04\x00\x01\xffx",
+        b"\x20\x02\x00\x00\x30\x01\x00",
+        b"\x20\x02\x00\x00\x90\x00",
+        b"\x20\x02\x00\x00\x30\xff\xff\xff\x7fx",
+        b"\x20\x02\x00\x00\xf0\xff\xff\xff\xff\xff",
+    ],
+    ids=["HTTP", "a topic that is no text", "cut short", "no consent", "256 MB", "endless length"],
+)
+def test_a_broker_that_breaks_the_protocol_is_left(tmp_path: Path, said: bytes) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / "mqtt"))
+        listener.listen()
+        link = MqttLink(TOPICS, BrokerAddress(str(tmp_path / "mqtt")))
+        server = threading.Thread(target=lambda: _answer_and_leave(listener, said))
+        server.start()
+        with pytest.raises(DeviceAway, match=r"connection ended|did not answer") as refused:
+            link.read()
+        assert str(refused.value).isprintable()
+        server.join()
+
+
+def _answer_and_leave(listener: socket.socket, said: bytes) -> None:
+    line, _ = listener.accept()
+    with line:
+        line.recv(1000)
+        line.sendall(said)
+        line.recv(1000)
 
 
 def test_without_its_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.patterns.phrase import parts_of
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
@@ -44,7 +45,6 @@ _RELATIONS: Final[Mapping[str, str]] = {
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
-_AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 # What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
 _BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
 Handler = Callable[["Steps", Step], list[Skill]]
@@ -139,11 +139,6 @@ def way_back(request: PlanRequest) -> Skill:
     if not poses:
         raise UnknownPlace("back", set(request.world.places.values()))
     return "navigate_to", pose_parameters(poses[-1])
-
-
-def parts_of(text: str) -> list[str]:
-    """Return the things of "the cup, the ball and the book"."""
-    return [part for part in _AND.split(text) if part]
 
 
 def _switch(spoken: Steps, step: Step) -> list[Skill]:
@@ -252,7 +247,7 @@ def _say(_spoken: Steps, step: Step) -> list[Skill]:
 
 def _answer(spoken: Steps, step: Step) -> list[Skill]:
     tell = answering.ANSWERS[step["about"]]
-    return tell(spoken.fields(step, "what", "where"), spoken.request)
+    return tell(spoken.fields(step, "what", "where", "device"), spoken.request)
 
 
 def _refused(error: type[Declined | CannotBeDone], why: str) -> Handler:

@@ -4,12 +4,12 @@ from string import digits
 from typing import Final
 
 from vla_deploy.client.action_words import skill_words
-from vla_deploy.planning.builders.steps import Steps, parts_of
+from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import Declined, NotUnderstood
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.patterns.follow_up import repeated
-from vla_deploy.planning.patterns.phrase import clauses
+from vla_deploy.planning.patterns.phrase import clauses, parts_of
 from vla_deploy.planning.patterns.table import PATTERNS, is_thing
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
@@ -93,7 +93,7 @@ def _fitting(clause: str, request: PlanRequest) -> Step:
         named = [said[name] for name in ("where", "from") if name in said]
         devices = parts_of(said.get("device", ""))
         if not all(match_device(one, request.world.devices) for one in devices):
-            no_device = "" if clause.startswith("put ") else said["device"]
+            no_device = said["device"] if clause.startswith(("turn ", "switch ")) else ""
             continue
         if all(_is_known(one, request) for one in named):
             return {**given, **said}

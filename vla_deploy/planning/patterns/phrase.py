@@ -23,6 +23,7 @@ _JOINT: Final = re.compile(
     r"[,;.!?]?\s+(?:and then|then|after that|and)\s+(?:please )?"
     rf"(?=(?:{_VERBS})\b)|[,;.!?]\s*(?:and |then |and then )?(?=(?:please |now )?(?:{_VERBS})\b)"
 )
+_AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
 
 def clauses(text: str) -> tuple[str, ...]:
@@ -41,3 +42,8 @@ def courtesy_off(text: str) -> str:
 def plain(text: str) -> str:
     """Return a text in lower case, with one space between words and no marks around."""
     return " ".join(text.lower().replace("’", "'").split()).strip(" .!?,")
+
+
+def parts_of(text: str) -> list[str]:
+    """Return the things of "the cup, the ball and the book"."""
+    return [part for part in _AND.split(text) if part]

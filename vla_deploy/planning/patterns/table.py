@@ -113,6 +113,7 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
      {"about": "ready"}),
     (r"help(?: me)?|what can you do|who are you", "ask", {"about": "able"}),
+    (rf"(?:is|are) {_DEVICE} (?:on|off)(?: now)?", "ask", {"about": "device"}),
     (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}", "where", {}),
     (rf"what (?:do|can) you see|what(?:'s| is) on (?:the )?{_WHERE}", "ask", {"about": "seeing"}),
     (r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",

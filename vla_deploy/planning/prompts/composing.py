@@ -93,6 +93,7 @@ _ESCAPES: Final = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026"
 CUT_ORDER: Final = ("remembered", "gone", "said_before", "failed_before", "things")
 MOST_THINGS: Final = 30
 MOST_RECOLLECTIONS: Final = 8
+_ON_OFF: Final = {True: "on", False: "off", None: "unknown"}
 _UNKNOWN_KIND: Final = "object"
 
 
@@ -104,6 +105,10 @@ def situation_of(request: PlanRequest) -> dict[str, Any]:
         "gone": [] if scene is None else [plain(one.thing) for one in scene.lost],
         "hands": {
             plain(hand): what and plain(what) for hand, what in request.world.holding.items()
+        },
+        "devices": {
+            plain(name): _ON_OFF[request.world.devices_on.get(name)]
+            for name in sorted(set(request.world.devices.values()))
         },
         "places": sorted({plain(place) for place in request.world.places.values()}),
         "said_before": [_turn(one) for one in reversed(request.conversation.turns)],

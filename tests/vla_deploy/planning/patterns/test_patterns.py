@@ -13,7 +13,7 @@ from vla_deploy.plans.errors import UnknownDevice, UnknownPlace
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
-WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
+WORLD = world_of(load_robot("butler"), {"left": None, "right": None}, devices_on={"lamp": True})
 HERE = (1.0, 2.0, 0.5)
 
 
@@ -43,6 +43,11 @@ def does(text: str, *turns: ConversationTurn) -> str:
         ("please switch the floor lamp off", "turn_off the floor lamp"),
         ("put the light on", "turn_on the light"),
         ("turn on the lamp in the living room", "turn_on the lamp in the living room"),
+        ("is the lamp on?", "speak The lamp is on."),
+        (
+            "are the light and the socket off",
+            "speak The lamp is on. I do not know whether the socket is on: it does not answer.",
+        ),
         ("turn off the lamp and the socket", "turn_off the lamp; turn_off the socket"),
         ("go to the kitchen and switch on the plug", "navigate_to the kitchen; turn_on the plug"),
         ("look up", "look_at up"),
