@@ -5,6 +5,7 @@ from typing import Final
 
 from sim_twin.faults.can_effects import CAN_ROWS
 from sim_twin.faults.effect import Effect
+from sim_twin.faults.home_effects import HOME_ROWS
 from sim_twin.faults.line_effects import SENSOR_ROWS
 from sim_twin.faults.servo_effects import SERVO_ROWS
 from sim_twin.faults.vocabulary import Component, Fault
@@ -13,6 +14,7 @@ EFFECTS: Final[Mapping[tuple[Component, Fault], Effect]] = {
     **SERVO_ROWS,
     **CAN_ROWS,
     **SENSOR_ROWS,
+    **HOME_ROWS,
 }
 
 

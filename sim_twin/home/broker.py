@@ -57,6 +57,7 @@ class EmulatedBroker:
         self._retained: dict[str, MqttMessage] = {}
         self._handlers: list[tuple[str, Handler]] = []
         self._lock = threading.RLock()
+        self._is_off = False
         self._thread = threading.Thread(target=self._serve, name="mqtt-broker", daemon=True)
         self._thread.start()
 
@@ -68,6 +69,15 @@ class EmulatedBroker:
     def publish(self, topic: str, payload: bytes, *, retain: bool = False) -> None:
         """Pass a message on to all who listen; it may come from any thread."""
         self._pass_on(MqttMessage(topic=topic, payload=payload, retain=retain))
+
+    def go_off(self) -> None:
+        """End every connection and take none, from now on."""
+        self._is_off = True
+        self.abandon()
+
+    def come_back(self) -> None:
+        """Take connections again; what was retained is there."""
+        self._is_off = False
 
     def abandon(self) -> None:
         """Cut every connection at once, as a broker that dies; it may come from any thread."""
@@ -100,6 +110,9 @@ class EmulatedBroker:
         try:
             line, _ = self._listener.accept()
         except OSError:  # it has gone already
+            return
+        if self._is_off:
+            line.close()
             return
         line.setblocking(False)
         self._clients[line] = client = _Client(line)
