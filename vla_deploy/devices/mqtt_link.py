@@ -75,7 +75,8 @@ class MqttLink:
     @property
     def called(self) -> str:
         """Return what the device calls itself in its discovery, fit to be shown."""
-        return "" if self._topics is None else self._topics.called
+        topics = self._topics  # another thread may have it forgotten meanwhile
+        return "" if topics is None else topics.called
 
     def switch(self, on: bool) -> DeviceReading:
         """Publish the command and return what the device says then.
