@@ -11,6 +11,7 @@ from typing import Final
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
+from vla_deploy.robots.home_devices import DeviceKind
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
@@ -68,7 +69,7 @@ class World:
     """Say what a plan may refer to, and what bounds it.
 
     `devices` maps every spoken name to its device of the home, `devices_on` those that answer to
-    whether they are on, and
+    whether they are on, `device_kinds` each to what it is, and
     `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
@@ -89,6 +90,7 @@ class World:
     is_free: IsFree | None = None
     devices: Mapping[str, str] = field(default_factory=dict)
     devices_on: Mapping[str, bool] = field(default_factory=dict)
+    device_kinds: Mapping[str, DeviceKind] = field(default_factory=dict)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -160,6 +162,31 @@ def match_device(text: object, devices: Mapping[str, str]) -> str | None:
     return devices.get(_said(text))
 
 
+_SEVERAL: Final = re.compile(r"(?P<every>everything)|(?:all |both |every )?(?P<kind>[a-z]+)")
+_KIND_WORDS: Final[Mapping[str, DeviceKind]] = {
+    "lamp": DeviceKind.LAMP, "light": DeviceKind.LAMP, "socket": DeviceKind.SOCKET,
+    "plug": DeviceKind.SOCKET, "outlet": DeviceKind.SOCKET, "switch": DeviceKind.SWITCH,
+    "switche": DeviceKind.SWITCH, "fan": DeviceKind.FAN,
+}  # fmt: skip
+
+
+def match_devices(text: str, world: "World") -> tuple[str, ...]:
+    """Return the devices that a text names: one, or all of a kind: "the lights", "all sockets"."""
+    one = match_device(text, world.devices)
+    if one is not None:
+        return (one,)
+    said = " ".join(word for word in words_of(text) if word != "of")
+    found = _SEVERAL.fullmatch(said)
+    if found is None:
+        return ()
+    if found["every"] or found["kind"] == "devices":
+        return tuple(world.device_kinds)
+    word = found["kind"]
+    is_several = word.endswith("s") or said.startswith("every ")
+    kind = _KIND_WORDS.get(word.removesuffix("s")) if is_several else None
+    return tuple(name for name, other in world.device_kinds.items() if other is kind)
+
+
 def world_of(
     robot: RobotDescription,
     holding: Mapping[str, str | None],
@@ -184,4 +211,5 @@ def world_of(
         is_free=is_free,
         devices=spoken_devices(robot),
         devices_on=devices_on,
+        device_kinds={name: one.kind for name, one in robot.devices.items()},
     )

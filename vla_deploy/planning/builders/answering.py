@@ -9,7 +9,7 @@ from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.patterns.phrase import parts_of
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
-from vla_deploy.plans.knowledge import match_device, match_place
+from vla_deploy.plans.knowledge import match_devices, match_place
 from vla_deploy.plans.plan import Skill
 from vla_deploy.plans.symbolic.state import Point
 from vla_deploy.world import Snapshot, Thing
@@ -79,7 +79,8 @@ def _tell_whether(fields: Fields, request: PlanRequest) -> list[Skill]:
 def _tell_devices(fields: Fields, request: PlanRequest) -> list[Skill]:
     """Say whether devices of the home are on, as they have told."""
     world = request.world
-    names = [match_device(one, world.devices) or one for one in parts_of(fields["device"])]
+    parts = parts_of(fields["device"])
+    names = dict.fromkeys(name for one in parts for name in match_devices(one, world))
     return _say(" ".join(_device(name, world.devices_on.get(name)) for name in names))
 
 

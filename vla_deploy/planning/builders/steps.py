@@ -21,7 +21,7 @@ from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, 
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
 from vla_deploy.plans.errors import PlanInvalid, UnknownObject, UnknownPlace
-from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.knowledge import match_devices, match_place
 from vla_deploy.plans.plan import Skill
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
@@ -142,8 +142,8 @@ def way_back(request: PlanRequest) -> Skill:
 
 
 def _switch(spoken: Steps, step: Step) -> list[Skill]:
-    del spoken
-    return [(f"turn_{step['way']}", {"device": one}) for one in parts_of(step["device"])]
+    named = (match_devices(one, spoken.request.world) for one in parts_of(step["device"]))
+    return [(f"turn_{step['way']}", {"device": one}) for each in named for one in each]
 
 
 def _go(spoken: Steps, step: Step) -> list[Skill]:

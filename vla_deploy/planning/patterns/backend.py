@@ -15,7 +15,7 @@ from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.plans.errors import UnknownDevice, UnknownPlace
-from vla_deploy.plans.knowledge import World, match_device, match_place
+from vla_deploy.plans.knowledge import World, match_devices, match_place
 from vla_deploy.plans.plan import Plan, chained
 from vla_deploy.runtime.deadline import Deadline
 
@@ -92,7 +92,7 @@ def _fitting(clause: str, request: PlanRequest) -> Step:
         said = {name.rstrip(digits): text for name, text in found.groupdict().items() if text}
         named = [said[name] for name in ("where", "from") if name in said]
         devices = parts_of(said.get("device", ""))
-        if not all(match_device(one, request.world.devices) for one in devices):
+        if not all(match_devices(one, request.world) for one in devices):
             no_device = said["device"] if clause.startswith(("turn ", "switch ")) else ""
             continue
         if all(_is_known(one, request) for one in named):
