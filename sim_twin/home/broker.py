@@ -147,9 +147,9 @@ class EmulatedBroker:
                 self._greet(client, body)
             case PacketType.PUBLISH:
                 message = read_publish(head, body)
-                if message.qos:
-                    self._send(client, packet(PacketType.PUBACK, two_bytes(message.packet_id)))
                 self._pass_on(message)
+                if message.qos:  # who reads this knows that the others have it
+                    self._send(client, packet(PacketType.PUBACK, two_bytes(message.packet_id)))
             case PacketType.SUBSCRIBE:
                 self._subscribe(client, FieldReader(body))
             case PacketType.UNSUBSCRIBE:

@@ -135,6 +135,9 @@ class MqttLink:
     def _is_available(self) -> bool:
         return bool(self._availability) and all(self._availability.values())
 
+    def _has_told(self) -> bool:
+        return self._is_on is not None or bool(self._unreadable)
+
     def _expect_available(self) -> None:
         away = [topic for topic, there in self._availability.items() if not there]
         if away:
@@ -180,7 +183,7 @@ class MqttLink:
             # In this order: whether it is there is known when its state is.
             self._subscribe(*(one.topic for one in topics.availability))
             self._subscribe(topics.state_topic)
-            self._pump(lambda: self._is_on is not None, FIRST_STATE_S, "its state")
+            self._pump(self._has_told, FIRST_STATE_S, "its state")
         except BaseException:
             self.close()
             raise

@@ -91,7 +91,7 @@ class Butler:
 
 @pytest.fixture
 def butler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Butler]:
-    monkeypatch.setattr(mqtt_link, "STATE_S", 0.3)
+    monkeypatch.setattr(mqtt_link, "STATE_S", 10.0)  # as a busy computer may take
     butler = Butler(tmp_path)
     yield butler
     butler.close()
@@ -129,8 +129,10 @@ def test_devices_are_switched_side_by_side_and_what_is_known_of_them_is_publishe
     ],
 )
 def test_what_was_not_read_back_is_no_success(
-    butler: Butler, fault: ApplianceFault, why: str
+    butler: Butler, fault: ApplianceFault, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if fault is not ApplianceFault.FLIPS_BACK:
+        monkeypatch.setattr(mqtt_link, "STATE_S", 0.3)
     lamp = butler.begin_home().appliances["lamp"]
     lamp.fault = fault
     end = butler.do(("turn_on", "lamp"))
