@@ -87,9 +87,13 @@ class MqttLink:
         topics = self._connected()
         self._expect_available()
         before = self._told
-        self._client.publish(topics.command_topic, topics.payload(on), qos=_QOS)
+        sent = self._client.publish(topics.command_topic, topics.payload(on), qos=_QOS)
         awaited = f"its state on {shown(topics.state_topic)} after {shown(topics.payload(on))!r}"
-        self._pump(lambda: self._told > before and self._is_on is on, STATE_S, awaited)
+
+        def is_done() -> bool:
+            return self._told > before and self._is_on is on and bool(sent.is_published())
+
+        self._pump(is_done, STATE_S, awaited)
         self._expect_available()
         if self._told > before or self._unreadable:
             return self._reading()

@@ -28,7 +28,7 @@ def lamp(
     ("component", "instance", "fault", "told"),
     [
         ("broker", None, "off", "connection ended"),
-        ("home_device", "lamp", "off", "waited 0.2 s"),
+        ("home_device", "lamp", "off", "waited 1 s"),
         ("home_device", "lamp", "stuck", False),
         ("home_device", "lamp", "wrong", False),
     ],
@@ -45,7 +45,7 @@ def test_what_fails_is_noticed_and_comes_back(
     assert not lamp.read().is_on
     handle = lockstep.faults.inject(component, instance, fault)
     with monkeypatch.context() as impatient:
-        impatient.setattr(mqtt_link, "STATE_S", 0.2)
+        impatient.setattr(mqtt_link, "STATE_S", 1.0)
         _expect(lamp, told)
     handle.clear()
     assert lamp.switch(True) == DeviceReading(is_on=True)
