@@ -129,6 +129,15 @@ def broker(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Broker]:
 
 
 @pytest.fixture
+def guarded(tmp_path: Path) -> Iterator[Mosquitto]:
+    """A broker that wants user and password."""
+    made = Mosquitto(tmp_path, login=True)
+    made.start()
+    yield made
+    made.kill()
+
+
+@pytest.fixture
 def client(broker: Broker) -> Iterator[Client]:
     """A device's own connection to the broker."""
     made = Client(broker.address)

@@ -226,14 +226,11 @@ def test_whoever_ends_does_not_wait(client: Client, new_link: NewLink) -> None:
 
 @pytest.mark.parametrize("password", [PASSWORD, "battery-staple"])
 def test_a_broker_wants_user_and_password_which_no_message_has(
-    tmp_path: Path, password: str, monkeypatch: pytest.MonkeyPatch
+    guarded: Mosquitto, password: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mqtt_link, "FIRST_STATE_S", 0.4)
-    broker = Mosquitto(tmp_path, login=True)
-    broker.start()
-    link = MqttLink(
-        TOPICS, broker.address, lambda: DeviceLogin(user=USER, password=Secret(password))
-    )
+    login = DeviceLogin(user=USER, password=Secret(password))
+    link = MqttLink(TOPICS, guarded.address, lambda: login)
     expected: tuple[type[DeviceError], str] = (StateUnreadable, "told no state yet")
     if password != PASSWORD:
         expected = DeviceNotUsable, r"refuses us .*; see credentials in \[mqtt\]"
@@ -241,7 +238,6 @@ def test_a_broker_wants_user_and_password_which_no_message_has(
         link.read()
     assert password not in str(refused.value)
     link.close()
-    broker.kill()
 
 
 @pytest.mark.parametrize(
