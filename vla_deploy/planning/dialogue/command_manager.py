@@ -19,7 +19,7 @@ from vla_deploy.planning.dialogue.dialogue import Dialogue, PendingQuestion
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.dialogue.turns import ALL, Turns, parts_of_plan
+from vla_deploy.planning.dialogue.turns import Turns
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
 from vla_deploy.planning.patterns.follow_up import (
@@ -70,8 +70,8 @@ class CommandManager:
         self._async = AsyncPlanner(executor)
         self._clock = clock
         self._queue: deque[UserCommand] = deque()
-        self._turns = Turns()
         self._active = ActivePlans(further_plans)
+        self._turns = Turns(self._active, situation, events)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
         self.dialogue = Dialogue(self._accept, situation, events, self._active, clock)
@@ -292,16 +292,10 @@ class CommandManager:
 
     def _settle(self, done: PlannedCommand) -> None:
         """Conclude a command, or let it wait while it would disturb what is carried out."""
-        if self._turns.must_wait(done, self._busy):
-            self._put_off(done.command, partial(self._queue.append, done.command))
+        if self._turns.must_wait(done):
+            self._turns.put_off(done.command, partial(self._queue.append, done.command))
         else:
             self.dialogue.conclude(done)
-
-    def _put_off(self, command: UserCommand, go_on: Callable[[], None]) -> None:
-        place = self._turns.add(command, go_on, self._under_way)
-        if place is not None:
-            self._events.queued(command, place)
-            self._events.say(command, Says.AFTERWARDS)
 
     def _look_after_turns(self) -> None:
         """End what the executor does not know of any more, and go on with what waited for it."""
@@ -312,21 +306,8 @@ class CommandManager:
             why = "the executor does not know of it any more"
             self.has_ended(command_id, False, why)
             self._events.lost(command_id, why)
-        for turn in self._turns.take_due(self._under_way):
+        for turn in self._turns.take_due():
             self._guarded(turn.command, turn.go_on)
-
-    @property
-    def _under_way(self) -> frozenset[str]:
-        """Return the commands that are carried out."""
-        return frozenset(self._active.plans) | (self._situation.executing or frozenset())
-
-    @property
-    def _busy(self) -> frozenset[str]:
-        """Return the parts of the robot that are used by what is carried out."""
-        plans = self._active.plans
-        if self._under_way - plans.keys():
-            return ALL
-        return frozenset[str]().union(*map(parts_of_plan, plans.values()))
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
@@ -503,8 +484,8 @@ class CommandManager:
         except PlanError as error:
             self.dialogue.refuse(pending.command, error, pending.answer)
             return
-        if self._turns.must_wait_with(pending.command, checked, self._busy):
-            self._put_off(pending.command, partial(self._run_confirmed, pending, plan))
+        if self._turns.must_wait_with(pending.command, checked):
+            self._turns.put_off(pending.command, partial(self._run_confirmed, pending, plan))
             return
         proposal = pending.answer.proposal
         if proposal is None or agreement_to(checked, request) <= agreement_to(plan, request):

@@ -1,10 +1,14 @@
 """Decide which command waits for its turn: until the robot is done with what it would disturb."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
+from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
+from vla_deploy.planning.dialogue.phrasing import Says
+from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, CommandUnreadable, NotAble, NotUnderstood
 from vla_deploy.plans.errors import UnknownObject, UnknownPlace
 from vla_deploy.plans.plan import Plan
@@ -40,52 +44,59 @@ class Turn:
     go_on: Callable[[], None]
 
 
-@dataclass(slots=True)
 class Turns:
     """Hold the commands that wait for their turn, in their order."""
 
-    waiting: list[Turn] = field(default_factory=list)
-    _told: dict[str, int] = field(default_factory=dict)
-    _busy: object = None
+    def __init__(self, active: ActivePlans, situation: Situation, events: PlannerEvents) -> None:
+        self.waiting: list[Turn] = []
+        self._active = active
+        self._situation = situation
+        self._events = events
+        self._told: dict[str, int] = {}
+        self._behind: frozenset[str] = frozenset()
+        """What was carried out when the last command came to wait."""
 
-    def must_wait(self, done: PlannedCommand, busy: frozenset[str]) -> bool:
-        """Return whether a command is done later; `busy` are the parts that plans under way use.
+    def must_wait(self, done: PlannedCommand) -> bool:
+        """Return whether a command is done later: it would disturb what is carried out.
 
         What is not possible now may be possible then. Only the parts of a mission overtake others.
         """
-        command, answer = done.command, done.answer
+        command, answer, busy = done.command, done.answer, self._busy
         if command.recovers or done.awaits_word or not (busy or self.waiting):
             return False
         if answer.plan is None:
             return bool(busy) and not isinstance(answer.error, _NEVER_BETTER)
-        return self.must_wait_with(command, answer.plan, busy)
+        return self.must_wait_with(command, answer.plan)
 
-    def must_wait_with(self, command: UserCommand, plan: Plan, busy: frozenset[str]) -> bool:
+    def must_wait_with(self, command: UserCommand, plan: Plan) -> bool:
         """Return whether a command's plan is carried out later."""
         if only_speaks(plan):
             return False
-        parts = parts_of_plan(plan)
+        parts, busy = parts_of_plan(plan), self._busy
         disturbs = busy == ALL or bool(parts & busy)
         if command.mission and busy != ALL:  # the executor gives arms and eyes in their turn
             return disturbs and BASE in parts
         return disturbs or bool(self.waiting) or (bool(busy) and not parts)
 
-    def add(self, command: UserCommand, go_on: Callable[[], None], busy: object) -> int | None:
-        """Let a command wait; return its place where that is news, 1 first."""
+    def put_off(self, command: UserCommand, go_on: Callable[[], None]) -> None:
+        """Let a command wait, and say so where its place is news."""
         self.waiting.append(Turn(command, go_on))
-        self._busy = busy
-        place, before = len(self.waiting), self._told.get(command.command_id)
+        self._behind = self._under_way
+        place = len(self.waiting)
+        if self._told.get(command.command_id) == place:
+            return
         self._told[command.command_id] = place
-        return None if place == before else place
+        self._events.queued(command, place)
+        self._events.say(command, Says.AFTERWARDS)
 
-    def take_due(self, busy: object) -> Iterator[Turn]:
-        """Take out all commands as soon as something else is under way than when they came."""
-        if not self.waiting or busy == self._busy:
-            return iter(())
+    def take_due(self) -> list[Turn]:
+        """Take out all commands as soon as something else is carried out than when they came."""
+        if not self.waiting or self._under_way == self._behind:
+            return []
         due, self.waiting = self.waiting, []
         names = {one.command.command_id for one in due}
         self._told = {name: place for name, place in self._told.items() if name in names}
-        return iter(due)
+        return due
 
     def drop(self, command_id: str) -> None:
         """Take out one command."""
@@ -96,3 +107,16 @@ class Turns:
         due, self.waiting = self.waiting, []
         self._told.clear()
         return [one.command for one in due]
+
+    @property
+    def _under_way(self) -> frozenset[str]:
+        """Return the commands that are carried out."""
+        return frozenset(self._active.plans) | (self._situation.executing or frozenset())
+
+    @property
+    def _busy(self) -> frozenset[str]:
+        """Return the parts of the robot that are used by what is carried out."""
+        plans = self._active.plans
+        if self._under_way - plans.keys():
+            return ALL
+        return frozenset[str]().union(*map(parts_of_plan, plans.values()))
