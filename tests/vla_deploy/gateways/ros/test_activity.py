@@ -27,6 +27,7 @@ def doing(skill, state="executing"):
         (of(executor=doing("pick_up")), "MANIPULATING", "executing"),
         (of(executor=doing("speak")), "PROCESSING", "executing"),
         (of(executor=doing("place", "recovering")), "MANIPULATING", "blocked"),
+        (of(executor=doing("navigate_to", "paused")), "NAVIGATING", "paused"),
         (of({"state": "protective_stop"}, doing("move")), "NAVIGATING", "paused"),
         (of({"state": "stopped"}, doing("move")), "STOPPED", "paused"),
         (of({"state": "disarmed"}), "STOPPED", "idle"),

@@ -35,7 +35,7 @@ class PlanState(StrEnum):
 
 
 _AT_REST: Final = frozenset({"", "disarmed", "stopping", "stopped", "fault"})
-_UNDER_WAY: Final = frozenset({"executing", "recovering"})
+_UNDER_WAY: Final = frozenset({"executing", "recovering", "paused"})
 _BY_SKILL: Final[Mapping[str, CapstoneState]] = {
     **dict.fromkeys(
         ("navigate_to", "charge", "move", "turn", "find_object"), CapstoneState.NAVIGATING
@@ -87,6 +87,8 @@ def activity_of(
         capstone = CapstoneState.IDLE
     if executing == "recovering":
         plan = PlanState.BLOCKED
+    elif executing == "paused":
+        plan = PlanState.PAUSED
     elif executing in _UNDER_WAY:
         plan = PlanState.EXECUTING if state == "armed" else PlanState.PAUSED
     elif has_asked:
