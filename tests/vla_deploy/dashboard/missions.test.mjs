@@ -44,7 +44,7 @@ test("an action without parts has a lane, a mission without actions none", () =>
 
 test("a long mission scrolls up to a bound, or is shown whole; its ticks do not crowd", () => {
   const long = mission([span("drive", ["base"], 0, 3600)]);
-  for (const [isWhole, width_px] of [[false, 4000], [true, 280]]) {
+  for (const [isWhole, width_px] of [[false, 4000], [true, 240]]) {
     const drawn = lanesOf(long, 3600, isWhole);
     assert.equal(drawn.width_px, width_px);
     assert.ok(((drawn.ticks_s[1] - drawn.ticks_s[0]) / 3600) * width_px >= 72);

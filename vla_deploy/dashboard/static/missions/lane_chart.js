@@ -36,7 +36,7 @@ export function LaneChart({ mission, now_s, nameOf, goesOn }) {
         <span class="grow"></span>
         ${drawn.end_s - drawn.begin_s > LONG_S && html`<${Choice} name="Scale of time" choices=${SCALES} value=${scale} onChange=${setScale} />`}
       </figcaption>
-      <div class="lanes" ref=${box} tabindex="0" role="region" aria-label="What each part did when, scrollable">
+      <div class="lanes" ref=${box} tabindex="0" role="region" aria-label="What each part did when for ${mission.mission.goal}, scrollable">
         <div class="lanes-inner" style=${{ minInlineSize: `calc(${drawn.width_px}px + var(--lane-name))` }}>
           <${Ticks} drawn=${drawn} />
           ${drawn.lanes.map((lane) => html`<${Lane} key=${lane.part} lane=${lane} drawn=${drawn} nameOf=${nameOf} />`)}

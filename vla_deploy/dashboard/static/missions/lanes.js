@@ -7,8 +7,9 @@ const ORDER = ["base", "head", "camera", "left", "right", "speaker"];
 const NO_PART = "no part";
 const PX_PER_S = 8;
 const MOST_PX = 4_000;
-const WHOLE_PX = 280; // the least that a phone has; what is there is filled
+const WHOLE_PX = 240; // the least that a phone has; what is there is filled
 const TICK_PX = 72;
+const LABEL_PX = 36;
 const STEPS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1_800, 3_600, 7_200, 21_600, 86_400];
 // How the actions of a part ended whose last words nobody noted.
 const ENDS = { completed: "succeeded", failed: "aborted", cancelled: "cancelled" };
@@ -75,7 +76,8 @@ function lane(part, spans, begin_s, end_s) {
 
 function ticks(whole_s, width_px) {
   const step_s = STEPS_S.find((one) => (one * width_px) / whole_s >= TICK_PX) ?? STEPS_S.at(-1);
-  return Array.from({ length: Math.floor(whole_s / step_s) + 1 }, (_, place) => place * step_s);
+  const last_s = whole_s * (1 - LABEL_PX / width_px); // what is written behind it has to fit
+  return Array.from({ length: Math.floor(Math.max(last_s, 0) / step_s) + 1 }, (_, place) => place * step_s);
 }
 
 function inOrder(a, b) {
