@@ -37,6 +37,7 @@ ROLES: Final = (
     "voice_activity",
     "speech_to_text",
     "text_to_speech",
+    "text_embedder",
 )
 PROVIDERS: Final = (
     "TensorrtExecutionProvider",

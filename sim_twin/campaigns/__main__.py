@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import load, soak
+from sim_twin.campaigns import load, missions, soak
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
@@ -23,6 +23,7 @@ CAMPAIGNS: Final[
     "faults": fault_matrix.run,
     "kills": kills.run,
     "load": load.run,
+    "missions": missions.run,
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,

@@ -25,6 +25,8 @@ from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import CellWriter, SharedSpace, topics
 from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.payloads.tasks import UtteranceContent
+from vla_deploy.memory import MemoryStore
+from vla_deploy.missions.store import FILE_NAME, MissionStore
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
@@ -181,16 +183,21 @@ class LockstepStack(LockstepControl):
         robot: str = "butler",
         world: str = "flat",
         speech: bool = False,
+        memory: Path | None = None,
     ) -> None:
-        """Start every node; with `speech` the robot hears and speaks too, which costs time."""
+        """Start every node; with `speech` the robot hears and speaks too, which costs time.
+
+        With a file for its `memory` it remembers from run to run.
+        """
         super().__init__(tmp_path, seed, profile, robot=robot, world=world)
+        self._memory = memory
         self._events = self._link.events(topics.TASK_EVENT, from_start=True)
         self._numbers = itertools.count(1)
         self.events: list[dict[str, Any]] = []
         self._outcomes: dict[str, dict[str, Any]] = {}
         context, devices = self.lockstep.context, self.lockstep.devices
         self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
-        self.planner: Node = PlannerNode(context, self.robot)
+        self.planner: Node = self._new_planner()
         rate_hz = self._profile.executor_rate_hz
         self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
         for node in (self.perception, self.planner, self.executor):
@@ -199,6 +206,17 @@ class LockstepStack(LockstepControl):
             self.lockstep.add(BatteryNode(context, self.robot.battery, self.space))
         if speech:
             self.lockstep.add(self._speech())
+
+    def restart_planner(self) -> None:
+        """Start the planner anew, as the supervisor does after it died."""
+        self.planner = self._new_planner()
+        self.lockstep.add(self.planner)
+
+    def _new_planner(self) -> Node:
+        context = self.lockstep.context
+        missions = MissionStore(context.run_dir / FILE_NAME)
+        memory = None if self._memory is None else MemoryStore(self._memory)
+        return PlannerNode(context, self.robot, memory=memory, missions=missions)
 
     def _speech(self) -> Node:
         context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot

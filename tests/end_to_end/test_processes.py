@@ -167,6 +167,21 @@ def test_kill_9_of_the_twin_stops_control_until_another_twin_is_armed(run: Run) 
     assert drives_again(run)
 
 
+@pytest.mark.parametrize("name", ["executor", "planner"])
+def test_a_mission_goes_on_when_what_carries_it_out_is_killed(run: Run, name: str) -> None:
+    pid = run.row(name)["pid"]
+    saying = run.begin("say", f"{DRIVE}; look left; {DRIVE}")
+    assert run.wait_until(lambda: run.fastest_rad_s() > MOVING_RAD_S)
+    run.kill(name)
+    assert run.is_back(name, pid)
+    told, _ = saying.communicate(timeout=90)
+    assert saying.returncode == 0, told
+    mission = json.loads(run.ask("mission", "list", "--json").stdout)["missions"][0]
+    assert mission["state"] == "completed"
+    tries = [one["tries"] for one in mission["subtasks"].values()]
+    assert tries == [2 if name == "executor" else 1, 1, 1]
+
+
 @pytest.mark.slow
 def test_a_frozen_twin_stops_control_and_is_started_again_by_its_silence(run: Run) -> None:
     pids = run.pids()

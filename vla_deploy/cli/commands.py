@@ -44,7 +44,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "scene": CommandEntry(
         "observation.scene", "show what the robot knows about the things around it"
     ),
-    "memory": CommandEntry("observation.memory", "show what the robot remembers, and delete it"),
+    "memory": CommandEntry(
+        "observation.memory", "show what the robot remembers, correct and delete it"
+    ),
     "budget": CommandEntry(
         "observation.budget",
         "show what the robot uses of its budgets, and what is done about an excess",

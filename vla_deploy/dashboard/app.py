@@ -12,6 +12,7 @@ from vla_deploy.dashboard.access.request import API_PREFIX
 from vla_deploy.dashboard.api import (
     analysis,
     commands,
+    memory,
     metrics,
     missions,
     operate,
@@ -33,6 +34,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     analysis.router,
     commands.router,
     missions.router,
+    memory.router,
     operate.router,
     profile.router,
     recordings.router,

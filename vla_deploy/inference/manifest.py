@@ -193,6 +193,29 @@ class Language:
     certainty: Certainty | None = None
 
 
+class Pooling(StrEnum):
+    """Say how an encoder's values for tokens become one for the text; `none` if they are one."""
+
+    MEAN = "mean"
+    FIRST = "first"
+    NONE = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Embedding:
+    """Declare a text embedder: its graph, which output is read, and how.
+
+    Texts whose vectors have a cosine below `least_cosine` count as having nothing in common.
+    """
+
+    graph: str
+    output: str
+    pooling: Pooling
+    dimensions: int
+    most_tokens: int
+    least_cosine: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpottingMeasured:
     """Declare how good a spotter was at its normal threshold, on voices that it had not learnt.
@@ -228,8 +251,8 @@ class Manifest:
     """Declare one model; `card` where there is one.
 
     A graph has tensors and `files`, one for each variant, detectors a `detection` too, spotters
-    `key_words`; a Whisper and a language model have `parts`, which are all needed, and `whisper` or
-    `language`.
+    `key_words`; a Whisper, a language model and a text embedder have `parts`, which are all needed,
+    and `whisper`, `language` or `embedding`.
     """
 
     name: str
@@ -245,3 +268,4 @@ class Manifest:
     parts: tuple[ModelFile, ...] = ()
     whisper: Whisper | None = None
     language: Language | None = None
+    embedding: Embedding | None = None

@@ -10,6 +10,7 @@ from vla_deploy.inference.manifest import (
     EncoderContext,
     Fit,
     LanguageUse,
+    Pooling,
     TensorLayout,
     Variant,
 )
@@ -35,6 +36,7 @@ DETECTOR: Final = "detector"
 KEY_WORDS: Final = "key_words"
 SPEECH_TO_TEXT: Final = "speech_to_text"
 PLANNER: Final = "planner"
+TEXT_EMBEDDER: Final = "text_embedder"
 DTYPES: Final = ("float32", "float16", "uint8", "int8", "int32", "int64", "bool")
 PIXEL_DTYPES: Final = ("float32", "float16", "uint8", "int32", "int64")
 COLOURS: Final = ("rgb", "bgr")
@@ -198,6 +200,14 @@ _SHAPES: Final[Mapping[str, Shape]] = {
         "most_tokens": COUNT,
         "certainty": TABLE.optional,
     },
+    "embedding": {
+        "graph": ValueCheck(expected="a file in the model's folder", holds=_is_file_name),
+        "output": TEXT,
+        "pooling": one_of(*Pooling),
+        "dimensions": COUNT,
+        "most_tokens": COUNT,
+        "least_cosine": RATIO,
+    },
     "language.certainty": dict.fromkeys(
         ("bias", "least", "mean", "strange", "read_back_below", "decline_below"), NUMBER
     ),
@@ -212,7 +222,9 @@ def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[T
 
 
 def _key_faults(document: Mapping[str, Any]) -> Iterator[TableFault]:
-    parts_of = next((name for name in ("whisper", "language") if name in document), None)
+    parts_of = next(
+        (name for name in ("whisper", "language", "embedding") if name in document), None
+    )
     shape = {**_HEAD, "parts": TABLES, parts_of: TABLE} if parts_of else _GRAPH
     yield from check_record(document, "", shape)
     yield from check_tables(document, _SHAPES)
@@ -231,6 +243,9 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Tab
         needed = [GENAI_CONFIG, TOKENIZER]
         needed += [] if any(path.endswith(".onnx") for path in paths) else ["an .onnx file"]
         yield from _part_faults(document, paths, "language", PLANNER, needed)
+    elif "embedding" in document:
+        needed = [TOKENIZER, document["embedding"]["graph"]]
+        yield from _part_faults(document, paths, "embedding", TEXT_EMBEDDER, needed)
     else:
         yield from _graph_faults(document)
 

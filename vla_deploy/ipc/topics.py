@@ -490,6 +490,16 @@ PROCESS_TABLE = Topic(
     payload=supervision.ProcessTable,
     fields=(PackedField("document", "json", 16384),),
 )
+ACTIVITY = Topic(
+    name="activity",
+    kind=TopicKind.CELL,
+    owner="supervisor",
+    rate_hz=2,
+    deadline_s=3.0,
+    summary="what the robot does in one word, and what stops it, as JSON; what changes, sooner",
+    payload=supervision.ActivityDocument,
+    fields=(PackedField("document", "json", 1024),),
+)
 RESOURCE_DIRECTIVES = Topic(
     name="resource_directives",
     kind=TopicKind.CELL,

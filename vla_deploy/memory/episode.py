@@ -1,10 +1,10 @@
 """Hold what is remembered, and say it: commands and what came of them, things and their places."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, Self
 
 
 def unix_s() -> float:
@@ -21,11 +21,29 @@ class EpisodeOutcome(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PastAction:
+    """Hold how one action of a command went: what it was about, with which hand, at which place.
+
+    `kind` and `colour` are those of the thing, `hand` the hand that did it; "" is not known.
+    """
+
+    skill: str
+    succeeded: bool
+    kind: str = ""
+    colour: str = ""
+    hand: str = ""
+    place: str = ""
+    error: str = ""
+    done_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
     """Hold one command from its words to its end; `told_s` is seconds since 1970.
 
     `plan` is the plan's document, empty where there was none; `rung` is who planned it. `number` is
-    its place in the memory, 0 before it has one.
+    its place in the memory, 0 before it has one. Where a person has corrected the outcome,
+    `judged_from` is what the robot had taken it for, and `why` what the person said.
     """
 
     told_s: float
@@ -39,15 +57,26 @@ class Episode:
     error: str = ""
     duration_s: float = 0.0
     number: int = 0
+    actions: tuple[PastAction, ...] = ()
+    judged_from: EpisodeOutcome | None = None
+    why: str = ""
 
     @property
     def text(self) -> str:
         """Return all of it that words can find."""
-        return "\n".join(part for part in (self.command, self.goal, self.error) if part)
+        return "\n".join(part for part in (self.command, self.goal, self.error, self.why) if part)
+
+    def judged(self, outcome: EpisodeOutcome, why: str = "") -> Self:
+        """Return it with the outcome that a person gives it; what the robot saw stays known."""
+        seen = self.judged_from or self.outcome
+        return replace(
+            self, outcome=outcome, judged_from=None if outcome is seen else seen, why=why
+        )
 
     def document(self) -> dict[str, Any]:
         """Return it as the export and `--json` tell it."""
-        return {**asdict(self), "outcome": self.outcome.value}
+        judged_from = None if self.judged_from is None else self.judged_from.value
+        return {**asdict(self), "outcome": self.outcome.value, "judged_from": judged_from}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +118,11 @@ _ENDS: Final = {
     EpisodeOutcome.FAILED: "and it failed",
     EpisodeOutcome.REFUSED: "and it was refused",
 }
+_JUDGED: Final = {
+    EpisodeOutcome.SUCCEEDED: "was right",
+    EpisodeOutcome.FAILED: "was wrong",
+    EpisodeOutcome.REFUSED: "was to be refused",
+}
 
 
 def ago(elapsed_s: float) -> str:
@@ -110,7 +144,26 @@ def sentence_of(episode: Episode, now_s: float) -> str:
     """Return an episode in a sentence."""
     because = f": {episode.error}" if episode.error else ""
     said = f'{ago(now_s - episode.told_s)} I was told "{episode.command}"'
-    return f"{said[0].upper()}{said[1:]} {_ENDS[episode.outcome]}{because}."
+    seen = episode.judged_from or episode.outcome
+    judged = ""
+    if episode.judged_from is not None or episode.why:
+        why = f": {episode.why}" if episode.why else ""
+        judged = f"; a person said later that it {_JUDGED[episode.outcome]}{why}"
+    return f"{said[0].upper()}{said[1:]} {_ENDS[seen]}{because}{judged}."
+
+
+def attempt_words(action: PastAction, now_s: float) -> str:
+    """Return a past action that failed in a sentence."""
+    thing = " ".join(word for word in (action.colour, action.kind) if word)
+    parts = (
+        action.skill,
+        f"of a {thing}" if thing else "",
+        f"with my {action.hand} hand" if action.hand else "",
+        f"at the {action.place.replace('_', ' ')}" if action.place else "",
+    )
+    because = f": {action.error}" if action.error else ""
+    done = " ".join(part for part in parts if part)
+    return f"{ago(now_s - action.done_s).capitalize()} {done} failed{because}."
 
 
 def place_words(thing: LastSeen, now_s: float) -> str:

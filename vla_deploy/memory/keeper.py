@@ -5,14 +5,16 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, wait
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import Event, SharedSpace, topics
 from vla_deploy.ipc.payloads.tasks import MemoryStatus, TaskEvent, Utterance
+from vla_deploy.memory.actions import past_actions
 from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen
 from vla_deploy.memory.errors import MemoryUnusable
+from vla_deploy.memory.judgement import Judgement, read_judgement
 from vla_deploy.memory.store import MemoryStore
 from vla_deploy.world import SceneUnreadable, Snapshot, Thing, read_snapshot
 from vla_deploy.world.memory import Point, place_of
@@ -31,6 +33,15 @@ _MOST_KEPT: Final = 200
 MOST_THINGS: Final = 512
 _ENDS: Final = frozenset({"rejected", "finished", "answered"})
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Batch:
+    """Hold what is written in one act."""
+
+    episodes: list[Episode] = field(default_factory=list)
+    things: dict[str, LastSeen] = field(default_factory=dict)
+    judged: list[tuple[Episode, Judgement]] = field(default_factory=list)
 
 
 class MemoryKeeper:
@@ -58,20 +69,25 @@ class MemoryKeeper:
         self._scene = space.cell_reader(topics.SCENE)
         self._open: OrderedDict[str, Episode] = OrderedDict()
         self._ended: list[Episode] = []
+        self._last: Episode | None = None
+        self._judged: list[tuple[Episode, Judgement]] = []
         self._seen: OrderedDict[str, LastSeen] = OrderedDict()
         self._changed: dict[str, LastSeen] = {}
         self._writing: Future[None] | None = None
-        self._batch: tuple[list[Episode], dict[str, LastSeen]] = ([], {})
+        self._batch = _Batch()
         self._look_due_ns = 0
         self._write_due_ns = 0
         self.trouble = ""
 
     def step(self) -> None:
         """Take note of what has come in, and write what is complete."""
-        for said in self._utterances.drain():
+        heard = self._utterances.drain()
+        for said in heard:
             self._begin(said)
         for event in self._events.drain():
             self._follow(event.payload)
+        for said in heard:  # once it is known what has ended by now
+            self._judge(said.payload)
         now_ns = self._clock.now_ns()
         if now_ns >= self._look_due_ns:
             self._look_due_ns = now_ns + LOOK_EVERY_NS
@@ -89,7 +105,7 @@ class MemoryKeeper:
 
     def document(self) -> MemoryStatus:
         """Return how remembering goes, for the status."""
-        waiting = len(self._ended) + len(self._changed)
+        waiting = len(self._ended) + len(self._changed) + len(self._judged)
         return {"file": str(self._store.path), "waiting": waiting, "trouble": self.trouble}
 
     # --- commands -------------------------------------------------------------------------------
@@ -98,6 +114,8 @@ class MemoryKeeper:
         told = event.payload
         command_id, text = str(told.get("command_id", "")), str(told.get("text") or "")
         if not command_id or not text:  # a cancel, or a whole plan from a program
+            return
+        if read_judgement(text) is not None:  # of another command
             return
         self._open[command_id] = Episode(
             told_s=self._wall_s(),
@@ -118,9 +136,22 @@ class MemoryKeeper:
             self._open[command_id] = episode
             return
         del self._open[command_id]
-        elapsed_s = max(0.0, self._wall_s() - episode.told_s)
-        self._ended.append(replace(episode, duration_s=round(elapsed_s, 1)))
+        now_s = self._wall_s()
+        actions = (
+            past_actions(told.get("actions", ()), now_s) if told["event"] == "finished" else ()
+        )
+        elapsed_s = max(0.0, now_s - episode.told_s)
+        self._last = replace(episode, duration_s=round(elapsed_s, 1), actions=actions)
+        self._ended.append(self._last)
         del self._ended[:-_MOST_KEPT]
+
+    def _judge(self, told: Utterance) -> None:
+        """Let a person correct what came of the command that ended last, if surely understood."""
+        judgement = read_judgement(str(told.get("text") or ""))
+        is_doubted = told.get("heard", {}).get("doubted", False)
+        if judgement is not None and self._last is not None and not is_doubted:
+            self._judged.append((self._last, judgement))
+            del self._judged[:-_MOST_KEPT]
 
     # --- things ---------------------------------------------------------------------------------
 
@@ -163,12 +194,13 @@ class MemoryKeeper:
             if not self._writing.done():
                 return
             self._settle(self._writing, now_ns)
-        if now_ns < self._write_due_ns or not (self._ended or self._changed):
+        if now_ns < self._write_due_ns or not (self._ended or self._changed or self._judged):
             return
-        self._batch = self._ended, self._changed
-        self._ended, self._changed = [], {}
-        episodes, things = self._batch
-        self._writing = self._executor.submit(self._store.add, episodes, list(things.values()))
+        batch = _Batch(episodes=self._ended, things=self._changed, judged=self._judged)
+        self._batch = batch
+        self._ended, self._changed, self._judged = [], {}, []
+        things = list(batch.things.values())
+        self._writing = self._executor.submit(self._store.add, batch.episodes, things, batch.judged)
 
     def _settle(self, writing: "Future[None]", now_ns: int) -> None:
         self._writing = None
@@ -182,9 +214,10 @@ class MemoryKeeper:
             _log.warning("not remembered for now: %s", error)
         self.trouble = str(error)
         self._write_due_ns = now_ns + _RETRY_NS
-        episodes, things = self._batch
-        self._ended = [*episodes, *self._ended][-_MOST_KEPT:]
-        waiting = {**things, **self._changed}
+        batch = self._batch
+        self._ended = [*batch.episodes, *self._ended][-_MOST_KEPT:]
+        self._judged = [*batch.judged, *self._judged][-_MOST_KEPT:]
+        waiting = {**batch.things, **self._changed}
         self._changed = {name: seen for name, seen in waiting.items() if name in self._seen}
 
 

@@ -8,10 +8,12 @@ from typing import Final
 
 from vla_deploy.memory.errors import MemoryUnusable
 
-VERSION: Final = 1
+VERSION: Final = 2
 _log = logging.getLogger(__name__)
 
-_TABLES: Final = """
+# What each version adds to the one before.
+_STEPS: Final = (
+    """
 CREATE TABLE episode (
     number INTEGER PRIMARY KEY AUTOINCREMENT, told_s REAL NOT NULL, command TEXT NOT NULL,
     outcome TEXT NOT NULL, source TEXT NOT NULL, goal TEXT NOT NULL, reasoning TEXT NOT NULL,
@@ -25,7 +27,14 @@ CREATE TABLE thing (
     place TEXT NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, z_m REAL NOT NULL,
     seen_s REAL NOT NULL, PRIMARY KEY (run_id, thing_id));
 CREATE INDEX thing_by_kind ON thing (kind, seen_s);
-"""
+""",
+    """
+ALTER TABLE episode ADD COLUMN actions TEXT NOT NULL DEFAULT '[]';
+ALTER TABLE episode ADD COLUMN judged_from TEXT NOT NULL DEFAULT '';
+ALTER TABLE episode ADD COLUMN why TEXT NOT NULL DEFAULT '';
+CREATE INDEX episode_with_actions ON episode (number) WHERE actions <> '[]' AND judged_from = '';
+""",
+)
 
 
 def open_file(path: Path, patience_s: float) -> sqlite3.Connection:
@@ -73,8 +82,14 @@ def _bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
     (found,) = connection.execute("PRAGMA user_version").fetchone()
     if found > VERSION:
         raise _unusable(path, f"it has version {found}, this release knows {VERSION}")
-    if found == 0:
-        connection.executescript(f"BEGIN;{_TABLES}PRAGMA user_version = {VERSION};COMMIT;")
+    if found == VERSION:
+        return
+    with connection:
+        connection.execute("BEGIN IMMEDIATE")  # another process may be at it, too
+        (found,) = connection.execute("PRAGMA user_version").fetchone()
+        for statement in "".join(_STEPS[found:]).split(";"):
+            connection.execute(statement)
+        connection.execute(f"PRAGMA user_version = {VERSION}")
 
 
 def _unusable(path: Path, reason: str) -> MemoryUnusable:

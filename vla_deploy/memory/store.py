@@ -1,17 +1,27 @@
 """Keep episodes and places of things in one bounded file; find, export and erase them."""
 
 import json
+import logging
 import sqlite3
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, Self
 
-from vla_deploy.memory.episode import Episode, EpisodeOutcome, LastSeen, Recollection
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.memory.episode import (
+    Episode,
+    EpisodeOutcome,
+    LastSeen,
+    PastAction,
+    Recollection,
+)
 from vla_deploy.memory.errors import MemoryUnusable, NoSuchEpisode
+from vla_deploy.memory.judgement import Judgement
 from vla_deploy.memory.schema import open_file
-from vla_deploy.memory.search import EMBEDDING, Vectors, embed, search
+from vla_deploy.memory.search import Embedder, LetterGroups, Vectors, search
 from vla_deploy.runtime.state_dir import state_dir_of
 
 FILE_NAME: Final = "memory.sqlite3"
@@ -19,15 +29,22 @@ MOST_EPISODES: Final = 5_000
 MOST_THINGS: Final = 1_000
 PATIENCE_S: Final = 2.0
 _EPISODE: Final = (
-    "number, told_s, command, outcome, source, goal, reasoning, plan, rung, error, duration_s"
+    "number, told_s, command, outcome, source, goal, reasoning, plan, rung, error, duration_s, "
+    "actions, judged_from, why"
 )
 _THING: Final = "run_id, thing_id, kind, colour, place, x_m, y_m, z_m, seen_s"
+# So many commands are looked through for how their actions went.
+_RECENT: Final = 50
+# Older episodes that get vectors of a new embedder along with each one that is added.
+_EMBEDDED_AT_ONCE: Final = 32
+_log = logging.getLogger(__name__)
 
 
 class MemoryStore:
     """Hold the memory of one robot; may be used from several threads and processes.
 
-    Beyond `most_episodes` and `most_things` the oldest are forgotten.
+    Beyond `most_episodes` and `most_things` the oldest are forgotten. With an `embedder` episodes
+    are found by meaning, too; one that fails is done without from then on.
     """
 
     def __init__(
@@ -37,6 +54,7 @@ class MemoryStore:
         most_episodes: int = MOST_EPISODES,
         most_things: int = MOST_THINGS,
         patience_s: float = PATIENCE_S,
+        embedder: Embedder | None = None,
     ) -> None:
         """Open the memory; each act waits for `patience_s` while another process writes.
 
@@ -46,39 +64,62 @@ class MemoryStore:
         self.path = path
         self._most_episodes = most_episodes
         self._most_things = most_things
+        self._embedders: tuple[Embedder, ...] = (LetterGroups(), *([embedder] if embedder else []))
         self._lock = threading.Lock()
         self._connection = open_file(path, patience_s)
 
     @classmethod
-    def of_base(cls, base: Path, most_episodes: int = MOST_EPISODES) -> Self:
+    def of_base(
+        cls, base: Path, most_episodes: int = MOST_EPISODES, embedder: Embedder | None = None
+    ) -> Self:
         """Open the memory of the robot that runs in a runtime directory.
 
         Raises:
             MemoryUnusable: the file cannot be used.
         """
-        return cls(state_dir_of(base) / "memory" / FILE_NAME, most_episodes=most_episodes)
+        path = state_dir_of(base) / "memory" / FILE_NAME
+        return cls(path, most_episodes=most_episodes, embedder=embedder)
 
     def close(self) -> None:
         """Release the file."""
         with self._lock:
             self._connection.close()
 
-    def add(self, episodes: Sequence[Episode], things: Sequence[LastSeen] = ()) -> None:
-        """Remember commands that have ended, and where things are now, in one act.
+    def add(
+        self,
+        episodes: Sequence[Episode],
+        things: Sequence[LastSeen] = (),
+        judgements: Sequence[tuple[Episode, Judgement]] = (),
+    ) -> None:
+        """Remember commands that have ended, where things are, what people say of it, in one act.
 
         Raises:
             MemoryUnusable: the file cannot be written, such as for a full disk; nothing is lost
                 of what was remembered before.
         """
-        vectors = embed([one.text for one in episodes])
+        vectors = self._vectors([one.text for one in episodes])
         with self._transaction() as connection:
-            for episode, vector in zip(episodes, vectors, strict=True):
-                self._insert(connection, episode, vector)
+            for number, episode in enumerate(episodes):
+                row = {name: rows[number] for name, rows in vectors.items()}
+                self._insert(connection, episode, row)
             connection.executemany(
                 f"INSERT OR REPLACE INTO thing ({_THING}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 [_thing_row(one) for one in things],
             )
+            for episode, judgement in judgements:
+                self._judge_same(connection, episode, judgement)
             self._forget_the_oldest(connection)
+        self._embed_older()
+
+    def update_outcome(self, number: int, outcome: EpisodeOutcome, why: str = "") -> Episode:
+        """Correct what came of a command, as a person judges it; return the episode as it is now.
+
+        Raises:
+            NoSuchEpisode: there is none of that number.
+            MemoryUnusable: the file cannot be written.
+        """
+        with self._transaction() as connection:
+            return self._judge(connection, self._one(number), Judgement(outcome=outcome, why=why))
 
     def recall(self, text: str, count: int = 5) -> list[Recollection]:
         """Return the episodes that fit a text best, by words and by vectors.
@@ -86,9 +127,28 @@ class MemoryStore:
         Raises:
             MemoryUnusable: the file cannot be read.
         """
+        vectors = self._vectors([text])
+        asked = {one.name: (vectors[one.name][0], one.least_cosine) for one in self._embedders}
         with self._transaction() as connection:
-            found = search(connection, text)[:count]
+            found = search(connection, text, asked)[:count]
             return [Recollection(episode=self._one(number), score=score) for number, score in found]
+
+    def past_actions(self, count: int = _RECENT) -> list[PastAction]:
+        """Return how actions of the last commands went, the newest first.
+
+        Those of a command whose outcome a person has corrected are left out: which of them was
+        wrong nobody knows.
+
+        Raises:
+            MemoryUnusable: the file cannot be read.
+        """
+        with self._transaction() as connection:
+            rows = connection.execute(
+                "SELECT actions FROM episode WHERE actions <> '[]' AND judged_from = '' "
+                "ORDER BY number DESC LIMIT ?",
+                (count,),
+            ).fetchall()
+        return [one for (text,) in rows for one in reversed(_actions(text))]
 
     def newest(self, count: int = 20) -> list[Episode]:
         """Return the last episodes, the newest first.
@@ -173,24 +233,77 @@ class MemoryStore:
             )
         return _episode(row)
 
-    def _insert(self, connection: sqlite3.Connection, episode: Episode, vector: Vectors) -> None:
-        values = (
-            episode.told_s, episode.command, episode.outcome.value, episode.source, episode.goal,
-            episode.reasoning, json.dumps(dict(episode.plan)), episode.rung, episode.error,
-            episode.duration_s,
-        )  # fmt: skip
+    def _insert(
+        self, connection: sqlite3.Connection, episode: Episode, vectors: Mapping[str, Vectors]
+    ) -> None:
+        values = _values(episode)
         number = connection.execute(
             f"INSERT INTO episode ({_EPISODE.removeprefix('number, ')}) "
             f"VALUES ({', '.join('?' * len(values))})",
             values,
         ).lastrowid
+        assert number is not None, "a row was inserted"
         connection.execute(
             "INSERT INTO episode_text (rowid, text) VALUES (?, ?)", (number, episode.text)
         )
+        for name, vector in vectors.items():
+            _keep_vector(connection, number, name, vector)
+
+    def _judge_same(
+        self, connection: sqlite3.Connection, episode: Episode, judgement: Judgement
+    ) -> None:
+        """Correct the outcome of an episode that was added without its number being known."""
+        row = connection.execute(
+            f"SELECT {_EPISODE} FROM episode WHERE told_s = ? AND command = ? "
+            "ORDER BY number DESC LIMIT 1",
+            (episode.told_s, episode.command),
+        ).fetchone()
+        if row is not None:  # else it was erased meanwhile
+            self._judge(connection, _episode(row), judgement)
+
+    def _judge(
+        self, connection: sqlite3.Connection, episode: Episode, judgement: Judgement
+    ) -> Episode:
+        judged = episode.judged(judgement.outcome, judgement.why)
+        from_value = judged.judged_from.value if judged.judged_from is not None else ""
         connection.execute(
-            "INSERT INTO vector (number, embedder, value) VALUES (?, ?, ?)",
-            (number, EMBEDDING, vector.tobytes()),
+            "UPDATE episode SET outcome = ?, judged_from = ?, why = ? WHERE number = ?",
+            (judged.outcome.value, from_value, judged.why, judged.number),
         )
+        connection.execute(
+            "UPDATE episode_text SET text = ? WHERE rowid = ?", (judged.text, judged.number)
+        )
+        return judged
+
+    # --- vectors --------------------------------------------------------------------------------
+
+    def _vectors(self, texts: Sequence[str]) -> dict[str, Vectors]:
+        """Return the vectors of texts by each embedder; one that fails is given up."""
+        made: dict[str, Vectors] = {}
+        for one in self._embedders:
+            try:
+                made[one.name] = one.embed(texts)
+            except InferenceError as error:
+                _log.warning("degraded: the memory is searched by words alone: %s", error)
+                self._embedders = tuple(kept for kept in self._embedders if kept is not one)
+        return made
+
+    def _embed_older(self) -> None:
+        """Make vectors for some episodes that have none of the embedder that is in use."""
+        for one in self._embedders[1:]:
+            with self._transaction() as connection:
+                rows = connection.execute(
+                    f"SELECT {_EPISODE} FROM episode WHERE number NOT IN "
+                    "(SELECT number FROM vector WHERE embedder = ?) ORDER BY number DESC LIMIT ?",
+                    (one.name, _EMBEDDED_AT_ONCE),
+                ).fetchall()
+            older = [_episode(row) for row in rows]
+            made = self._vectors([episode.text for episode in older]).get(one.name)
+            if made is None or not older:
+                continue
+            with self._transaction() as connection:
+                for episode, vector in zip(older, made, strict=True):
+                    _keep_vector(connection, episode.number, one.name, vector)
 
     def _forget_the_oldest(self, connection: sqlite3.Connection) -> None:
         old = connection.execute(
@@ -218,15 +331,41 @@ def _told(path: Path) -> Iterator[None]:
         raise MemoryUnusable(f"{path}: {error}; check the disk's space and rights") from error
 
 
+def _keep_vector(connection: sqlite3.Connection, number: int, name: str, vector: Vectors) -> None:
+    """Keep a vector of an episode, unless that was erased meanwhile."""
+    connection.execute(
+        "INSERT OR REPLACE INTO vector (number, embedder, value) "
+        "SELECT number, ?, ? FROM episode WHERE number = ?",
+        (name, vector.tobytes(), number),
+    )
+
+
+def _values(episode: Episode) -> tuple[Any, ...]:
+    judged_from = "" if episode.judged_from is None else episode.judged_from.value
+    return (
+        episode.told_s, episode.command, episode.outcome.value, episode.source, episode.goal,
+        episode.reasoning, json.dumps(dict(episode.plan)), episode.rung, episode.error,
+        episode.duration_s, json.dumps([asdict(one) for one in episode.actions]), judged_from,
+        episode.why,
+    )  # fmt: skip
+
+
 def _episode(row: Sequence[Any]) -> Episode:
     values = dict(zip(_EPISODE.split(", "), row, strict=True))
+    judged_from = values["judged_from"]
     return Episode(
         **{
             **values,
             "outcome": EpisodeOutcome(values["outcome"]),
             "plan": json.loads(values["plan"]),
+            "actions": _actions(values["actions"]),
+            "judged_from": EpisodeOutcome(judged_from) if judged_from else None,
         }
     )
+
+
+def _actions(text: str) -> tuple[PastAction, ...]:
+    return tuple(PastAction(**one) for one in json.loads(text))
 
 
 def _last_seen(row: Sequence[Any]) -> LastSeen:

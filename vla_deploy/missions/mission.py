@@ -22,7 +22,7 @@ RESOURCES: Final[Mapping[str, str]] = {
     "navigation_system": "base", "navigation": "base", "base": "base", "head": "head",
     "camera": "camera", "microphone": "microphone", "speaker": "speaker", "voice": "speaker",
 }  # fmt: skip
-_SEPARATOR: Final = re.compile(r"\s*;\s*(?:and )?(?:then )?|\.\s+(?:then|after that,?) ", re.I)
+_SEPARATOR: Final = re.compile(r"\s*;\s*(?:and )?(?:then )?", re.I)
 _MEANWHILE: Final = re.compile(r"(?:meanwhile|at the same time),? ?", re.I)
 _ALIASES: Final[Mapping[str, tuple[str, ...]]] = {
     "words": ("words", "command", "text", "description", "name", "objective", "goal"),

@@ -77,6 +77,7 @@ class MissionRun(BaseModel):
     run_id: str = ""
     mission: Mission
     source: str = ""
+    heard_confidence: float | None = None
     given_unix_s: float
     state: MissionState = MissionState.PLANNING
     due_unix_s: float | None = None
@@ -215,6 +216,19 @@ class MissionRun(BaseModel):
         return self.due_unix_s is not None and (times is None or self.cycles < times)
 
     # --- words ----------------------------------------------------------------------------------
+
+    def spoken_report(self) -> str:
+        """Say in short sentences what is done so far, and what is not, at most 500 characters."""
+        words = {one.id: one.words or one.id for one in self.mission.objectives}
+        done = [words[name] for name, one in self.objectives.items() if one.state == "completed"]
+        failed = [
+            f"{words[name]}, because {one.error}"
+            for name, one in self.objectives.items()
+            if one.state is PartState.FAILED
+        ]
+        told = [f"Done: {'; '.join(done)}." if done else "Nothing is done yet."]
+        told += [f"Not done: {one.rstrip('.')}." for one in failed]
+        return " ".join(told)[:500]
 
     def report(self) -> str:
         """Say which objectives are done, and why the others are not."""

@@ -14,6 +14,13 @@ FILE_NAME: Final = "missions.json"
 MOST_KEPT: Final = 20
 
 
+def newest(runs: list[MissionRun]) -> list[MissionRun]:
+    """Return the missions to keep: the newest, and all that have not ended."""
+    ended = [one for one in runs if one.state.is_final and not one.repeats()]
+    gone = {one.mission_id for one in ended[: max(0, len(runs) - MOST_KEPT)]}
+    return [one for one in runs if one.mission_id not in gone]
+
+
 class MissionStore:
     """Read and write the missions of a robot; without a file nothing is kept."""
 
@@ -43,17 +50,14 @@ class MissionStore:
             self.file.replace(self.file.with_suffix(".unreadable"))
 
     def save(self, runs: list[MissionRun]) -> None:
-        """Write the newest missions; what has not ended is always among them.
+        """Write missions.
 
         Raises:
             MissionsUnusable: the file cannot be written.
         """
         if self.file is None:
             return
-        ended = [one for one in runs if one.state.is_final and not one.repeats()]
-        gone = {one.mission_id for one in ended[: max(0, len(runs) - MOST_KEPT)]}
-        kept = [one for one in runs if one.mission_id not in gone]
-        text = json.dumps([one.model_dump(mode="json") for one in kept])
+        text = json.dumps([one.model_dump(mode="json") for one in runs])
         part = self.file.with_suffix(".part")
         try:
             self.file.parent.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from vla_deploy.inference.errors import ModelUnknown
-from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Whisper
+from vla_deploy.inference.manifest import Embedding, Language, Manifest, ModelFile, Whisper
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
 from vla_deploy.inference.store import ModelStore, StoredModel, sha256_of
 
@@ -32,6 +32,7 @@ class FolderSource:
         *,
         whisper: Whisper | None = None,
         language: Language | None = None,
+        embedding: Embedding | None = None,
     ) -> Manifest:
         """Return the manifest of a model that these files of the folder make up.
 
@@ -49,6 +50,7 @@ class FolderSource:
             ),
             whisper=whisper,
             language=language,
+            embedding=embedding,
         )
 
 

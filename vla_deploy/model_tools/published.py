@@ -9,10 +9,11 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.inference.errors import FetchFailed, ModelUnknown
-from vla_deploy.inference.manifest_schema import GENAI_CONFIG, WHISPER_PARTS
+from vla_deploy.inference.manifest_schema import GENAI_CONFIG, TOKENIZER, WHISPER_PARTS
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.model_tools.hub import HubCommit
 from vla_deploy.model_tools.language_models import is_part
+from vla_deploy.model_tools.text_embedders import GRAPH
 from vla_deploy.model_tools.whispers import PARTS
 
 _MIT: Final = "MIT"
@@ -24,13 +25,15 @@ _CPU: Final = "cpu_and_mobile/cpu-int4-rtn-block-32-acc-level-4"
 class ModelFormat:
     """Say which files make up a model of a kind; where one lies, there is its `landmark`.
 
-    `option` is that of `models add` for a folder of this form.
+    `option` is that of `models add` for a folder of this form. Files `at_root` lie at the root of
+    many repositories instead of in the model's folder.
     """
 
     name: str
     option: str
     landmark: str
     is_part: Callable[[str], bool]
+    at_root: tuple[str, ...] = ()
 
 
 WHISPER: Final = ModelFormat(
@@ -41,6 +44,14 @@ WHISPER: Final = ModelFormat(
 )
 LANGUAGE: Final = ModelFormat(
     name="onnxruntime-genai", option="--language", landmark=GENAI_CONFIG, is_part=is_part
+)
+
+EMBEDDER: Final = ModelFormat(
+    name="sentence-transformers' ONNX export",
+    option="--embedder",
+    landmark=GRAPH,
+    is_part=(GRAPH, f"{GRAPH}_data", TOKENIZER).__contains__,
+    at_root=(TOKENIZER,),
 )
 
 
@@ -140,6 +151,17 @@ LANGUAGE_MODELS: Final[Mapping[str, PublishedModel]] = MappingProxyType(
         ),
     }
 )
+TEXT_EMBEDDERS: Final[Mapping[str, PublishedModel]] = MappingProxyType(
+    {
+        "minilm-l6": PublishedModel(
+            repository="sentence-transformers/all-MiniLM-L6-v2",
+            folder="onnx",
+            summary="all-MiniLM-L6-v2 of sentence-transformers, fp32, 90 MB, English",
+            licence="Apache-2.0",
+            format=EMBEDDER,
+        )
+    }
+)
 """Where models are published; the hub alone knows their hashes."""
 
 
@@ -171,6 +193,8 @@ def fetched(
     there = PurePosixPath(published.folder)
     files = [PurePosixPath(path) for path in commit.paths]
     wanted = [str(file) for file in files if file.parent == there and form.is_part(file.name)]
+    apart = [name for name in form.at_root if str(there / name) not in wanted]
+    apart = [name for name in apart if name in commit.paths]
     if str(there / form.landmark) not in wanted:
         models = ", ".join(str(file.parent) for file in files if file.name == form.landmark)
         raise FetchFailed(
@@ -180,5 +204,7 @@ def fetched(
     store.user.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".fetch-", dir=store.user) as directory:
         folder = Path(directory)
-        commit.fetch(wanted, folder, report)
+        commit.fetch([*wanted, *apart], folder, report)
+        for name in apart:
+            (folder / name).replace(folder / published.folder / name)
         yield folder / published.folder, published.licence or commit.licence or "not stated"

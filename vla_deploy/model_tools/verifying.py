@@ -11,7 +11,7 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools import language_models, whispers
+from vla_deploy.model_tools import language_models, text_embedders, whispers
 from vla_deploy.model_tools.detectors.adding import try_out
 from vla_deploy.speech.errors import SpeechError
 
@@ -83,6 +83,9 @@ def _as_profile(shelf: ModelShelf, model: StoredModel, profile: Profile) -> str:
 
 def _parts_tried(shelf: ModelShelf, model: StoredModel, choice: ModelChoice | None) -> str:
     """Run a model of several files, as plainly as it goes without a choice."""
+    if model.manifest.embedding is not None:
+        trial = text_embedders.try_out(model, choice or PLAIN_CHOICE)
+        return f"one meaning {trial.same:.2f} alike, two meanings {trial.other:.2f}"
     if model.manifest.whisper is None:
         answer = language_models.try_out(model, shelf.clock, choice or PLAIN_CHOICE)
         return f"answers {answer.text} in {answer.runs} runs"

@@ -5,6 +5,8 @@ from typing import Final
 
 from platforms import load_profile
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.memory.meaning import installed_embedder
 from vla_deploy.missions.store import FILE_NAME, MissionStore
 from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
@@ -24,7 +26,10 @@ def build(context: NodeContext) -> PlannerNode:
     robot = load_robot(context.robot)
     profile, base = load_profile(context.profile), context.run_dir.parent
     planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
-    memory = open_memory(profile.planning, base)
+    shelf = ModelShelf.of_run(context.run_dir, context.clock)
+    remembers = profile.planning.remembered > 0
+    embedder = installed_embedder(shelf, profile) if remembers else None
+    memory = open_memory(profile.planning, base, embedder)
     executor = worker_thread("plan", context.clock, PLANNING_S)
     missions = MissionStore(state_dir_of(base) / FILE_NAME)
     forbidden = Prohibitions.of_base(base)

@@ -15,7 +15,7 @@ from vla_deploy.inference.manifest import LanguageUse
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, tier_name
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.memory import MemoryStore, MemoryUnusable
+from vla_deploy.memory import Embedder, MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.planning.chat_models.chat_model import LocalModel, ServedModel
@@ -98,12 +98,14 @@ def open_local_models(
     return tuple(opened), away
 
 
-def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
+def open_memory(
+    settings: PlanningSettings, base: Path, embedder: Embedder | None = None
+) -> MemoryStore | None:
     """Return the robot's memory, None where the profile wants none or its file cannot be used."""
     if settings.remembered == 0:
         return None
     try:
-        return MemoryStore.of_base(base, settings.remembered)
+        return MemoryStore.of_base(base, settings.remembered, embedder)
     except MemoryUnusable as error:
         _log.warning("planning does without memory: %s", error)
         return None

@@ -1,13 +1,13 @@
 """Define what passes between the planner's parts, and what every back end does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from typing import Any, Protocol
 
 from vla_deploy.ipc.payloads.supervision import BatteryDocument
-from vla_deploy.ipc.payloads.tasks import AttemptDocument
-from vla_deploy.memory.episode import LastSeen
+from vla_deploy.ipc.payloads.tasks import ActionStatusName, AttemptDocument
+from vla_deploy.memory.experience import NO_EXPERIENCE, Experience
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.planning.errors import Ambiguous, NotAble
 from vla_deploy.planning.understanding.conversation import Conversation
@@ -65,16 +65,26 @@ class Aid(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ActionNote:
+    """Hold how one of the last actions ended."""
+
+    skill: str
+    parameters: Mapping[str, Any]
+    status: ActionStatusName
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlanRequest:
     """Hold one command, with all that may be known when it is planned.
 
-    `here` is the robot's x and y in metres and its yaw in radians, in the map. `recollections` are
-    what the robot remembers that may bear on the command, a sentence each; `last_seen` says where
-    things were before, the newest first. `heard_confidence`, 0 to 1, is how sure the recogniser is
-    of the words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now,
-    where a back end can use it. `failed` describes plans for this command that were tried before,
-    and what went wrong. `prohibitions` are what people have forbidden for good.
-    `battery` is None where nothing tells of it.
+    `here` is the robot's x and y in metres and its yaw in radians, in the map. `experience` is what
+    the robot remembers that may bear on the command. `task` is what is carried out now, in words,
+    "" for nothing; `last_actions` are those that ended last, the newest first. `battery` is
+    None where nothing tells of it. `heard_confidence`, 0 to 1, is how sure the recogniser is of the
+    words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now, where a
+    back end can use it. `failed` describes plans for this command that were tried before, and what
+    went wrong. `prohibitions` are what people have forbidden for good.
     """
 
     command_id: str
@@ -83,8 +93,9 @@ class PlanRequest:
     scene: Snapshot | None = None
     here: tuple[float, float, float] | None = None
     conversation: Conversation = field(default_factory=Conversation)
-    recollections: tuple[str, ...] = ()
-    last_seen: tuple[LastSeen, ...] = ()
+    experience: Experience = NO_EXPERIENCE
+    task: str = ""
+    last_actions: tuple[ActionNote, ...] = ()
     heard_confidence: float | None = None
     image: Image | None = field(default=None, compare=False, repr=False)
     failed: tuple[str, ...] = ()

@@ -77,9 +77,13 @@ class SkillContext:
         }
         self.claims.amend(self.holder, wants)
 
+    def has_all(self) -> bool:
+        """Take back what a phase has left to others; return whether the action has all it needs."""
+        return self.claims.widen(self.holder, self.needs.get(self.holder, {}))
+
     def take_all_again(self) -> "Skill":
         """Wait until the acting action has every part of the robot again that it needs."""
-        while not self.claims.widen(self.holder, self.needs.get(self.holder, {})):
+        while not self.has_all():
             yield
 
     def note(self, text: str) -> None:

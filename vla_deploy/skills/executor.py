@@ -256,7 +256,7 @@ class PlanExecution:
             return
         if branch.skill is None and self._is_ending(action):
             return  # a server has still to end what was tried before
-        if branch.record.retries and branch.skill is None and not self._has_all():
+        if branch.record.retries and branch.skill is None and not self._context.has_all():
             return  # others use what a phase of the first try has left to them
         if branch.skill is None:
             if self._lacks_need(branch, self._context.link.clock.now_ns()):
@@ -264,10 +264,6 @@ class PlanExecution:
             branch.before = self._world.state(action)
             branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
         next(branch.skill)
-
-    def _has_all(self) -> bool:
-        """Return whether the acting action has every part of the robot that it needs."""
-        return next(self._context.take_all_again(), True) is True
 
     def _timeout_s(self, action: Action) -> float:
         spec = SKILLS[action.skill]

@@ -212,6 +212,7 @@ class Supervisor:
             self._given_up.take(self._records, run.space)
         if changed or now_ns >= self._report_due_ns:
             self._report(now_ns)
+        run.activity.step(self._given_up.refusal)
         if run.battery is not None:
             run.battery.step()
         run.serial_workers.step(wanted=self.profile.realtime_priority > 0)

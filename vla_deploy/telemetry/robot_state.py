@@ -17,6 +17,7 @@ def collect(link: RobotLink) -> dict[str, Any]:
         "run_dir": str(link.run_dir),
         "twin": link.document(topics.TWIN_STATUS, age_limit_s=3.0),
         "process_table": link.document(topics.PROCESS_TABLE, age_limit_s=3.0),
+        "activity": link.document(topics.ACTIVITY, age_limit_s=3.0),
         "control": link.document(topics.CONTROL_STATUS, age_limit_s=1.0),
         "planner": link.document(topics.PLANNER_STATUS, age_limit_s=2.0),
         "executor": link.document(topics.EXECUTOR_STATUS, age_limit_s=2.0),

@@ -18,6 +18,10 @@ def safety(page: Page) -> Locator:
     return page.get_by_label("Safety state", exact=True)
 
 
+def activity(page: Page) -> Locator:
+    return page.get_by_role("banner").locator(".activity")
+
+
 def act(page: Page, name: str, *, agreed: bool = True) -> None:
     safety(page).get_by_role("button", name=name, exact=True).click()
     if agreed:
@@ -40,7 +44,9 @@ def test_stop_ends_the_motion_and_reset_and_arm_are_two_acts(
 ) -> None:
     expect(safety(page)).to_contain_text("Armed")
     drive(page, robot)
+    expect(activity(page)).to_contain_text("navigating")
     page.get_by_role("button", name="Stop", exact=True).click()
+    expect(activity(page)).to_contain_text("stopped")
     assert stands(robot), robot.truth()
     page.evaluate("location.hash = '#/now'")
     expect(safety(page)).to_contain_text("Emergency stop latched")
@@ -52,6 +58,7 @@ def test_stop_ends_the_motion_and_reset_and_arm_are_two_acts(
     assert stands(robot)
     act(page, "Arm")
     expect(safety(page)).to_contain_text(re.compile("^Armed"))
+    expect(activity(page)).to_contain_text("idle")
     assert robot.state() == "armed"
 
 

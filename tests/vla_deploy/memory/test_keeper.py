@@ -48,8 +48,8 @@ class Desk:
             wall_s=lambda: 1000.0 + self.clock.ns / NS_PER_S,
         )
 
-    def say(self, text: str, command_id: str = "c1") -> None:
-        self._utterances.publish({"command_id": command_id, "text": text, "source": "cli"})
+    def say(self, text: str, command_id: str = "c1", **more: Any) -> None:
+        self._utterances.publish({"command_id": command_id, "text": text, "source": "cli"} | more)
 
     def tell(self, event: str, command_id: str = "c1", **details: Any) -> None:
         self._events.publish({"command_id": command_id, "event": event} | details)
@@ -218,3 +218,50 @@ def test_what_cannot_be_written_now_is_told_and_written_later(desk: Desk) -> Non
     desk.step(after_s=60.0)
     assert desk.keeper.document()["trouble"] == ""
     assert [one.command for one in desk.store.newest()] == ["go to the kitchen"]
+
+
+def test_how_each_action_went_is_remembered_with_its_thing_and_hand(desk: Desk) -> None:
+    def result(skill: str, status: str, error: str | None = None, **given: Any) -> dict[str, Any]:
+        return {"skill": skill, "parameters": given, "status": status, "error": error, "note": None}
+
+    desk.say("bring the red cup to the kitchen")
+    desk.tell(
+        "finished",
+        success=False,
+        error="it slipped",
+        actions=[
+            result("navigate_to", "succeeded", place="kitchen"),
+            result("pick_up", "aborted", "the left hand does not hold the cup", object="red cup"),
+            result("pick_up", "succeeded", object="cup_2", arm="right"),
+            result("place", "cancelled", destination="kitchen"),
+        ],
+    )
+    desk.step()
+    (kept,) = desk.store.newest()
+    went = [
+        (one.skill, one.succeeded, one.kind, one.colour, one.hand, one.place)
+        for one in kept.actions
+    ]
+    assert went == [
+        ("navigate_to", True, "", "", "", "kitchen"),
+        ("pick_up", False, "cup", "red", "left", ""),
+        ("pick_up", True, "cup", "", "right", ""),
+    ]
+    assert [one.skill for one in desk.store.past_actions()] == ["pick_up", "pick_up", "navigate_to"]
+
+
+def test_that_was_wrong_is_about_the_command_that_ended_last(desk: Desk) -> None:
+    desk.say("that was wrong", "c0")
+    desk.step()
+    for number, command in enumerate(("go to the kitchen", "wait"), 1):
+        desk.say(command, f"c{number}")
+        desk.tell("finished", f"c{number}", success=True, error=None)
+        desk.step()
+    desk.say("that was right: heard badly", "c3", heard={"doubted": True, "confidence": 0.4})
+    desk.say("that was wrong: I meant the bedroom", "c4")
+    desk.step()
+    outcomes = [(one.command, one.outcome.value, one.why) for one in desk.store.newest()]
+    assert outcomes == [
+        ("wait", "failed", "I meant the bedroom"),
+        ("go to the kitchen", "succeeded", ""),
+    ]

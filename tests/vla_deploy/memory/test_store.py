@@ -3,15 +3,27 @@
 import json
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from vla_deploy.memory import Episode, EpisodeOutcome, LastSeen, MemoryStore, MemoryUnusable
+from vla_deploy.inference.errors import RunFailed
+from vla_deploy.memory import (
+    Episode,
+    EpisodeOutcome,
+    LastSeen,
+    MemoryStore,
+    MemoryUnusable,
+    PastAction,
+    schema,
+)
+from vla_deploy.memory.episode import sentence_of
 from vla_deploy.memory.errors import NoSuchEpisode
+from vla_deploy.memory.search import Vectors
 
 DONE = Episode(told_s=1000.0, command="bring me the bottle", outcome=EpisodeOutcome.SUCCEEDED)
 KEYS = LastSeen(
@@ -113,6 +125,76 @@ def test_it_outlives_the_process_and_only_its_owner_can_read_it(store: MemorySto
     assert store.path.stat().st_mode & 0o077 == 0
 
 
+def test_an_outcome_is_corrected_and_back_again(store: MemoryStore) -> None:
+    past = PastAction(skill="pick_up", succeeded=True, kind="bottle", hand="left")
+    store.add([replace(DONE, actions=(past,))])
+    judged = store.update_outcome(1, EpisodeOutcome.FAILED, "it was the wrong zebrawood bottle")
+    assert store.newest() == [judged]
+    assert sentence_of(judged, DONE.told_s) == (
+        'Just now I was told "bring me the bottle" and it was done; a person said later that it '
+        "was wrong: it was the wrong zebrawood bottle."
+    )
+    assert store.recall("zebrawood")[0].episode == judged
+    assert store.past_actions() == []
+    again = store.update_outcome(1, EpisodeOutcome.SUCCEEDED)
+    assert (again.outcome, again.judged_from) == (EpisodeOutcome.SUCCEEDED, None)
+    assert store.past_actions() == [past]
+    with pytest.raises(NoSuchEpisode):
+        store.update_outcome(7, EpisodeOutcome.FAILED)
+
+
+def test_a_memory_of_an_earlier_release_is_brought_up_to_date(tmp_path: Path) -> None:
+    path = tmp_path / "memory.sqlite3"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(f"{schema._STEPS[0]}; PRAGMA user_version = 1;")
+        connection.execute(
+            "INSERT INTO episode VALUES "
+            "(1, 5.0, 'go', 'succeeded', 'cli', '', '', '{}', '', '', 1.0)"
+        )
+        connection.commit()
+    with closing(MemoryStore(path)) as store:
+        assert store.newest() == [
+            Episode(told_s=5.0, command="go", outcome=EpisodeOutcome.SUCCEEDED, source="cli",
+                    duration_s=1.0, number=1)
+        ]  # fmt: skip
+        assert store.update_outcome(1, EpisodeOutcome.FAILED).judged_from is not None
+
+
+class ByMeaning:
+    """Embed words by the rows of a table of synonyms, as a model does by what it has learnt."""
+
+    name = "by-meaning"
+    least_cosine = 0.5
+    rows = ("mug cup beaker", "sofa couch settee", "bring fetch carry")
+
+    def __init__(self) -> None:
+        self.is_broken = False
+
+    def embed(self, texts: Sequence[str]) -> Vectors:
+        if self.is_broken:
+            raise RunFailed("the model is away")
+        words = [text.lower().split() for text in texts]
+        counts = [[sum(one in row for one in said) for row in self.rows] for said in words]
+        rows = np.array(counts, dtype=np.float32).reshape(len(texts), len(self.rows))
+        lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+        return np.divide(rows, lengths, out=np.zeros_like(rows), where=lengths > 0)
+
+
+def test_an_embedder_finds_by_meaning_also_what_was_remembered_before_it(tmp_path: Path) -> None:
+    path, embedder = tmp_path / "memory.sqlite3", ByMeaning()
+    with closing(MemoryStore(path)) as before:
+        before.add(told("clean the couch", "water the tulips"))
+        assert before.recall("the settee") == []
+    with closing(MemoryStore(path, embedder=embedder)) as store:
+        store.add(told("fetch a beaker"))
+        assert [one.episode.command for one in store.recall("the settee")] == ["clean the couch"]
+        assert [one.episode.command for one in store.recall("a mug")] == ["fetch a beaker"]
+        embedder.is_broken = True
+        store.add(told("carry the cup"))
+        assert store.recall("the settee") == []
+        assert store.recall("the couch")[0].episode.command == "clean the couch"
+
+
 def test_what_is_erased_stands_nowhere_in_the_file(store: MemoryStore) -> None:
     store.add(told("find the zebrawood casket", "go to the kitchen"), [KEYS])
     store.erase(1)
@@ -151,7 +233,7 @@ def test_a_file_of_a_later_release_is_left_as_it_is(tmp_path: Path) -> None:
     MemoryStore(path).close()
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA user_version = 99")
-    with pytest.raises(MemoryUnusable, match="it has version 99, this release knows 1"):
+    with pytest.raises(MemoryUnusable, match="it has version 99, this release knows 2"):
         MemoryStore(path)
 
 

@@ -163,11 +163,14 @@ class Desk:
     def control(self, state: str) -> None:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
 
-    def executor_is(self, state: str, **holding: str | None) -> None:
-        """Let the executor tell what it does, and what the hands hold."""
+    def executor_is(
+        self, state: str, doing: tuple[str, str] | None = None, **holding: str | None
+    ) -> None:
+        """Let the executor tell what it is `doing`, command and skill, and what the hands hold."""
         commands = [] if state == "idle" else self.carried_out
-        document = {"state": state, "commands": commands, "holding": holding}
-        self._executor_status.put_document(document)
+        command_id, skill = doing or (None, None)
+        told = {"command_id": command_id, "skill": skill, "commands": commands}
+        self._executor_status.put_document({"state": state, "holding": holding, **told})
 
     def sees(self, *names: str) -> None:
         """Let perception tell of things such as "red cup_1", in a row on the coffee table."""

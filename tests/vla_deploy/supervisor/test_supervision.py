@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 from drivers.clock import NS_PER_S
+from vla_deploy.ipc import topics
 from vla_deploy.supervisor.errors import ProcessGivenUp
 from vla_deploy.supervisor.runs.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -275,3 +276,22 @@ def test_kill_9_of_the_supervisor_while_it_starts_or_stops_leaves_nothing_for_lo
         assert not any(is_running(pid) for name in "ab" for pid in stage.pids(name))
     assert stage.leftovers() == []
     assert len(list((stage.state_dir / "runs").iterdir())) == 2
+
+
+def test_what_the_robot_does_is_said_by_the_supervisor_whatever_dies(stage, step_until):
+    with stage.supervisor(stage.row("a", "base", watched=BEATING)) as supervisor:
+        supervisor.start()
+        activity = supervisor.space.cell_reader(topics.ACTIVITY)
+
+        def says_stopped(after: int) -> bool:
+            sample = activity.latest()
+            if sample is None or sample.sequence <= after:
+                return False
+            told = sample.document()
+            return (told["activity"], told["stopped_by"]) == ("stopped", "control is silent")
+
+        assert step_until(supervisor, lambda: says_stopped(0))
+        os.kill(stage.pids("a")[0], signal.SIGKILL)
+        before = activity.latest()
+        assert before.writer_pid == os.getpid()
+        assert step_until(supervisor, lambda: says_stopped(before.sequence))

@@ -15,10 +15,11 @@ from vla_deploy.cli.commands import (
     number_within,
     whole_number,
 )
-from vla_deploy.inference.manifest import Fit
+from vla_deploy.inference.manifest import Fit, Pooling
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.inference.store import StoredModel
-from vla_deploy.model_tools.published import LANGUAGE_MODELS, WHISPERS
+from vla_deploy.model_tools.published import LANGUAGE_MODELS, TEXT_EMBEDDERS, WHISPERS
+from vla_deploy.model_tools.text_embedders import LEAST_COSINE
 from vla_deploy.perception.detectors.adapters import ADAPTERS
 
 EXAMPLES: Final = """  vla-deploy models list
@@ -61,11 +62,12 @@ def _add(acts: Any) -> None:
     add = add_command(
         acts,
         "add",
-        "add a detector, a Whisper or a language model of your own, after a check and a trial run",
+        "add a detector, a Whisper, a language model or a text embedder of your own, after a trial",
         "  vla-deploy models add mugs --onnx best.onnx --classes classes.txt\n"
         "  vla-deploy models add mugs --onnx best.onnx --adapter yolo_end_to_end --licence MIT\n"
         "  vla-deploy models add mine --whisper whisper-mine-ct2 --languages en\n"
-        "  vla-deploy models add qwen --language qwen2.5-1.5b-int4 --licence Apache-2.0\n",
+        "  vla-deploy models add qwen --language qwen2.5-1.5b-int4 --licence Apache-2.0\n"
+        "  vla-deploy models add minilm --embedder all-MiniLM-L6-v2-onnx --licence Apache-2.0\n",
     )
     add.add_argument("name", help="to call it by; profiles name it as a tier")
     kind = add.add_mutually_exclusive_group(required=True)
@@ -79,8 +81,15 @@ def _add(acts: Any) -> None:
         metavar="DIR",
         help="a language model in the layout of onnxruntime-genai",
     )
+    kind.add_argument(
+        "--embedder",
+        type=Path,
+        metavar="DIR",
+        help="a text embedder: tokenizer.json and one .onnx file; the memory is searched by it",
+    )
     _most_tokens(add)
     _profile(add)
+    _add_embedder_arguments(add)
     _add_whisper_arguments(add)
     add.add_argument(
         "--classes",
@@ -110,6 +119,21 @@ def _most_tokens(act: argparse.ArgumentParser) -> None:
         type=whole_number(),
         default=512,
         help="of one answer of a language model (default: 512)",
+    )
+
+
+def _add_embedder_arguments(add: argparse.ArgumentParser) -> None:
+    add.add_argument(
+        "--pooling",
+        choices=[Pooling.MEAN.value, Pooling.FIRST.value],
+        default=Pooling.MEAN.value,
+        help="of a text embedder: of all tokens, or the first one's vector (default: mean)",
+    )
+    add.add_argument(
+        "--least-cosine",
+        type=number_within(0.0, 1.0, "a cosine from 0 to 1"),
+        default=LEAST_COSINE,
+        help=f"below which a text embedder finds two texts unlike (default: {LEAST_COSINE:g})",
     )
 
 
@@ -165,18 +189,20 @@ def _fetch(acts: Any) -> None:
     fetch = add_command(
         acts,
         "fetch",
-        "fetch a published Whisper or language model from the Hugging Face hub, checked by its "
-        "hashes",
+        "fetch a published Whisper, language model or text embedder from the Hugging Face hub, "
+        "checked by its hashes",
         "  vla-deploy models fetch whisper-small.en\n"
         "  vla-deploy models fetch llama-3.2-1b-gpu\n"
+        "  vla-deploy models fetch minilm-l6\n"
         "  vla-deploy models fetch --language OWNER/REPO:FOLDER --as mine\n",
     )
     fetch.add_argument(
         "name",
         nargs="?",
         metavar="NAME",
-        choices=[*WHISPERS, *LANGUAGE_MODELS],
-        help=f"Whispers: {', '.join(WHISPERS)}; language models: {', '.join(LANGUAGE_MODELS)}",
+        choices=[*WHISPERS, *LANGUAGE_MODELS, *TEXT_EMBEDDERS],
+        help=f"Whispers: {', '.join(WHISPERS)}; language models: {', '.join(LANGUAGE_MODELS)}; "
+        f"text embedders: {', '.join(TEXT_EMBEDDERS)}",
     )
     fetch.add_argument(
         "--language",

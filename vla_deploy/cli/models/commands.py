@@ -1,6 +1,6 @@
 """`vla-deploy models`: add, fetch, list, measure, quantise and verify models.
 
-What depends on the kind of a model is in `detector`, `whisper` and `language`.
+What depends on the kind of a model is in `detector`, `whisper`, `language` and `embedder`.
 """
 
 import argparse
@@ -14,14 +14,14 @@ from drivers.clock import MonotonicClock
 from platforms import Profile, load_profile
 from vla_deploy.cli.commands import Run, emit
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.models import detector, language, whisper
+from vla_deploy.cli.models import detector, embedder, language, whisper
 from vla_deploy.cli.models.arguments import register_acts
 from vla_deploy.cli.session import base_of
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.manifest_file import document_of
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.model_tools.listing import model_rows, profile_uses
-from vla_deploy.model_tools.published import WHISPERS
+from vla_deploy.model_tools.published import TEXT_EMBEDDERS, WHISPERS
 from vla_deploy.model_tools.verifying import verify
 from vla_deploy.supervisor.profiles.profile_choice import start_profile
 
@@ -64,6 +64,8 @@ def add(arguments: argparse.Namespace) -> int:
         result = whisper.add(arguments, shelf)
     elif arguments.language is not None:
         result = language.add(arguments, shelf, _profile(arguments))
+    elif arguments.embedder is not None:
+        result = embedder.add(arguments, shelf, _profile(arguments))
     else:
         result = detector.add(arguments, shelf)
     return emit(arguments, *result)
@@ -83,6 +85,8 @@ def fetch(arguments: argparse.Namespace) -> int:
     shelf = _shelf(arguments)
     if arguments.name in WHISPERS:
         return emit(arguments, *whisper.fetch(arguments, shelf, report))
+    if arguments.name in TEXT_EMBEDDERS:
+        return emit(arguments, *embedder.fetch(arguments, shelf, _profile(arguments), report))
     return emit(arguments, *language.fetch(arguments, shelf, _profile(arguments), report))
 
 
@@ -100,6 +104,8 @@ def bench(arguments: argparse.Namespace) -> int:
         result = whisper.measure(arguments, shelf, model, profile)
     elif model.manifest.language is not None:
         result = language.measure(arguments, shelf, model, profile)
+    elif model.manifest.embedding is not None:
+        raise UsageError(f"{arguments.name} is a text embedder: nothing is measured of these")
     else:
         result = detector.measure(arguments, shelf, model, profile)
     return emit(arguments, *result)
@@ -113,6 +119,8 @@ def quantise(arguments: argparse.Namespace) -> int:
         raise UsageError(f"{arguments.name} is a Whisper: CTranslate2 quantises as it converts")
     if model.manifest.language is not None:
         raise UsageError(f"{arguments.name} is a language model: its exporter quantises it")
+    if model.manifest.embedding is not None:
+        raise UsageError(f"{arguments.name} is a text embedder: its exporter quantises it")
     return emit(arguments, *detector.quantise_model(arguments, shelf, model))
 
 

@@ -1,4 +1,4 @@
-"""`vla-deploy memory`: show what the robot remembers, and delete it."""
+"""`vla-deploy memory`: show what the robot remembers, correct it, and delete it."""
 
 import argparse
 import json
@@ -8,16 +8,21 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
+from drivers.clock import MonotonicClock
 from vla_deploy.cli.commands import Run, add_command, add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import base_of
-from vla_deploy.memory import Episode, MemoryStore
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.memory import Episode, EpisodeOutcome, MemoryStore
 from vla_deploy.memory.episode import place_words, sentence_of, unix_s
+from vla_deploy.memory.judgement import MOST_CHARACTERS
+from vla_deploy.memory.meaning import installed_embedder
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "list": "  vla-deploy memory list\n",
     "search": '  vla-deploy memory search "where did the keys go"\n',
     "things": "  vla-deploy memory things --kind keys\n",
+    "outcome": '  vla-deploy memory outcome 12 failed --why "it was the wrong cup"\n',
     "export": "  vla-deploy memory export memory.jsonl\n",
     "erase": "  vla-deploy memory erase 12\n  vla-deploy memory erase --all --yes\n",
 }
@@ -35,12 +40,19 @@ def register(commands: Any) -> None:
     things = _act(acts, "things", "where things were seen last", list_things)
     things.add_argument("--kind", default="", help='such as "keys"')
     things.add_argument("--colour", default="", help='such as "red"')
+    judged = _act(acts, "outcome", "correct what came of a command", correct)
+    judged.add_argument("number", type=int, help="its number in the list")
+    judged.add_argument("outcome", choices=_OUTCOMES, help="what really came of it")
+    judged.add_argument("--why", default="", help="in a few words, for the next time")
     exported = _act(acts, "export", "write everything to a file, a JSON document a line", export)
     exported.add_argument("file", type=Path, help="where to; it must not exist yet")
     erased = _act(acts, "erase", "forget one command, or everything", erase)
     erased.add_argument("number", type=int, nargs="?", help="its number in the list")
     erased.add_argument("--all", action="store_true", help="everything, things too")
     erased.add_argument("--yes", action="store_true", help="do not ask")
+
+
+_OUTCOMES: Final = (EpisodeOutcome.SUCCEEDED.value, EpisodeOutcome.FAILED.value)
 
 
 def _act(acts: Any, name: str, summary: str, run: Run) -> argparse.ArgumentParser:
@@ -57,7 +69,8 @@ def list_episodes(arguments: argparse.Namespace) -> int:
 
 def find(arguments: argparse.Namespace) -> int:
     """Print the episodes that match some words, the best first."""
-    with _store(arguments) as store:
+    embedder = installed_embedder(ModelShelf.of_base(base_of(arguments), MonotonicClock()))
+    with closing(MemoryStore.of_base(base_of(arguments), embedder=embedder)) as store:
         found = store.recall(arguments.text, arguments.count)
     document = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
     text = _numbered([one.episode for one in found])
@@ -72,6 +85,14 @@ def list_things(arguments: argparse.Namespace) -> int:
     text = "\n".join(place_words(one, now_s) for one in things)
     document = [one.document() for one in things]
     return emit(arguments, document, text or "no such thing is remembered")
+
+
+def correct(arguments: argparse.Namespace) -> int:
+    """Correct what came of a command; plans and models go by it from then on."""
+    outcome = EpisodeOutcome(arguments.outcome)
+    with _store(arguments) as store:
+        judged = store.update_outcome(arguments.number, outcome, arguments.why[:MOST_CHARACTERS])
+    return emit(arguments, judged.document(), _numbered([judged]))
 
 
 def _numbered(episodes: Sequence[Episode]) -> str:

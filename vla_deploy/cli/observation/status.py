@@ -41,6 +41,7 @@ def as_text(status: dict[str, Any]) -> str:
             *_twin(status),
             *_processes(status),
             _profile(status),
+            f"activity: {activity_words(status.get('activity'))}",
             _control(status),
             _pose(status),
             *_battery(status),
@@ -89,6 +90,14 @@ def _processes(status: dict[str, Any]) -> list[str]:
             lines.append(f"  {row['name']}: {row['reason']}")
         lines.extend(f"  alarm: {alarm}" for alarm in row["alarms"])
     return [*lines, f"no commands: {table['refusal']}"] if table["refusal"] else lines
+
+
+def activity_words(document: Mapping[str, Any] | None) -> str:
+    """Return what the robot does in one word, and what stops it."""
+    if document is None:
+        return "unknown, the supervisor is silent"
+    why = document["stopped_by"]
+    return f"{document['activity']} ({why})" if why else str(document["activity"])
 
 
 def _profile(status: dict[str, Any]) -> str:

@@ -28,6 +28,7 @@ from vla_deploy.ipc import TOPICS, PulseReader
 
 DOCUMENTS: Final = (
     "process_table",
+    "activity",
     "control_status",
     "budget",
     "executor_status",
@@ -186,12 +187,13 @@ def _measured(control: Report) -> str:
 
 def _work(report: Report) -> Text:
     executor, planner = report["executor_status"], report["planner_status"]
+    activity = report["activity"]["activity"] if report["activity"] else "unknown"
     if executor is None:
-        return Text("work: the executor is silent", style=_POOR)
+        return Text(f"{activity}: the executor is silent", style=_POOR)
     doing = f"{executor['skill']} of {executor['command_id']}" if executor["skill"] else "nothing"
     waiting = len(planner["commands"]) if planner else 0
     asks = f"; asks: {planner['question']}" if planner and planner["question"] else ""
-    return Text(f"work: {doing}; {waiting} being planned{asks}")
+    return Text(f"{activity}: {doing}; {waiting} being planned{asks}")
 
 
 def _processes(report: Report) -> RenderableType:

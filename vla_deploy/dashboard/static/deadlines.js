@@ -17,6 +17,7 @@ const DEADLINES_S = {
   planner_status: 3,
   speech_status: 3,
   process_table: 4,
+  activity: 4,
   profile_status: 4,
   budget: 4,
   battery: 5,

@@ -49,6 +49,7 @@ function Head() {
         ${table?.twin && html`<span class="badge" data-tone="info">twin</span>`}
       </a>
       <${SafetyPill} />
+      <${Activity} />
       <span class="grow"></span>
       <${Connection} />
       <${ThemeSwitch} />
@@ -65,6 +66,17 @@ function SafetyPill() {
       <${Icon} name=${told.icon} /><span class="out-of-sight">Safety state:${" "}</span><span>${told.title}</span>
       ${told.cause && html`${" "}<span class="cause">${told.cause}</span>`}
     </a>
+  `;
+}
+
+/** Say in one word what the robot does; the safety state beside it says why it is stopped. */
+function Activity() {
+  const { data, stale } = useTopic("activity");
+  const word = data && !stale ? data.activity : "unknown";
+  return html`
+    <span class="activity" title=${data?.stopped_by || null}>
+      <span class="out-of-sight">The robot is:${" "}</span>${word}
+    </span>
   `;
 }
 

@@ -41,16 +41,9 @@ class RobotCommands:
         self.news: tuple[CommandNews, ...] = ()
         self.recent: deque[dict[str, Any]] = deque(maxlen=MOST_RECENT)
         self.has_succeeded: bool | None = None
-        self._ros_ns = ros_ns
-        self._ended_ns = 0
         self._under_way: dict[str, PlanUnderWay] = {}
         self._coming: list[CommandNews] = []
         self._history = CommandHistory(link, ros_ns, self._follow)
-
-    @property
-    def ended_s(self) -> float:
-        """Return how long ago a command ended last."""
-        return (self._ros_ns() - self._ended_ns) / 1e9
 
     @property
     def current(self) -> PlanUnderWay:
@@ -96,7 +89,7 @@ class RobotCommands:
         was_under_way = self._under_way.pop(command_id, None) is not None
         success = bool(event.get("success"))
         if was_under_way or not success:  # a stop succeeds, but completes nothing
-            self.has_succeeded, self._ended_ns = success, self._ros_ns()
+            self.has_succeeded = success
 
     def _note_action(self, command_id: str, event: Mapping[str, Any]) -> None:
         under_way = self._under_way.get(command_id)

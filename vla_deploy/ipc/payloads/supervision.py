@@ -14,6 +14,9 @@ ProcessStateName = Literal[
     "stopping",
     "stopped",
 ]
+ActivityName = Literal[
+    "idle", "listening", "processing", "navigating", "manipulating", "completed", "stopped"
+]
 LadderActionName = Literal["slow", "smaller_model", "suspend", "restart", "protective_stop"]
 AnsweredPhaseName = Literal["prepare", "commit", "validate", "rollback"]
 
@@ -64,6 +67,14 @@ class ProcessTable(TypedDict):
     supervisor: UsageDocument
     peak_memory_mb: float | None
     memory_kind: str | None
+
+
+class ActivityDocument(TypedDict):
+    """Say what the robot does, since when, and what stops it; "" where nothing does."""
+
+    activity: ActivityName
+    stopped_by: str
+    since_ns: int
 
 
 class ResourceDirectives(TypedDict):

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.client.battery import SILENT, battery_sentences
-from vla_deploy.memory.episode import at_words, place_words, unix_s
+from vla_deploy.memory.episode import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
@@ -93,10 +93,10 @@ def _known(text: str, request: PlanRequest) -> list[Thing]:
 def _remembered(text: str, request: PlanRequest) -> list[Skill]:
     """Say where such a thing was in earlier runs, if that is remembered."""
     query = CommandContext(request).read(text).query
-    for seen in request.last_seen:
-        if seen.kind == query.kind and query.colour in ("", seen.colour):
-            return _say(place_words(seen, unix_s()) + " I will look for it.")
-    return []
+    seen = request.experience.where(query.kind, query.colour)
+    if seen is None:
+        return []
+    return _say(place_words(seen, request.experience.now_s) + " I will look for it.")
 
 
 def _where(thing: Thing, places: Mapping[str, Point], scene: Snapshot) -> str:

@@ -107,6 +107,7 @@ class ActivePlans:
     def end(self, command_id: str) -> tuple[UserCommand, Plan] | None:
         """Forget a command that has come to its end; return it with its plan, if it is known."""
         known = self._active.pop(command_id, None)
+        self._since_ns.pop(command_id, None)
         return None if known is None else (known[0], known[1].plan)
 
     def end_all(self) -> None:

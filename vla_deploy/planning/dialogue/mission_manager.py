@@ -1,6 +1,7 @@
 """Carry missions out: give their subtasks to be planned, check criteria, begin at their times."""
 
 import logging
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -8,7 +9,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import summary_of
 from vla_deploy.ipc import CellWriter, Event
-from vla_deploy.ipc.payloads.tasks import MissionsDocument, TaskEvent
+from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
 from vla_deploy.missions.criteria import Facts, judge
 from vla_deploy.missions.errors import MissionInvalid, MissionsUnusable
 from vla_deploy.missions.mission import (
@@ -19,7 +20,7 @@ from vla_deploy.missions.mission import (
     read_mission,
 )
 from vla_deploy.missions.progress import MOST_SPANS, ActionSpan, MissionRun, MissionState, PartState
-from vla_deploy.missions.store import MissionStore
+from vla_deploy.missions.store import MissionStore, newest
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
@@ -35,6 +36,10 @@ MOST_OPEN: Final = 10
 MOST_SHOWN: Final = 8
 _PERIOD_NS: Final = NS_PER_S // 5
 _LOST: Final = "lost"
+_REPORTS: Final = re.compile(
+    r"(?:give (?:me )?a )?report(?: back)?(?: to me)?|(?:tell me|say) (?:how it went|what you did)",
+    re.IGNORECASE,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -66,6 +71,7 @@ class MissionManager:
         self._runs: dict[str, MissionRun] = {}
         self._outcomes: dict[str, list[str]] = {}
         self._trouble = ""
+        self._is_changed = False
         self._due_ns = 0
         self._load()
 
@@ -94,8 +100,10 @@ class MissionManager:
         return True
 
     def _of_words(self, command: UserCommand, now: datetime, facts: Facts) -> Mission | None:
-        if command.plan is not None or command.is_doubted or command.is_answer:
+        if command.plan is not None or command.is_answer:
             return None
+        if command.is_doubted or command.is_unsure or command.awaits_word:
+            return None  # such words are read back or held as a whole
         found = mission_from_words(command.text, now)
         if found is not None and found.schedule.when:
             try:
@@ -110,6 +118,7 @@ class MissionManager:
             run_id=self._run_id,
             mission=mission,
             source=command.source,
+            heard_confidence=command.heard_confidence,
             given_unix_s=self._wall_s(),
             due_unix_s=mission.schedule.at_unix_s,
         )
@@ -120,7 +129,7 @@ class MissionManager:
         else:
             self._tell_said(run, _appointment(run, self._wall_s()))
             self._tell_finished(run)
-        self._changed()
+        self._keep()
 
     def cancel(self, mission_id: str, why: str) -> bool:
         """End a mission; return False where there is none that has not ended."""
@@ -136,7 +145,7 @@ class MissionManager:
             self._manager.drop(_command_id(run, name))
         if was_executing:
             self._tell_finished(run)
-        self._changed()
+        self._keep()
         return True
 
     def stop(self, why: str) -> None:
@@ -160,6 +169,9 @@ class MissionManager:
             return
         if event["event"] == "action":
             _note_span(run, name, event, stamp_s)
+        elif event["event"] == "said":
+            said: SaidEvent = {"command_id": run.mission_id, "event": "said", "text": event["text"]}
+            self._publisher.publish(said)
         elif event["event"] == "rejected":
             self._ended(run, name, event["reason"])
         elif event["event"] == "finished":
@@ -171,7 +183,7 @@ class MissionManager:
     def _ended(self, run: MissionRun, name: str, error: str, *, is_lost: bool = False) -> None:
         run.end(name, self._wall_s(), error, is_lost=is_lost)
         self._tell_part(run, name)
-        self._changed()
+        self._is_changed = True
 
     # --- what goes on ---------------------------------------------------------------------------
 
@@ -183,11 +195,13 @@ class MissionManager:
         self._due_ns = now_ns + _PERIOD_NS
         for run in list(self._runs.values()):
             self._advance(run)
+        if self._is_changed:
+            self._keep()
 
     def _advance(self, run: MissionRun) -> None:
         if self._is_due(run):
             self._begin(run)
-            self._changed()
+            self._is_changed = True
         if run.state in (MissionState.EXECUTING, MissionState.PAUSED):
             self._note_pause(run)
         if run.state is not MissionState.EXECUTING:
@@ -197,7 +211,7 @@ class MissionManager:
             self._tell_finished(run)
             if run.repeats():
                 run.state = MissionState.PLANNING
-            self._changed()
+            self._is_changed = True
             return
         for name, subtask in run.ready():
             self._give(run, name, subtask)
@@ -220,7 +234,7 @@ class MissionManager:
         state = MissionState.PAUSED if is_paused else MissionState.EXECUTING
         if run.state is not state:
             run.state = state
-            self._changed()
+            self._is_changed = True
 
     def _begin(self, run: MissionRun) -> None:
         self._outcomes[run.mission_id] = []
@@ -228,8 +242,11 @@ class MissionManager:
 
     def _give(self, run: MissionRun, name: str, subtask: Subtask) -> None:
         run.start(name, self._wall_s())
-        plan = None
-        if subtask.actions:
+        plan: dict[str, Any] | None = None
+        if _REPORTS.fullmatch(subtask.words.strip()):
+            said = {"id": "a1", "skill": "speak", "parameters": {"text": run.spoken_report()}}
+            plan = {"goal": subtask.words, "actions": [said]}
+        elif subtask.actions:
             actions = [one.model_dump(mode="json") for one in subtask.actions]
             plan = {"goal": subtask.words or run.mission.goal, "actions": actions}
         self._manager.take_part(
@@ -237,13 +254,14 @@ class MissionManager:
                 command_id=_command_id(run, name),
                 told_ns=self._clock.now_ns(),
                 source=run.source,
+                heard_confidence=run.heard_confidence,
                 text=subtask.words,
                 plan=plan,
                 mission=run.mission_id,
             )
         )
         self._tell_part(run, name)
-        self._changed()
+        self._is_changed = True
 
     def _check(self, run: MissionRun) -> None:
         """Judge the criteria of what has ended; the world has a moment to show them met."""
@@ -260,7 +278,7 @@ class MissionManager:
                 continue
             run.conclude(name, now_s, "; ".join(unmet), "; ".join(unknown))
             self._tell_part(run, name)
-            self._changed()
+            self._is_changed = True
 
     # --- what is told ---------------------------------------------------------------------------
 
@@ -308,15 +326,17 @@ class MissionManager:
                 "event": "finished",
                 "success": is_success,
                 "error": None if is_success else run.error or run.report(),
-                "summary": summary_of(self._outcomes.get(run.mission_id, ())),
+                "summary": summary_of(self._outcomes.pop(run.mission_id, ())),
                 "actions": [],
             }
         )
         if run.state in (MissionState.COMPLETED, MissionState.FAILED):
             self._say(run, run.report())
 
-    def _changed(self) -> None:
+    def _keep(self) -> None:
         """Keep and show how the missions stand."""
+        self._is_changed = False
+        self._runs = {one.mission_id: one for one in newest(list(self._runs.values()))}
         try:
             self._store.save(list(self._runs.values()))
             self._trouble = ""
@@ -324,8 +344,8 @@ class MissionManager:
             if not self._trouble:
                 _log.warning("%s", error)
             self._trouble = str(error)
-        newest = list(self._runs.values())[-MOST_SHOWN:]
-        missions = [one.model_dump(mode="json") for one in reversed(newest)]
+        shown = list(self._runs.values())[-MOST_SHOWN:]
+        missions = [one.model_dump(mode="json") for one in reversed(shown)]
         self._shown.put_document({"missions": missions, "trouble": self._trouble})
 
     def _load(self) -> None:
@@ -343,7 +363,7 @@ class MissionManager:
                 run.cancel("the robot was shut down meanwhile", self._wall_s())
             elif is_open:
                 run.state = MissionState.EXECUTING
-        self._changed()
+        self._keep()
 
     def take_up(self, events: Iterable[Event[TaskEvent]]) -> None:
         """Go on with what another planner of this run began; `events` came in the meantime."""
@@ -355,7 +375,7 @@ class MissionManager:
                 if part.state is PartState.EXECUTING and _command_id(run, name) not in executing:
                     why = "the planner was started again"
                     run.end(name, self._wall_s(), why, is_lost=True)
-        self._changed()
+        self._keep()
 
 
 def _command_id(run: MissionRun, name: str) -> str:

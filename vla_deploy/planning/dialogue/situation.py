@@ -11,13 +11,14 @@ from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSp
 from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.ipc.topics import P
-from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
-from vla_deploy.memory.episode import sentence_of, unix_s
+from vla_deploy.memory import NO_EXPERIENCE, Experience, MemoryStore, experience_of
+from vla_deploy.memory.episode import unix_s
 from vla_deploy.missions.criteria import Facts
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.planning.dialogue.battery_rules import refusal_at_low
 from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.dialogue.task_log import TaskLog
 from vla_deploy.planning.errors import BatteryLow, NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest
 from vla_deploy.planning.understanding import Conversation
@@ -31,10 +32,6 @@ STATUS_AGE_S: Final = 2.0
 _POSE_AGE_S: Final = 1.0
 _SCENE_AGE_S: Final = 10.0
 _IMAGE_AGE_S: Final = 2.0
-MOST_SENTENCES: Final = 5
-MOST_THINGS: Final = 60
-# What is older says nothing of where a thing is now.
-OLDEST_S: Final = 30 * 86_400.0
 
 _log = logging.getLogger(__name__)
 
@@ -62,6 +59,8 @@ class Situation:
         self._table = space.cell_reader(topics.PROCESS_TABLE)
         self._battery = space.cell_reader(topics.BATTERY)
         self._frames: FrameReader = space.frame_reader(topics.RGBD)
+        self._log = TaskLog(space)
+        self._called_up: tuple[tuple[str, str, bool], Experience] = ("", "", False), NO_EXPERIENCE
 
     def request(
         self,
@@ -73,8 +72,7 @@ class Situation:
         """Return the request for a command with what is known now, and what aids are of use."""
         here = self._here()
         scene = self._snapshot(here)
-        recalls = command.text if Aid.MEMORY in of_use else None
-        recollections, last_seen = recalled(self._memory, recalls)
+        self._log.step()
         return PlanRequest(
             command_id=command.command_id,
             text=command.text,
@@ -85,8 +83,9 @@ class Situation:
             battery=self.battery(),
             heard_confidence=command.heard_confidence,
             image=self._image() if Aid.IMAGE in of_use else None,
-            recollections=recollections,
-            last_seen=last_seen,
+            experience=self._experience_of(command, with_episodes=Aid.MEMORY in of_use),
+            task=self._task(),
+            last_actions=self._log.last_actions,
         )
 
     def facts(self) -> Facts:
@@ -112,6 +111,24 @@ class Situation:
         """Return whether the executor says that it has paused."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
         return sample is not None and sample.document()["state"] == "paused"
+
+    def _experience_of(self, command: UserCommand, *, with_episodes: bool) -> Experience:
+        """Call up once for each command what bears on it: it is asked for at every step of it."""
+        key = (command.command_id, command.text, with_episodes)
+        if key != self._called_up[0]:
+            found = experience_of(self._memory, command.text, unix_s(), with_episodes=with_episodes)
+            self._called_up = key, found
+        return self._called_up[1]
+
+    def _task(self) -> str:
+        """Return what is carried out, in the words of who asked for it, and the skill of now."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        status = None if sample is None else sample.document()
+        if status is None or status.get("state", "idle") == "idle":
+            return ""
+        words = self._log.words_of(status.get("command_id") or "")
+        skill = status.get("skill")
+        return f"{words or 'a plan'}: {skill}" if skill else words or "a plan"
 
     def check_ready(self) -> None:
         """Accept that the robot moves now.
@@ -187,23 +204,3 @@ class Situation:
         sample = reader.latest()
         is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
         return sample if is_fresh else None
-
-
-def recalled(
-    store: MemoryStore | None, text: str | None
-) -> tuple[tuple[str, ...], tuple[LastSeen, ...]]:
-    """Return what is remembered that fits a text, a sentence each, and where things were last.
-
-    The newest comes first. A memory that cannot be read is done without.
-    """
-    if store is None:
-        return (), ()
-    now_s = unix_s()
-    try:
-        found = [] if text is None else store.recall(text, MOST_SENTENCES)
-        seen = store.last_seen(count=MOST_THINGS)
-    except MemoryUnusable as error:
-        _log.warning("%s", error)
-        return (), ()
-    sentences = tuple(sentence_of(one.episode, now_s) for one in found)
-    return sentences, tuple(one for one in seen if one.seen_s > now_s - OLDEST_S)

@@ -83,6 +83,8 @@ class Turns:
         if not self.waiting or busy == self._busy:
             return iter(())
         due, self.waiting = self.waiting, []
+        names = {one.command.command_id for one in due}
+        self._told = {name: place for name, place in self._told.items() if name in names}
         return iter(due)
 
     def drop(self, command_id: str) -> None:

@@ -4,19 +4,21 @@ from string import digits
 from typing import Final
 
 from vla_deploy.client.action_words import skill_words
+from vla_deploy.memory import EpisodeOutcome, Judgement, read_judgement
 from vla_deploy.planning.builders.steps import Steps
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.errors import Declined, NotUnderstood
+from vla_deploy.planning.errors import CannotBeDone, Declined, NotUnderstood
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.patterns.follow_up import repeated
 from vla_deploy.planning.patterns.phrase import clauses
 from vla_deploy.planning.patterns.table import PATTERNS, is_thing
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
+from vla_deploy.planning.understanding import TurnOutcome
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.plans.errors import UnknownPlace
 from vla_deploy.plans.knowledge import World, match_place
-from vla_deploy.plans.plan import Plan, chained
+from vla_deploy.plans.plan import Plan, Skill, chained
 from vla_deploy.runtime.deadline import Deadline
 
 NAME: Final = "patterns"
@@ -41,9 +43,31 @@ class Patterns(BackEnd):
         order = read_order(request.text, request.world, request.prohibitions)
         if order is not None:
             return proposal_of(order, request, self.name)
+        judgement = read_judgement(request.text)
+        if judgement is not None:
+            plan = _answered(judgement, request)
+            return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
         plan = pattern_plan(request)
         # Around the slots there are no words that change anything.
         return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
+
+
+def _answered(judgement: Judgement, request: PlanRequest) -> Plan:
+    """Return what the robot says to a judgement of the last command; the memory keeps it.
+
+    Raises:
+        CannotBeDone: there is no memory, or no command that has ended.
+    """
+    if not request.experience.has_memory:
+        raise CannotBeDone("I keep no memory of what I was told, so I cannot correct it")
+    turns = [one for one in request.conversation.turns if read_judgement(one.said) is None]
+    if not turns or turns[-1].outcome is TurnOutcome.UNDER_WAY:
+        raise CannotBeDone("no command has ended yet that this could be about")
+    words = "I will remember that this was right."
+    if judgement.outcome is not EpisodeOutcome.SUCCEEDED:
+        words = "Sorry. I will remember that this was wrong."
+    skills: list[Skill] = [("speak", {"text": words})]
+    return Plan(goal=request.text.strip(), summary=words, actions=chained(skills))
 
 
 def pattern_plan(request: PlanRequest) -> Plan:

@@ -12,11 +12,12 @@ from typing import Any, Final
 from vla_deploy.client.battery import battery_words
 from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
-from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.interfaces import ActionNote, PlanRequest
 from vla_deploy.planning.understanding import ConversationTurn
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
+from vla_deploy.world.access import GRIP_HEIGHTS_M, REACH_M
 from vla_deploy.world.vocabulary import OBJECT_CLASSES, size_word
 
 TEMPLATES: Final = Path(__file__).parent
@@ -31,10 +32,10 @@ def chat_for(request: PlanRequest, robot: str, room: int = ROOM, jpeg: bytes | N
     extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
         "robot": plain(robot),
-        "skills": skills_in_words(),
+        "skills": skills_in_words(has_hands=request.world.opening_max_m is not None),
         "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
-    system = "\n\n".join(filled(part, **fields) for part in ("plan", *extra))
+    system = "\n\n".join(filled(part, **fields) for part in ("plan", "safety", *extra))
     command = as_data(plain(request.text, MOST_CHARACTERS))
     text = "<situation>\n{}\n</situation>\n<command>{}</command>"
     data_room = room - len(system) - len(text) - len(command)
@@ -55,21 +56,32 @@ def _template(name: str) -> Template:
 
 
 @cache
-def skills_in_words() -> str:
-    """Return every skill on a line: its name, its parameters, what it does."""
+def skills_in_words(*, has_hands: bool) -> str:
+    """Return every skill of a robot on a line: its name, its parameters, what it does."""
     return "\n".join(
-        f"- {name}({', '.join(spec.parameters)}): {spec.summary}" for name, spec in SKILLS.items()
+        f"- {name}({', '.join(spec.parameters)}): {spec.summary}"
+        for name, spec in SKILLS.items()
+        if has_hands or "arm" not in spec.parameters
     )
 
 
 def limits(world: World) -> Iterator[str]:
-    """Yield what bounds a plan for this robot."""
+    """Yield what bounds a plan for this robot: how it moves, what it reaches and carries."""
+    speed = "" if world.max_speed_m_s is None else f", at most {world.max_speed_m_s:g} m/s"
+    yield f"it drives on wheels, on one level floor{speed}; no stairs, steps, thresholds or ramps"
+    if world.footprint_radius_m:
+        yield f"it needs a way {2 * world.footprint_radius_m:.2f} m wide, and opens no doors"
     yield f"it recognises these kinds of things: {', '.join(OBJECT_CLASSES)}"
     yield f"at most {world.bounds.max_actions} steps"
     if math.isfinite(world.bounds.payload_kg):
         yield f"a hand carries at most {world.bounds.payload_kg:g} kg"
     if world.opening_max_m is not None:
         yield f"a hand opens {world.opening_max_m:.2f} m wide; what is wider cannot be taken"
+        low_m, high_m = GRIP_HEIGHTS_M
+        yield (
+            f"its hands reach {max(REACH_M):g} m in front of its middle, {low_m:g} to {high_m:g} m "
+            "above the floor"
+        )
     if world.poses:
         yield f"poses of the arms: {', '.join(sorted(map(plain, world.poses)))}"
     for zone in world.zones:
@@ -86,29 +98,73 @@ _LOOKED_AT: Final = 4  # times as much as may be left when white space is folded
 _ESCAPES: Final = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026"}
 # What is cut first. The first rows of each matter most: things that the command names, then the
 # nearest; what was said last.
-CUT_ORDER: Final = ("remembered", "gone", "said_before", "failed_before", "things")
+CUT_ORDER: Final = (
+    "remembered", "gone", "said_before", "last_actions", "failed_before", "things", "forbidden",
+)  # fmt: skip
 MOST_THINGS: Final = 30
-MOST_RECOLLECTIONS: Final = 8
+MOST_RECOLLECTIONS: Final = 10
+MOST_FORBIDDEN: Final = 20
+# Farther than that from all of them, the robot is at no known place.
+AT_PLACE_M: Final = 1.0
+NOT_MEASURED: Final = "not measured"
 _UNKNOWN_KIND: Final = "object"
 
 
 def situation_of(request: PlanRequest) -> dict[str, Any]:
     """Return all that a planner should know of a request, apart from the command itself."""
     scene = request.scene
+    in_sight = frozenset() if scene is None else frozenset(one.kind for one in scene.things)
+    remembered = request.experience.sentences(request.text, in_sight)
     return {
+        "robot": _robot(request),
+        "last_actions": [_action(one) for one in request.last_actions],
+        "forbidden": [plain(one) for one in request.prohibitions[:MOST_FORBIDDEN]],
         "things": [] if scene is None else _things(request, scene),
         "gone": [] if scene is None else [plain(one.thing) for one in scene.lost],
         "hands": {
             plain(hand): what and plain(what) for hand, what in request.world.holding.items()
         },
         "places": sorted({plain(place) for place in request.world.places.values()}),
-        "battery": None if request.battery is None else plain(battery_words(request.battery)),
         "said_before": [_turn(one) for one in reversed(request.conversation.turns)],
-        "remembered": [
-            plain(one, SENTENCE_CHARACTERS) for one in request.recollections[:MOST_RECOLLECTIONS]
-        ],
+        "remembered": [plain(one, SENTENCE_CHARACTERS) for one in remembered[:MOST_RECOLLECTIONS]],
         "failed_before": [plain(one, _FAILURE_CHARACTERS) for one in request.failed],
     }
+
+
+def _robot(request: PlanRequest) -> dict[str, Any]:
+    """Return where the robot is, in the map's frame, what it does, and how full its battery is."""
+    here, battery = request.here, request.battery
+    pose = None
+    if here is not None:
+        x_m, y_m, yaw_rad = (round(one, 2) for one in here)
+        pose = {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad}
+    return {
+        "pose": pose,
+        "at": plain(place_at(request)) or None,
+        "battery": NOT_MEASURED if battery is None else plain(battery_words(battery)),
+        "task": plain(request.task, SENTENCE_CHARACTERS) or None,
+    }
+
+
+def place_at(request: PlanRequest) -> str:
+    """Return the known place that the robot is at, "" where it is at none or lost."""
+    here, sites = request.here, request.world.sites.values()
+    if here is None:
+        return ""
+    away_m = {one.name: math.dist((one.pose.x_m, one.pose.y_m), here[:2]) for one in sites}
+    nearest = min(away_m, key=away_m.__getitem__, default="")
+    return nearest if nearest and away_m[nearest] <= AT_PLACE_M else ""
+
+
+def _action(note: ActionNote) -> dict[str, str]:
+    given = ", ".join(f"{name} {value}" for name, value in note.parameters.items())
+    row = {
+        "skill": plain(note.skill),
+        "with": plain(given, SENTENCE_CHARACTERS),
+        "ended": plain(note.status),
+        "error": plain(note.error, SENTENCE_CHARACTERS),
+    }
+    return {key: value for key, value in row.items() if value}
 
 
 def _things(request: PlanRequest, scene: Snapshot) -> list[dict[str, Any]]:

@@ -21,6 +21,7 @@ from vla_deploy.planning.understanding.places import (
     resolve_place,
     thing_unless_place,
 )
+from vla_deploy.planning.understanding.remembered import hand_to_take, place_to_look
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownPlace
@@ -45,6 +46,7 @@ from vla_deploy.plans.symbolic.table import LOGIC
 from vla_deploy.plans.validator import action_faults
 
 LONGEST_ID: Final = 48
+OTHER_FAILED: Final = "the other one could not take such a thing the last time"
 # These skills want the robot before the thing, those only want it known.
 FROM_CLOSE: Final = frozenset({"pick_up", "place"})
 OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
@@ -101,6 +103,7 @@ class _Grounder:
             if skill == action.skill:
                 step = action.model_copy(update={"parameters": dict(parameters)})
             step = self._with_hand(step)
+            needed = self._look_where_it_was(step, needed)
             for _ in ("a look", "a way"):  # each is done before the next is asked for
                 missing = _missing(step, self._state, self._request)
                 if missing is not None:
@@ -115,6 +118,11 @@ class _Grounder:
     def _with_hand(self, step: Action) -> Action:
         """Name the hands when a second thing is taken: who puts down must know which is where."""
         state, wanted = self._state, step.parameters.get("arm")
+        if step.skill == "pick_up":
+            hand = hand_to_take(step.parameters, state, self._request)
+            if hand:
+                self.resolver.note(step.parameters["object"], f"for the {hand} hand", OTHER_FAILED)
+                return _with_arm(step, hand)
         if step.skill != "pick_up" or len(state.held) != 1 or len(state.hands) < 2:
             return step
         first = state.held[0].hand or next(one for one in state.hands if one != wanted)
@@ -123,6 +131,14 @@ class _Grounder:
             self.done[at] = _with_arm(self.done[at], first)
             self._state = replace(state, held=(replace(state.held[0], hand=first),))
         return _with_arm(step, wanted or next(one for one in state.hands if one != first))
+
+    def _look_where_it_was(self, step: Action, needed: tuple[str, ...]) -> tuple[str, ...]:
+        """Go first to where a thing that is not in sight was seen in earlier runs."""
+        place = place_to_look(step, self._state, self.done, self._request)
+        if not place:
+            return needed
+        self.resolver.note(step.parameters["object"], f"sought at {place}", "it was there last")
+        return self._append(_made(step, "navigate_to", {"place": place}), needed)
 
     def _append(self, action: Action, needed: tuple[str, ...]) -> tuple[str, ...]:
         """Add an action behind those that it needs; return what comes next needs."""

@@ -19,6 +19,7 @@ from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.journal import JOURNAL_SOCKET
 from vla_deploy.runtime.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
 from vla_deploy.runtime.twin_members import SUPERVISOR
+from vla_deploy.supervisor.activity_writer import ActivityWriter
 from vla_deploy.supervisor.battery import BatteryKeeper, open_battery
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.health import Health
@@ -82,6 +83,7 @@ class Run:
             )
             opened.callback(self.processes.kill_all)
             self.report = ProcessTableWriter(run_dir.name, options, self.space, clock)
+            self.activity = ActivityWriter(self.space, clock)
             self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
             crashes = crash_folder(self.runtime.state_dir)
             self.crashes = CrashReports(crashes, run_dir, options, self.space, clock)

@@ -63,6 +63,13 @@ def test_it_tells_a_script(memory: Run) -> None:
     assert thing["place"] == "bedside_table"
 
 
+def test_what_came_of_a_command_is_corrected(memory: Run) -> None:
+    code, out = memory("outcome", "2", "failed", "--why", "it was the can")
+    assert (code, "a person said later that it was wrong: it was the can" in out) == (0, True)
+    assert "was wrong" in memory("search", "the can")[1]
+    assert "nothing number 9 is remembered" in memory("outcome", "9", "failed")[1]
+
+
 def test_everything_is_written_to_a_new_file_alone(memory: Run, tmp_path: Path) -> None:
     file = tmp_path / "memory.jsonl"
     assert memory("export", str(file))[0] == 0

@@ -40,6 +40,7 @@ def told() -> dict[str, Any]:
         },
         "control_status": {**control, **why, **ticks, "buses": buses},
         "budget": {"rows": [budget], "ladder": {"taken": []}},
+        "activity": {"activity": "manipulating", "stopped_by": ""},
         "executor_status": {"skill": "pick_up", "command_id": "cli-1"},
         "planner_status": {"commands": [], "question": None},
         "board": None,
@@ -67,7 +68,7 @@ def test_the_screen_fits_and_says_what_matters_without_colour(told: dict[str, An
     for words in (
         "safety: armed, obstacle_slow_zone front (0.4, limit 0.6, 0.05 s ago)",
         "twin at 0.6 of real time, held by perception",
-        "work: pick_up of cli-1",
+        "manipulating: pick_up of cli-1",
         "450!",
         "250 Hz, 5 of 1000 ticks late (0.50 %)",
         "bus servos: answers p99 3.0 ms, timeouts 2",

@@ -53,6 +53,8 @@ def test_a_mission_is_followed_with_its_parts_and_ends_once(robot) -> None:
     robot.tell(mission, "accepted")
     robot.part(mission, "o1", "executing")
     robot.carry_out(f"{mission}/o1.s1", "navigate_to", "look_at")
+    for speaker in (f"{mission}/o1.s1", mission):  # the mission passes on what its parts say
+        robot.tell(speaker, "said", text="I am there")
     robot.part(mission, "o1", "completed")
     assert order.last is None  # the end of a part is not the end
     robot.part(mission, "o2", "executing")
@@ -68,6 +70,7 @@ def test_a_mission_is_followed_with_its_parts_and_ends_once(robot) -> None:
         place = progress.note(event)
         told.append((event["event"], place.action_id, f"{place.index}/{place.total}"))
     assert [one[0] for one in told].count("finished") == 3  # two parts, and the mission once
+    assert [one[0] for one in told].count("said") == 1
     assert [one[1:] for one in told if one[0] == "action"] == [
         ("o1.s1/a1", "0/2"), ("o1.s1/a2", "1/2"), ("o2.s1/a1", "0/1"),
     ]  # fmt: skip

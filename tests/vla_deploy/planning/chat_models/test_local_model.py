@@ -37,7 +37,7 @@ def test_a_chat_model_is_told_what_is_remembered(
     propose = chat.propose
 
     def listening(request, deadline):
-        told.append(request.recollections)
+        told.append(request.experience.sentences())
         return propose(request, deadline)
 
     monkeypatch.setattr(chat, "propose", listening)

@@ -117,6 +117,18 @@ def test_a_criterion_that_is_not_met_fails_its_objective_and_what_depends_on_it(
     assert "1 of 3 objectives done" in told[-1]["error"]
 
 
+def test_a_report_says_what_is_done_and_what_is_not(flat) -> None:
+    give(flat, {"id": "a", "words": "look left"}, {"id": "b", "words": "bring me the unicorn"},
+         {"id": "c", "words": "Report back", "depends_on": ["a"]})  # fmt: skip
+    flat.desk.plans()
+    flat.ends("c1/a.s1")
+    (plan,) = flat.desk.plans()
+    text = plan["plan"]["actions"][0]["parameters"]["text"]
+    flat.desk.executor_tells(command_id="c1/c.s1", event="said", text=text)
+    assert ("c1", "said") in events(flat.pass_s())
+    assert text.startswith("Done: look left. Not done: bring me the unicorn, because ")
+
+
 @pytest.mark.parametrize("words", ["bring me the unicorn", "fly to the moon"])
 def test_an_objective_that_nobody_can_plan_fails_with_its_reason(flat, words) -> None:
     told = give(flat, words) + flat.pass_s()
@@ -232,3 +244,13 @@ def test_a_command_waits_for_the_mission_and_an_answer_does_not(flat) -> None:
     assert events(flat.desk.answers_to("go to the bedroom", source="voice")) == [("c2", "queued")]
     assert events(flat.desk.answers_to("what do you see"))[-1] == ("c3", "plan")
     assert flat.desk.said_aloud() == [Says.AFTERWARDS]
+
+
+def test_words_that_were_heard_badly_are_no_mission_and_those_heard_well_keep_their_doubt(flat):
+    flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.4})
+    flat.pass_s()
+    assert flat.desk.missions() == []
+    flat.desk.answers_to("stop")
+    flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.9})
+    flat.pass_s()
+    assert flat.desk.missions()[0]["heard_confidence"] == 0.9

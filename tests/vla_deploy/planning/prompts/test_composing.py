@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from vla_deploy.memory import Episode, EpisodeOutcome, Experience
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.interfaces import ActionNote, Forbidden, Prohibition
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.prompts.composing import TEMPLATES, as_data, chat_for, plain
+from vla_deploy.planning.prompts.composing import TEMPLATES, as_data, chat_for, place_at, plain
 from vla_deploy.planning.understanding import Conversation, ConversationTurn
 
 ATTACK = (
@@ -22,6 +24,13 @@ def parts(chat) -> tuple[dict, str]:
         r"<situation>\n(.*)\n</situation>\n<command>(.*)</command>", chat.messages[0].text
     )
     return json.loads(found[1]), json.loads(found[2])
+
+
+def remembering(*commands: str) -> Experience:
+    """Return a memory of commands that failed."""
+    failed = EpisodeOutcome.FAILED
+    told = (Episode(told_s=0.0, command=one, outcome=failed) for one in commands)
+    return Experience(has_memory=True, episodes=tuple(told))
 
 
 def length(chat) -> int:
@@ -39,7 +48,7 @@ def crowded(ask, scene, thing):
         "pick up the red cup",
         scene=replace(scene, things=(*things, *scene.things)),
         conversation=talk,
-        recollections=tuple(f"recollection {n} " + "z" * 900 for n in range(50)),
+        experience=remembering(*(f"recollection {n} " + "z" * 900 for n in range(50))),
         failed=tuple("it slipped " * 50 for _ in range(5)),
     )
 
@@ -68,7 +77,10 @@ def test_nothing_that_is_told_of_the_scene_can_end_the_data(ask, scene, thing):
         conversation=Conversation().after(
             ConversationTurn(said=ATTACK, answer=ATTACK, understood=ATTACK)
         ),
-        recollections=(ATTACK,),
+        experience=remembering(ATTACK),
+        task=ATTACK,
+        last_actions=(ActionNote(skill=ATTACK, parameters={ATTACK: ATTACK}, status="lost"),),
+        prohibitions=(Prohibition(what=Forbidden.THING, words=ATTACK),),
         failed=(ATTACK,),
     )
     plain_one = ask("go", failed=("it slipped",))
@@ -135,3 +147,53 @@ def test_the_answers_words_are_cleaned_before_anybody_sees_them():
     answer = PlanAnswer.model_validate(dirty)
     assert answer.reasoning == "a[2J b"
     assert answer.plan("x").actions[0].parameters == {"text": "hi"}
+
+
+def test_the_context_says_how_the_robot_is_and_what_it_may_not_do(ask):
+    """Each part that a model needs of the robot's state is there, or said to be unknown."""
+    grasp = ActionNote(
+        skill="pick_up", parameters={"object": "red cup"}, status="aborted", error="it slipped"
+    )
+    request = ask(
+        "bring it to me",
+        here=(0.25, -0.5, 1.57079),
+        task="tidy up: place",
+        last_actions=(grasp,) * 5,
+        prohibitions=(Prohibition(what=Forbidden.THING, words="keys"),),
+        holding={"left": "ball", "right": None},
+    )
+    situation, _ = parts(chat_for(request, "butler"))
+    assert situation["robot"] == {
+        "pose": {"x_m": 0.25, "y_m": -0.5, "yaw_rad": 1.57},
+        "at": place_at(request) or None,
+        "battery": "not measured",
+        "task": "tidy up: place",
+    }
+    assert situation["last_actions"] == 5 * [
+        {"skill": "pick_up", "with": "object red cup", "ended": "aborted", "error": "it slipped"}
+    ]
+    assert situation["forbidden"] == ["touch the keys"]
+    assert situation["hands"] == {"left": "ball", "right": None}
+    gauge = {"charge_ratio": 0.66, "voltage_v": 11.4, "current_a": None, "is_estimate": True,
+             "is_charging": False, "low": False, "critical": False}  # fmt: skip
+    lost = ask("go", here=None, battery=gauge)
+    robot = parts(chat_for(lost, "butler"))[0]["robot"]
+    assert robot["battery"] == "66 % (estimated), 11.4 V"
+    assert (robot["pose"], robot["at"], robot["task"]) == (None, None, None)
+
+
+def test_the_place_is_the_known_one_that_the_robot_stands_at(ask):
+    kitchen = ask("go").world.sites["kitchen"].pose
+    assert place_at(ask("go", here=(kitchen.x_m + 0.3, kitchen.y_m, 0.0))) == "kitchen"
+    assert place_at(ask("go", here=(50.0, 50.0, 0.0))) == ""
+
+
+def test_instructions_have_specs_and_safety_rules_of_a_robot_and_no_skill_that_it_lacks(ask):
+    system = chat_for(ask("go"), "butler").system
+    for told in ("wheels", "stairs", "0.54 m in front", "0.25 to 0.85 m", "hot", "people near"):
+        assert told in system
+    assert "- pick_up(" in system
+    world = replace(ask("go").world, opening_max_m=None, max_speed_m_s=None)
+    handless = chat_for(ask("go", world=world), "butler").system
+    assert not re.search(r"^- (?:pick_up|place|hand_over|move_arm|open_gripper)\(", handless, re.M)
+    assert "- navigate_to(" in handless

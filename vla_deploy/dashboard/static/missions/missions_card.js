@@ -64,6 +64,7 @@ function Body({ mission, rows, commands, now_s }) {
   const names = new Map(rows.flatMap((row) => row.parts.map((part) => [part.name, row.parts.length > 1 ? part.words : row.words])));
   const facts = [mission.source && `by ${sourceWords(mission.source)}`, `given at ${clock(mission.given_unix_s)}`, whenWords(mission)];
   const isToldBelow = rows.some((row) => row.error);
+  const said = commands.find((one) => one.command_id === mission.mission_id)?.story.said ?? [];
   return html`
     <div class="stack">
       <div class="row">
@@ -75,6 +76,7 @@ function Body({ mission, rows, commands, now_s }) {
       </div>
       ${mission.error && !isToldBelow && html`<p class="quiet">${sentence(mission.error)}</p>`}
       <${Objectives} rows=${rows} actionsOf=${actionsOf} />
+      ${said.map((text, place) => html`<p key=${place} class="robot-says">“${text}”</p>`)}
       <${LaneChart} mission=${mission} now_s=${now_s} goesOn=${goesOn} nameOf=${(name) => names.get(name) ?? name} />
     </div>
   `;

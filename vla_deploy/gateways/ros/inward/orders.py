@@ -38,14 +38,16 @@ class CommandOrder:
     def take(self, events: list[TaskEvent]) -> None:
         """Take what came since the last step, and find out whether nobody works on it.
 
-        The events of a mission's parts are news of the mission, but do not end it.
+        The events of a mission's parts are news of the mission, but do not end it; what a part says
+        the mission says, too.
         """
         if self.last is not None:
             return
         why = self._following.why_lost()
         for event in events:
             if self._is_of_part(event):
-                self.news.append(event)
+                if event["event"] != "said":
+                    self.news.append(event)
             else:
                 self.news.extend(self._following.take((event,)))
         lost = self._following.conclude(why)

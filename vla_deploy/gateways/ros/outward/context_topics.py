@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from vla_deploy.client.activity import RobotActivity
 from vla_deploy.gateways.ros.conversions import quaternion_of
 from vla_deploy.gateways.ros.geometry import pose_of
 from vla_deploy.gateways.ros.graph import JsonTopic
-from vla_deploy.gateways.ros.outward.activity import Activity, activity_of
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
+from vla_deploy.gateways.ros.outward.plan_state import PlanState, plan_state_of
 from vla_deploy.gateways.ros.outward.scene import Locator, described, latest_last
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.ipc import topics
@@ -23,6 +24,7 @@ LOOK_HZ: Final = 10.0
 """How often a change of a status is looked for."""
 _AGE_S: Final = 1.0
 _STATUS_AGE_S: Final = 2.0
+_ACTIVITY_AGE_S: Final = 3.0
 _LOST: Final = 2
 
 
@@ -51,36 +53,40 @@ class ContextTopics(GatewayPart):
             self._context.publish(self._surroundings(state))
         if not self._look_due.is_now(now_ns):
             return
-        activity = self._activity()
+        activity, plan = self._activity(), self._plan_state()
         commands = self._gateway.commands
-        key = (activity.capstone, activity.plan, tuple(commands.current.statuses.values()))
+        key = (activity, plan, tuple(commands.current.statuses.values()))
         if key != self._published or self._status_due.is_now(now_ns):
             self._published = key
-            self._publish_statuses(activity)
+            self._publish_statuses(activity, plan)
 
     def stop(self) -> None:
         """Publish last that the robot is out of reach."""
-        self._publish_statuses(Activity())
+        self._publish_statuses(RobotActivity.STOPPED, PlanState.IDLE)
 
-    def _activity(self) -> Activity:
+    def _activity(self) -> RobotActivity:
+        """Return what the supervisor says; a robot without one is on its way down."""
+        told = self._gateway.link.document(topics.ACTIVITY, _ACTIVITY_AGE_S)
+        return RobotActivity.STOPPED if told is None else RobotActivity(told["activity"])
+
+    def _plan_state(self) -> PlanState:
         link, commands = self._gateway.link, self._gateway.commands
-        return activity_of(
+        return plan_state_of(
             self._gateway.control_status(),
             link.document(topics.EXECUTOR_STATUS, _AGE_S),
             link.document(topics.PLANNER_STATUS, _STATUS_AGE_S),
-            link.document(topics.SPEECH_STATUS, _STATUS_AGE_S),
             has_succeeded=commands.has_succeeded,
-            ended_s=commands.ended_s,
         )
 
-    def _publish_statuses(self, activity: Activity) -> None:
+    def _publish_statuses(self, activity: RobotActivity, plan: PlanState) -> None:
         commands = self._gateway.commands
-        self._capstone.publish_text(f"State: {activity.capstone}, Tasks: {commands.actions_left}")
+        state = activity.value.upper()
+        self._capstone.publish_text(f"State: {state}, Tasks: {commands.actions_left}")
         statuses = list(commands.current.statuses.values())
         index = next((i for i, one in enumerate(statuses) if one in ("active", "pending")), 0)
         self._plan.publish(
             {
-                "status": activity.plan,
+                "status": plan,
                 "current_action_index": index,
                 "total_actions": len(statuses),
                 "robot_state": self._brief(),
