@@ -116,7 +116,9 @@ def test_a_mission_shows_its_objectives_and_what_each_part_of_the_robot_did(page
     expect(lanes.get_by_label("Base").get_by_role("listitem")).to_contain_text("turn")
     expect(lanes.get_by_label("Head").get_by_role("listitem").last).to_contain_text("done, from 0:")
     shown.get_by_text("As a table").click()
-    expect(shown.get_by_role("row", name=re.compile("^turn turn left 20 degrees base"))).to_be_visible()
+    expect(
+        shown.get_by_role("row", name=re.compile("^turn turn left 20 degrees base"))
+    ).to_be_visible()
     history = page.get_by_role("region", name="History")
     expect(history.get_by_role("button", name="look left")).to_have_count(1)  # and not its parts
 

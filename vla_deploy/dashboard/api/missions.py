@@ -45,7 +45,10 @@ async def give(mission: _Mission, request: Request) -> CommandAccepted:
         goal = read_mission(mission).goal
     except MissionInvalid as error:
         raise ApiError(
-            HTTPStatus.UNPROCESSABLE_ENTITY, "mission_invalid", str(error), "see docs/missions.md"
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            "mission_invalid",
+            str(error),
+            "see docs/missions.md, or try: vla-deploy mission run FILE",
         ) from error
     link: RobotLink = request.app.state.link
     command_id = link.utter(mission=mission)

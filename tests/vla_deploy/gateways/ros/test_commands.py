@@ -90,9 +90,7 @@ def test_a_mission_has_feedback_for_each_plan_and_objective_and_one_end(robot) -
     objective = {"part": "o1", "words": "go there", "note": None}
     plan = {"goal": "go", "actions": [{"id": "a1", "skill": "move", "parameters": {}}]}
     robot.tell(mission, "accepted")
-    executing = feedback(
-        robot, mission, "objective", state="executing", error=None, **objective
-    )
+    executing = feedback(robot, mission, "objective", state="executing", error=None, **objective)
     (planned,) = feedback(robot, part, "plan", plan=plan)
     robot.action(part, "a1", "active")
     assert robot.commands.current.text == "go there"
@@ -114,7 +112,9 @@ def test_a_mission_has_feedback_for_each_plan_and_objective_and_one_end(robot) -
     assert robot.commands.has_succeeded is False
 
 
-@pytest.mark.parametrize("said", [{"cancel": True}, {"pause": True}, {"mission_act": {"cancel": "m"}}])
+@pytest.mark.parametrize(
+    "said", [{"cancel": True}, {"pause": True}, {"mission_act": {"cancel": "m"}}]
+)
 def test_that_a_cancel_or_a_pause_is_done_is_no_feedback_on_a_command(robot, said) -> None:
     command = robot.link.utter(**said)
     done = {"success": True, "error": None, "actions": []}

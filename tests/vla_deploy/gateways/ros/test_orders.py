@@ -106,7 +106,10 @@ def test_a_cancel_is_an_utterance_of_its_own_so_that_the_command_ends_once(robot
         ({"event": "said", "text": "I see two"}, "I see two"),
         ({"event": "action", "error": "it fell"}, "it fell"),
         ({"event": "accepted"}, ""),
-        ({"event": "objective", "words": "go", "state": "completed", "error": None}, "go: completed"),
+        (
+            {"event": "objective", "words": "go", "state": "completed", "error": None},
+            "go: completed",
+        ),
         (
             {"event": "objective", "words": "go", "state": "failed", "error": "no way"},
             "go: failed: no way",

@@ -144,7 +144,6 @@ class Carrying:
         return int(Result.LOST if why.startswith("lost") else Result.ABORTED)
 
 
-
 def _message(state: str, event: Mapping[str, Any], place: ActionPlace) -> Any:
     return News(
         state=state,
