@@ -36,6 +36,7 @@ from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
 from sim_twin.wire_digest import WireDigest
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.home_devices import BROKER_SOCKET
 
 READY_FILE = "ready"
 MOST_PATH_BYTES = 90
@@ -89,6 +90,7 @@ class TwinProcess:
         self._hub = CanHub(
             self._twin.can_wire, devices / robot.can_bus.device, on_packet=self._digest.add
         )
+        self._twin.begin_home(devices / BROKER_SOCKET)
         self._drawings = _start_drawings(options)
         self._servo_line = self._open_servo_line(devices / robot.servo_bus.device)
         self._lines = {robot.servo_bus.device: self._servo_line} | {
@@ -141,6 +143,7 @@ class TwinProcess:
         self._status.close()
         self._referee.close()
         self._hub.close()
+        self._twin.leave_home()
         for line in self._lines.values():
             line.close()
         for stream in self._streams.values():
@@ -235,6 +238,7 @@ class TwinProcess:
             now_ns=now_ns,
             clock_ns=self._clock_ns(now_ns),
             qpos=self._twin.engine.data.qpos,
+            switched_on=self._twin.switched_on,
             camera_faults=faults_in_force(self._twin.faults),
         )
         for drawing in self._drawings:
@@ -282,7 +286,7 @@ class TwinProcess:
 
     def _truth(self, _request: Mapping[str, Any]) -> dict[str, Any]:
         return {
-            **self._twin.engine.referee.truth(),
+            **self._twin.truth(),
             "real_time_factor": self._factor.value,
             "priority": self._priority.value,
             "wire_digest": self._digest.text(),

@@ -1,6 +1,7 @@
 """Join the physics to every emulated device: what a bus says moves a motor, and back."""
 
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
@@ -13,7 +14,9 @@ from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import Supply
+from sim_twin.home.appliances import EmulatedHome
 from sim_twin.physics.hazards import HazardWatch
+from sim_twin.physics.lamps import show_lamps
 from sim_twin.physics.load import load_engine
 from sim_twin.pictures.head_camera import HeadCamera, camera_line
 from sim_twin.ports.streams import StreamedDevice, streamed_devices
@@ -81,6 +84,7 @@ class Twin:
         self.faults = FaultInjector(self)
         self._hazards: HazardWatch | None = None
         self._camera: HeadCamera | None = None
+        self._home: EmulatedHome | None = None
         self._camera_line: LineTamper | None = None
         self._seed = seed
 
@@ -138,6 +142,42 @@ class Twin:
             self._hazards = HazardWatch(self.engine.model, self.engine.data, self.robot)
         return self._hazards
 
+    @property
+    def home(self) -> EmulatedHome:
+        """Return the home beside the robot, with its broker and what is switched there.
+
+        Raises:
+            TwinModelMismatch: it has not begun, or the robot file has no device on MQTT.
+        """
+        if self._home is None:
+            needed = "[[devices]] on MQTT in the robot file, and begin_home"
+            raise TwinModelMismatch(f"the twin of {self.robot.name} needs {needed}")
+        return self._home
+
+    @property
+    def switched_on(self) -> tuple[str, ...]:
+        """Return the names of the home's devices that are on."""
+        return () if self._home is None else tuple(sorted(self._home.switched_on))
+
+    def begin_home(self, path: Path) -> None:
+        """Serve the home's broker on a Unix socket, where the robot file has devices on it.
+
+        Raises:
+            OSError: the path cannot be bound.
+        """
+        if any(device.mqtt is not None for device in self.robot.devices.values()):
+            self._home = EmulatedHome(self.robot, path)
+
+    def leave_home(self) -> None:
+        """End the home's broker."""
+        home, self._home = self._home, None
+        if home is not None:
+            home.close()
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the physics knows, and what is on in the home."""
+        return {**self.engine.referee.truth(), "switched_on": list(self.switched_on)}
+
     def announce(self, stream: str) -> None:
         """Let a streamed device begin anew for its next host.
 
@@ -171,12 +211,14 @@ class Twin:
         if self.battery is not None and now_ns >= self.battery.due_ns:
             self.battery.step(now_ns)
         if self._camera is not None:
+            show_lamps(self.engine.model, self.switched_on)
             self._camera.device.step(now_ns)
         if self._hazards is not None:
             self._hazards.step(now_ns)
 
     def close(self) -> None:
-        """Release OpenGL where the camera was used."""
+        """Release OpenGL where the camera was used, and end the home's broker."""
+        self.leave_home()
         if self._camera is not None:
             self._camera.close()
 

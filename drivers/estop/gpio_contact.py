@@ -4,23 +4,12 @@ Wiring: one side of the contact to ground, the other to the line; the line is pu
 contact pulls it low. Pressing opens the contact, and so does a broken wire or a pulled plug.
 """
 
-from importlib import import_module
-from types import ModuleType
 from typing import Any, Final
 
-from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
+from drivers.errors import LinkLost
+from drivers.gpio import load_gpiod, refused_line
 
 CONSUMER: Final = "vla-deploy e-stop"
-_EBUSY: Final = 16
-
-
-def _gpiod() -> ModuleType:
-    try:
-        return import_module("gpiod")
-    except ImportError as error:
-        raise DeviceMissing(
-            "an e-stop on GPIO needs the package gpiod: pip install 'vla-deploy[gpio]'"
-        ) from error
 
 
 class GpioContact:
@@ -35,7 +24,7 @@ class GpioContact:
         """
         self._where = f"{chip} line {offset}"
         self._offset = offset
-        gpiod = _gpiod()
+        gpiod = load_gpiod("an e-stop")
         line = gpiod.line
         settings = gpiod.LineSettings(
             direction=line.Direction.INPUT, bias=line.Bias.PULL_UP, active_low=True
@@ -47,7 +36,7 @@ class GpioContact:
                 chip, consumer=CONSUMER, config={offset: settings}
             )
         except (OSError, ValueError) as error:
-            raise self._refused(error) from error
+            raise refused_line(self._where, error) from error
 
     def is_closed(self) -> bool:
         """Return whether the contact is closed, that is, the button released and the wire whole.
@@ -65,11 +54,3 @@ class GpioContact:
         request, self._request = self._request, None
         if request is not None:
             request.release()
-
-    def _refused(self, error: Exception) -> DeviceMissing | DeviceBusy:
-        if isinstance(error, OSError) and error.errno == _EBUSY:
-            return DeviceBusy(f"{self._where}: busy; see who holds it with `gpioinfo`")
-        remedy = "see `gpiodetect` and `gpioinfo`, or correct chip and line in the robot file"
-        if isinstance(error, PermissionError):
-            remedy = "add the user to the group gpio and log in again"
-        return DeviceMissing(f"{self._where}: {error}; {remedy}")

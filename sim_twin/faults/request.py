@@ -85,12 +85,14 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
 
 
 def instances_of(component: Component, robot: RobotDescription) -> dict[str, int]:
-    """Return the joints and ids of what there is several of; empty where there is but one."""
+    """Return names and ids of what there is several of; empty where there is but one."""
     match component:
         case Component.SERVO:
             return {servo.joint: servo.id for servo in robot.servo_bus.servos}
         case Component.DRIVE:
             return {drive.joint: drive.node_id for drive in robot.can_bus.drives}
+        case Component.HOME_DEVICE:
+            return {name: number for number, name in enumerate(robot.devices, 1)}
     return {}
 
 
@@ -124,7 +126,7 @@ def _instance(
     if name not in known:
         choices = ", ".join(f"{each} ({number})" for each, number in known.items())
         raise FaultRefused(
-            f"{component.value}: instance: expected a joint or an id of {choices}; got {given!r}"
+            f"{component.value}: instance: expected a name or an id of {choices}; got {given!r}"
         )
     return name, known[name]
 

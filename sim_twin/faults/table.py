@@ -6,6 +6,7 @@ from typing import Final
 from sim_twin.faults.battery_effects import BATTERY_ROWS
 from sim_twin.faults.can_effects import CAN_ROWS
 from sim_twin.faults.effect import Effect
+from sim_twin.faults.home_effects import HOME_ROWS
 from sim_twin.faults.line_effects import SENSOR_ROWS
 from sim_twin.faults.servo_effects import SERVO_ROWS
 from sim_twin.faults.vocabulary import Component, Fault
@@ -15,6 +16,7 @@ EFFECTS: Final[Mapping[tuple[Component, Fault], Effect]] = {
     **CAN_ROWS,
     **SENSOR_ROWS,
     **BATTERY_ROWS,
+    **HOME_ROWS,
 }
 
 

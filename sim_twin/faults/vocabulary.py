@@ -25,7 +25,7 @@ class Fault(Enum):
 
 
 class Component(Enum):
-    """Name what fails; a servo or a drive needs an instance: its joint, or its id on the bus."""
+    """Name what fails; of servos, drives and devices of the home an instance: its name or id."""
 
     SERVO_BUS = "servo_bus"
     SERVO = "servo"
@@ -38,3 +38,5 @@ class Component(Enum):
     MICROPHONE = "microphone"
     SPEAKER = "speaker"
     BATTERY = "battery"
+    BROKER = "broker"
+    HOME_DEVICE = "home_device"

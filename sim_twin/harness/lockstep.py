@@ -260,7 +260,7 @@ class Lockstep(Schedule):
 
     def truth(self) -> dict[str, Any]:
         """Return what the physics knows; see `sim_twin.physics.truth.Referee`."""
-        return self.twin.engine.referee.truth()
+        return self.twin.truth()
 
     def inside(self, name: str, container: str) -> dict[str, Any]:
         """Return whether an object rests in a container.

@@ -22,6 +22,7 @@ from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.client.link import RobotLink
 from vla_deploy.control.node import ControlNode
+from vla_deploy.devices import HomeDevices, open_home
 from vla_deploy.ipc import CellWriter, SharedSpace, topics
 from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.payloads.tasks import UtteranceContent
@@ -32,6 +33,7 @@ from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySettings
+from vla_deploy.robots.home_devices import BROKER_SOCKET
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
 from vla_deploy.runtime.node import Node, NodeContext
@@ -199,7 +201,9 @@ class LockstepStack(LockstepControl):
         self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
         self.planner: Node = self._new_planner()
         rate_hz = self._profile.executor_rate_hz
-        self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
+        self.executor: Node = ExecutorNode(
+            context, self.robot, rate_hz, devices=self._open_home(context)
+        )
         for node in (self.perception, self.planner, self.executor):
             self.lockstep.add(node)
         if self.robot.battery is not None:
@@ -217,6 +221,12 @@ class LockstepStack(LockstepControl):
         missions = MissionStore(context.run_dir / FILE_NAME)
         memory = None if self._memory is None else MemoryStore(self._memory)
         return PlannerNode(context, self.robot, memory=memory, missions=missions)
+
+    def _open_home(self, context: NodeContext) -> HomeDevices:
+        """Begin the twin's home, and return its devices as the executor has them."""
+        broker = context.run_dir / BROKER_SOCKET
+        self.lockstep.twin.begin_home(broker)
+        return open_home(self.robot, context.clock, lambda _name: InlineExecutor(), broker)
 
     def _speech(self) -> Node:
         context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot

@@ -10,6 +10,7 @@ import mujoco
 
 from sim_twin.errors import TwinError
 from sim_twin.lifetime import die_with_parent
+from sim_twin.physics.lamps import show_lamps
 from sim_twin.pictures.mirror import READY, MirrorState
 
 
@@ -56,8 +57,9 @@ def run_drawing(options: argparse.Namespace, start: Callable[[], Drawing]) -> in
 
 
 def take_over(state: MirrorState, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Move everything that is drawn to where the state has it."""
+    """Move everything that is drawn to where the state has it, and let the lamps shine."""
     data.qpos[:] = state.qpos
+    show_lamps(model, state.switched_on)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)

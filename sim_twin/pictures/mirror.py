@@ -1,5 +1,6 @@
 """Copy the physics' state to a process that only draws it; old states are dropped, never queued."""
 
+import json
 import socket
 import struct
 from dataclasses import dataclass
@@ -15,12 +16,13 @@ _MAX_STATE_BYTES = 65_536
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MirrorState:
-    """Hold one moment: simulated time, the run's time, all positions, and the camera's faults."""
+    """Hold one moment: both times, all positions, the camera's faults, and what is switched on."""
 
     now_ns: int
     clock_ns: int
     qpos: NDArray[np.float64]
     camera_faults: str = "[]"
+    switched_on: tuple[str, ...] = ()
 
 
 def mirror_pair() -> tuple[socket.socket, socket.socket]:
@@ -39,7 +41,8 @@ def send_state(sender: socket.socket, state: MirrorState) -> None:
     """
     try:
         head = _HEAD.pack(state.now_ns, state.clock_ns, len(state.qpos))
-        sender.send(head + state.qpos.tobytes() + state.camera_faults.encode())
+        rest = json.dumps([state.camera_faults, state.switched_on])
+        sender.send(head + state.qpos.tobytes() + rest.encode())
     except BlockingIOError:
         return
 
@@ -63,5 +66,11 @@ def newest_state(receiver: socket.socket) -> MirrorState | None:
         return None
     now_ns, clock_ns, count = _HEAD.unpack_from(newest)
     qpos = np.frombuffer(newest, np.float64, count, offset=_HEAD.size)
-    faults = newest[_HEAD.size + qpos.nbytes :].decode()
-    return MirrorState(now_ns=now_ns, clock_ns=clock_ns, qpos=qpos, camera_faults=faults)
+    faults, switched_on = json.loads(newest[_HEAD.size + qpos.nbytes :])
+    return MirrorState(
+        now_ns=now_ns,
+        clock_ns=clock_ns,
+        qpos=qpos,
+        camera_faults=faults,
+        switched_on=tuple(switched_on),
+    )

@@ -47,6 +47,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "memory": CommandEntry(
         "observation.memory", "show what the robot remembers, correct and delete it"
     ),
+    "devices": CommandEntry(
+        "observation.devices", "show the devices of the home that the robot switches"
+    ),
     "budget": CommandEntry(
         "observation.budget",
         "show what the robot uses of its budgets, and what is done about an excess",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from platforms.tree import ValueMissing
-from vla_deploy.doctor import computer, devices, power, realtime, ros, software
+from vla_deploy.doctor import computer, devices, home_devices, power, realtime, ros, software
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, Section, missing, warn
 
@@ -33,6 +33,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),
     Check("Devices", "sound", devices.sound),
+    Check("Devices", "devices of the home", home_devices.reachable, live=True),
     Check("Devices", "spoken stop", devices.spoken_stop, live=True),
     Check("Real time", "kernel", realtime.preempt_rt),
     Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),

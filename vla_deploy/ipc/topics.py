@@ -371,6 +371,16 @@ MISSIONS = Topic(
     payload=tasks.MissionsDocument,
     fields=(PackedField("document", "json", 262144),),
 )
+DEVICE_STATUS = Topic(
+    name="device_status",
+    kind=TopicKind.CELL,
+    owner="executor",
+    rate_hz=2,
+    deadline_s=3.0,
+    summary="each device of the home: on, off or unknown, how old that is and why, as JSON",
+    payload=services.DevicesStatus,
+    fields=(PackedField("document", "json", 32768),),
+)
 PLANNER_STATUS = Topic(
     name="planner_status",
     kind=TopicKind.CELL,

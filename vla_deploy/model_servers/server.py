@@ -17,7 +17,6 @@ from vla_deploy.model_servers.calls.limits import (
 )
 from vla_deploy.model_servers.calls.privacy import check_privacy
 from vla_deploy.model_servers.chat import Chat, Completion
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import (
     AnswerUnusable,
     ModelServerError,
@@ -30,6 +29,7 @@ from vla_deploy.model_servers.formats.base import Format, Json, ModelFacts, Wire
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.runtime.deadline import Deadline
+from vla_deploy.runtime.secret import Secret
 
 
 class ModelServer:

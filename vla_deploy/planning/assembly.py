@@ -19,6 +19,7 @@ from vla_deploy.memory import Embedder, MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.planning.chat_models.chat_model import LocalModel, ServedModel
+from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.planner import Planner, checked
@@ -73,8 +74,12 @@ def open_planner(
             away[name] = one_line(error)
             _log.warning("planning does without server %s: %s", name, away[name])
         else:
-            servers.append(ServedModel(server, robot.name, sorted(robot.places), checked))
+            servers.append(ServedModel(server, robot.name, _shape(robot), checked))
     return Planner(clock, (*local, *servers), within_s=settings.within_s, away=away)
+
+
+def _shape(robot: RobotDescription) -> type[PlanAnswer]:
+    return answer_for(sorted(robot.places), sorted(robot.devices))
 
 
 def open_local_models(
@@ -122,8 +127,6 @@ def _open(
 
     def opened() -> LocalModel:
         language_model = open_language_model(model, choice)
-        return LocalModel(
-            model.manifest.name, language_model, robot.name, sorted(robot.places), checked
-        )
+        return LocalModel(model.manifest.name, language_model, robot.name, _shape(robot), checked)
 
     return shelf.load(model, choice, opened)

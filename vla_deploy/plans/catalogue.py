@@ -14,6 +14,8 @@ GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
 RELATIONS = (IN, ON, NEXT_TO)
 # These skills move nothing.
 MOTIONLESS = frozenset({"speak", "wait", "stop"})
+# These skills switch a device of the home.
+SWITCHING = frozenset({"turn_on", "turn_off"})
 
 
 class SkillKind(StrEnum):
@@ -45,6 +47,7 @@ class Type(Enum):
     PLACE = "a known place"
     OBJECT = "a known kind of object, with a colour if it matters"
     DESTINATION = "a known object or a known place"
+    DEVICE = "a known device of the home"
     CHOICE = "one of a list"
 
 
@@ -63,7 +66,8 @@ class SkillParameter:
 class SkillSpec:
     """Describe one skill; `one_of` names parameter groups of which exactly one must be given.
 
-    `resources` are what no two skills use at a time; "arm" is the arm that the action names.
+    `resources` are what no two skills use at a time; "arm" is the arm that the action names, and
+    "device" the device.
     """
 
     summary: str
@@ -90,6 +94,7 @@ def _choice(*choices: str, required: bool = True) -> SkillParameter:
 
 
 _ARM = _choice(*ARMS, required=False)
+_DEVICE = SkillParameter(type=Type.DEVICE)
 _OBJECT = SkillParameter(type=Type.OBJECT)
 _OBJECT_OR_ELSE = SkillParameter(type=Type.OBJECT, required=False)
 # Without it the base cruises as fast as its robot file lets it.
@@ -217,6 +222,18 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             own_timeout_s=660.0,
             estimated_duration_s=5.0,
         ),
+        **{
+            f"turn_{state}": SkillSpec(
+                kind=SkillKind.INTERACTION,
+                summary=f"switch a device of the home {state}, and read back that it is",
+                parameters={"device": _DEVICE},
+                resources=("device",),
+                own_timeout_s=30.0,
+                estimated_duration_s=1.5,
+                retryable=True,
+            )
+            for state in ("on", "off")
+        },
         "stop": SkillSpec(
             kind=SkillKind.MOVEMENT,
             summary="bring the base and the arms to rest",

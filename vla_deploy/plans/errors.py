@@ -4,6 +4,7 @@ PlanError
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
+├── UnknownDevice     name a device of the robot file
 └── PlanInvalid       mend the plan; carries every fault
 
 `vla_deploy.planning.errors` adds why there is no plan for a command.
@@ -48,6 +49,14 @@ class DependsOnView(UnknownObject):
             f'"{name}": left, right, in front and behind change while I drive; say what it is '
             "on, in or next to",
         )
+
+
+class UnknownDevice(PlanError):
+    """Say that a device of the home is not in the robot file."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        listed = ", ".join(sorted(known)) or "none"
+        super().__init__(f'I do not know the device "{name}"; I can switch: {listed}')
 
 
 class PlanInvalid(PlanError):

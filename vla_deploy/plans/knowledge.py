@@ -5,15 +5,20 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from types import MappingProxyType
+from typing import Final
 
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
+from vla_deploy.robots.home_devices import DeviceKind
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
 from vla_deploy.world.query import FROM_A_VIEW
 from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
+
+NOTHING_KNOWN: Final[Mapping[str, bool]] = MappingProxyType({})
 
 
 def words_of(text: str) -> list[str]:
@@ -56,14 +61,15 @@ def object_or_none(text: object) -> Query | None:
 
 def match_place(text: str, places: Mapping[str, str]) -> str | None:
     """Return the place that `text` names, or None; `places` maps every spoken name to a place."""
-    spoken = " ".join(words_of(text.replace("_", " ")))
-    return places.get(spoken)
+    return places.get(_said(text))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """Say what a plan may refer to, and what bounds it.
 
+    `devices` maps every spoken name to its device of the home, `devices_on` those that answer to
+    whether they are on, `device_kinds` each to what it is, and
     `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
@@ -84,6 +90,9 @@ class World:
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
     station: str = ""
+    devices: Mapping[str, str] = field(default_factory=dict)
+    devices_on: Mapping[str, bool] = field(default_factory=dict)
+    device_kinds: Mapping[str, DeviceKind] = field(default_factory=dict)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -118,14 +127,73 @@ class World:
 def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
     """Map every name by which a place may be called, in lower case, to the place."""
     return {
-        " ".join(words_of(spoken.replace("_", " "))): place.name
+        _said(spoken): place.name
         for place in places.values()
         for spoken in (place.name, *place.aliases)
     }
 
 
+def spoken_devices(robot: RobotDescription) -> dict[str, str]:
+    """Map every name by which a device of the home may be called, in lower case, to the device.
+
+    A lamp of the kitchen is "the kitchen lamp" and "the lamp in the kitchen", too.
+    """
+    names = {
+        _said(spoken): device.name
+        for device in robot.devices.values()
+        for spoken in (device.name, *device.aliases)
+    }
+    with_place = {
+        _said(words.format(spoken, place)): name
+        for spoken, name in names.items()
+        for place, where in spoken_places(robot.places).items()
+        if where == robot.devices[name].place
+        for words in ("{1} {0}", "{0} in the {1}")
+    }
+    return with_place | names
+
+
+def _said(name: str) -> str:
+    return " ".join(words_of(name.replace("_", " ")))
+
+
+def match_device(text: object, devices: Mapping[str, str]) -> str | None:
+    """Return the device that `text` names, or None; `devices` maps spoken names to devices."""
+    if not isinstance(text, str):
+        return None
+    return devices.get(_said(text))
+
+
+_SEVERAL: Final = re.compile(r"(?P<every>everything)|(?:all |both |every )?(?P<kind>[a-z]+)")
+_KIND_WORDS: Final[Mapping[str, DeviceKind]] = {
+    "lamp": DeviceKind.LAMP, "light": DeviceKind.LAMP, "socket": DeviceKind.SOCKET,
+    "plug": DeviceKind.SOCKET, "outlet": DeviceKind.SOCKET, "switch": DeviceKind.SWITCH,
+    "switche": DeviceKind.SWITCH, "fan": DeviceKind.FAN,
+}  # fmt: skip
+
+
+def match_devices(text: str, world: "World") -> tuple[str, ...]:
+    """Return the devices that a text names: one, or all of a kind: "the lights", "all sockets"."""
+    one = match_device(text, world.devices)
+    if one is not None:
+        return (one,)
+    said = " ".join(word for word in words_of(text) if word != "of")
+    found = _SEVERAL.fullmatch(said)
+    if found is None:
+        return ()
+    if found["every"] or found["kind"] == "devices":
+        return tuple(world.device_kinds)
+    word = found["kind"]
+    is_several = word.endswith("s") or said.startswith("every ")
+    kind = _KIND_WORDS.get(word.removesuffix("s")) if is_several else None
+    return tuple(name for name, other in world.device_kinds.items() if other is kind)
+
+
 def world_of(
-    robot: RobotDescription, holding: Mapping[str, str | None], is_free: IsFree | None = None
+    robot: RobotDescription,
+    holding: Mapping[str, str | None],
+    is_free: IsFree | None = None,
+    devices_on: Mapping[str, bool] = NOTHING_KNOWN,
 ) -> World:
     """Return what plans for this robot may refer to; `is_free` is its map, where one is at hand."""
     openings_m = [
@@ -144,4 +212,7 @@ def world_of(
         bounds=robot.planning,
         is_free=is_free,
         station="" if robot.battery is None else robot.battery.station,
+        devices=spoken_devices(robot),
+        devices_on=devices_on,
+        device_kinds={name: one.kind for name, one in robot.devices.items()},
     )

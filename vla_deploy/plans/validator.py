@@ -5,7 +5,7 @@ from typing import Any
 
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
 from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownObject
-from vla_deploy.plans.knowledge import World, match_place, parse_object
+from vla_deploy.plans.knowledge import World, match_device, match_place, parse_object
 from vla_deploy.plans.plan import Action, Plan, dependency_faults
 from vla_deploy.plans.symbolic.simulation import (
     bounds_faults,
@@ -118,6 +118,8 @@ def _value_faults(name: str, value: Any, parameter: SkillParameter, world: World
             return _object_faults(value)
         case Type.DESTINATION:
             return [] if not _place_faults(name, value, world) else _object_faults(value)
+        case Type.DEVICE:
+            return _device_faults(name, value, world)
 
 
 def _number_faults(name: str, value: Any, parameter: SkillParameter) -> list[str]:
@@ -133,6 +135,13 @@ def _place_faults(name: str, value: Any, world: World) -> list[str]:
         return []
     known = ", ".join(sorted(set(world.places.values())))
     return [f'{name}: unknown place "{value}"; known: {known}']
+
+
+def _device_faults(name: str, value: Any, world: World) -> list[str]:
+    if match_device(value, world.devices):
+        return []
+    known = ", ".join(sorted(set(world.devices.values()))) or "none, there is no [[devices]]"
+    return [f'{name}: unknown device "{value!s:.60}"; known: {known}']
 
 
 def _object_faults(value: Any) -> list[str]:

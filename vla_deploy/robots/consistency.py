@@ -62,9 +62,10 @@ def _joints(records: list[Document]) -> set[str]:
     return {row["joint"] for row in records if isinstance(row.get("joint"), str)}
 
 
-def _repeats(
+def repeats(
     values: Iterator[tuple[str, object]] | list[tuple[str, object]],
 ) -> Iterator[TableFault]:
+    """Yield a fault for each value that an earlier key has."""
     first: dict[object, str] = {}
     for key, value in values:
         if not isinstance(value, str | int):
@@ -80,10 +81,10 @@ def nothing_used_twice(document: Document) -> Iterator[TableFault]:
     """Servo ids, node ids, driven joints and device names are unique."""
     servos = [(f"servo_bus.servos[{i}]", row) for i, row in enumerate(_servos(document))]
     drives = [(f"can_bus.drives[{i}]", row) for i, row in enumerate(_drives(document))]
-    yield from _repeats([(f"{key}.id", row.get("id")) for key, row in servos])
-    yield from _repeats([(f"{key}.node_id", row.get("node_id")) for key, row in drives])
-    yield from _repeats([(f"{key}.joint", row.get("joint")) for key, row in servos + drives])
-    yield from _repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
+    yield from repeats([(f"{key}.id", row.get("id")) for key, row in servos])
+    yield from repeats([(f"{key}.node_id", row.get("node_id")) for key, row in drives])
+    yield from repeats([(f"{key}.joint", row.get("joint")) for key, row in servos + drives])
+    yield from repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
 
 
 NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
@@ -163,7 +164,7 @@ def groups_cover_joints(document: Document) -> Iterator[TableFault]:
         for name, row in subtables(document, "groups").items()
         for joint in texts(row, "joints")
     ]
-    yield from _repeats(placed)
+    yield from repeats(placed)
     for key, joint in placed:
         if joint not in driven:
             yield unknown_name(key, str(joint), "a driven joint", driven)
@@ -222,7 +223,7 @@ def places_are_distinct(document: Document) -> Iterator[TableFault]:
     words: list[tuple[str, object]] = [(f"home.places.{name}", name) for name in places]
     for name, row in places.items():
         words += [(f"home.places.{name}.aliases", alias) for alias in texts(row, "aliases")]
-    yield from _repeats(words)
+    yield from repeats(words)
 
 
 def ros_is_on_where_needed(document: Document) -> Iterator[TableFault]:

@@ -1,7 +1,7 @@
 """Describe one robot as an immutable value: how it may move, where it lives, what it is made of."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from vla_deploy.robots.devices import (
     VoiceSettings,
 )
 from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.ros_settings import UNUSED, RosSettings
@@ -138,6 +139,9 @@ class RobotDescription:
     battery: BatterySettings | None = None
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
+    broker: MqttBroker | None = None
+    devices: Mapping[str, HomeDevice] = field(default_factory=dict)
+    """What the robot switches in its home, by name."""
 
     @property
     def gripper_joints(self) -> frozenset[str]:

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from platforms.profile_source import merged
-from vla_deploy.robots import protection_schema, schema
+from vla_deploy.robots import home_devices, protection_schema, schema
 from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
@@ -34,6 +34,7 @@ from vla_deploy.robots.devices import (
     VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
+from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.ros_settings import ROS, RosSettings
@@ -74,6 +75,7 @@ SHAPES: Mapping[str, Shape] = {
     "clearance": protection_schema.CLEARANCE,
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
+    **home_devices.SHAPES,
 }
 """What each table of a robot file holds, by its path."""
 
@@ -166,7 +168,7 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     yield from check_record(document, "", schema.ROBOT)
     yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
-    for check in (*CHECKS, *protection_schema.CHECKS):
+    for check in (*CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
@@ -210,7 +212,24 @@ def _build(document: Document, directory: Path, camera: CameraDescription) -> Ro
         home=_home(document["home"], directory),
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
+        broker=_broker(document.get("mqtt"), directory),
+        devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},
     )
+
+
+def _broker(record: Document | None, directory: Path) -> MqttBroker | None:
+    if record is None:
+        return None
+    credentials = _sibling(record, "credentials", directory)
+    return replace(build(MqttBroker, record), credentials=credentials)
+
+
+def _home_device(record: Document, directory: Path) -> HomeDevice:
+    device = build(HomeDevice, record)
+    if device.http is None:
+        return device
+    credentials = _sibling(record["http"], "credentials", directory)
+    return replace(device, http=replace(device.http, credentials=credentials))
 
 
 def _can_bus(record: Document, directory: Path) -> CanBus:

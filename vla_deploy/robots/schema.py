@@ -41,6 +41,8 @@ ROBOT: Shape = {
     "voice": TABLE.optional,
     "ros": TABLE.optional,
     "battery": TABLE.optional,
+    "mqtt": TABLE.optional,
+    "devices": TABLES.optional,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,

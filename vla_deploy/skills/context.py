@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.devices import HomeDevices
 from vla_deploy.ipc import Announcer, ClaimBook
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
@@ -45,7 +46,8 @@ class SkillContext:
     `needs` are the parts that each holder claims for the whole of its action;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
-    robot, where the robot file names any. `keeps_out` are the places that the plan may not enter.
+    robot, where the robot file names any. `keeps_out` are the places that the plan may not enter,
+    `devices` those of the home that are switched.
     """
 
     robot: RobotDescription
@@ -63,6 +65,7 @@ class SkillContext:
     holder: str = ""
     ros: RosGoals | None = None
     keeps_out: frozenset[str] = frozenset()
+    devices: HomeDevices | None = None
     needs: dict[str, Mapping[str, int]] = field(default_factory=dict)
 
     def keep_only(self, hand: str) -> None:

@@ -82,6 +82,7 @@ class PlanExecution:
         self.records = [ActionRecord(action=action) for action in execution_order(plan.actions)]
         self._context = context
         self._tell = tell
+        self._only_speaks = all(one.skill == "speak" for one in plan.actions)
         self._command_id = command_id
         self._world = WorldCheck(context)
         self._branches: dict[str, _Branch] = {}
@@ -118,10 +119,10 @@ class PlanExecution:
         return next(under_way, None) or next(map(self._record, self._leaving), None)
 
     def step(self) -> None:
-        """Start what may start, and advance every action under way; in a pause nothing goes on."""
+        """Start what may start, and advance every action under way; in a pause it only speaks."""
         now_ns = self._context.link.clock.now_ns()
         self._end_left()
-        if self._context.link.is_paused:
+        if self._context.link.is_paused and not self._only_speaks:
             return
         self._start_ready(now_ns)
         for name, branch in list(self._branches.items()):

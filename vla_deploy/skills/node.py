@@ -1,5 +1,6 @@
 """Run the executor: plans in, motions out, and a word about every action."""
 
+import logging
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from drivers.clock import NS_PER_S
 from platforms import Profile
 from vla_deploy.client.action_status import FAILED, ActionStatus, summary_of
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.devices import HomeDevices
 from vla_deploy.ipc import (
     Announcer,
     CellReader,
@@ -21,6 +23,7 @@ from vla_deploy.ipc import (
     SharedSpace,
     topics,
 )
+from vla_deploy.ipc.payloads.services import DevicesStatus
 from vla_deploy.ipc.payloads.tasks import (
     ExecutorStatus,
     GripDocument,
@@ -45,12 +48,14 @@ from vla_deploy.skills.resources import body_of
 from vla_deploy.skills.ros_goals import RosGoals
 
 STATUS_PERIOD_NS = NS_PER_S // 10
+DEVICE_PERIOD_NS = NS_PER_S // 2
 _SHOWN_POINTS = 200
 PLANNER_AGE_S = 2.0
 PLAN_WITHIN_S: Final = 20.0
 # Another plan is waited for as long as the planner may take, and a moment besides.
 _MOMENT_S: Final = 2.0
 MOST_COMMANDS: Final = 8
+_log = logging.getLogger(__name__)
 
 
 def _told_hands(before: Sample[ExecutorStatus] | None) -> dict[str, Held]:
@@ -81,21 +86,27 @@ class ExecutorNode:
         robot: RobotDescription,
         rate_hz: float,
         plan_within_s: float = PLAN_WITHIN_S,
+        devices: HomeDevices | None = None,
     ) -> None:
+        """Take the devices of the home, which are closed with the node."""
         self.period_s = 1.0 / rate_hz
         self._plan_within_s = plan_within_s
         self._clock = context.clock
         self._robot = robot
+        self._devices = devices
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
         self._adviser: Adviser
         self._plans: RingReader[PlanMessage]
         self._events: RingWriter[TaskEvent]
         self._status: CellWriter[ExecutorStatus]
+        self._device_status: CellWriter[DevicesStatus]
         self._planner: CellReader[PlannerStatus]
         self._jobs: dict[str, _Job] = {}
         self._acting = ""
         self._status_ns = 0
+        self._device_status_ns = 0
+        self._device_faults: dict[str, str] = {}
         self._knows_hands = False
         self._told_hands: dict[str, Held] = {}
 
@@ -109,6 +120,7 @@ class ExecutorNode:
             say=self._say,
             voice=Announcer(self._space, "speak", self._clock),
             claims=ClaimBook(self._space, self._clock),
+            devices=self._devices,
             ros=RosGoals(self._space, self._clock) if self._robot.ros.is_needed else None,
         )
         self._adviser = Adviser(self._skills)
@@ -118,6 +130,7 @@ class ExecutorNode:
         with closing(self._space.cell_reader(topics.EXECUTOR_STATUS)) as before:
             self._told_hands = _told_hands(before.latest())
         self._status = self._space.cell_writer(topics.EXECUTOR_STATUS)
+        self._device_status = self._space.cell_writer(topics.DEVICE_STATUS)
         self._planner = self._space.cell_reader(topics.PLANNER_STATUS)
 
     def step(self) -> None:
@@ -125,6 +138,7 @@ class ExecutorNode:
         self._skills.link.refresh()
         if self._skills.ros is not None:
             self._skills.ros.refresh()
+        self._refresh_devices()
         if not self._knows_hands:
             self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
@@ -144,6 +158,8 @@ class ExecutorNode:
                 self._conclude(job)
         if self._skills.ros is not None:
             self._skills.ros.close()
+        if self._devices is not None:
+            self._devices.close()
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> tuple[float, float]:
@@ -323,6 +339,24 @@ class ExecutorNode:
         if any(job.execution is not None for job in self._jobs.values()):
             return "executing"
         return "recovering" if self._jobs else "idle"
+
+    def _refresh_devices(self) -> None:
+        """Take in what devices of the home have told, and publish it."""
+        if self._devices is None:
+            return
+        self._devices.refresh()
+        now_ns = self._clock.now_ns()
+        if now_ns - self._device_status_ns >= DEVICE_PERIOD_NS:
+            self._device_status_ns = now_ns
+            self._device_status.put_document(self._devices.document())
+            self._log_device_faults(self._devices)
+
+    def _log_device_faults(self, devices: HomeDevices) -> None:
+        for one in devices:
+            name, state = one.device.name, one.state
+            if state.was_asked and state.fault != self._device_faults.get(name, ""):
+                _log.warning("device %s: %s", name, state.fault or "it answers again")
+                self._device_faults[name] = state.fault
 
     def _tell_status(self) -> None:
         now_ns = self._clock.now_ns()

@@ -3,23 +3,29 @@
 from typing import Final
 
 from vla_deploy.plans.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
+from vla_deploy.plans.knowledge import match_device, spoken_devices
 from vla_deploy.plans.plan import Action
 from vla_deploy.robots import RobotDescription
 
 ARMS: Final = "arms"
 ONE_ARM: Final = "arm"
+DEVICE: Final = "device"
 SENSES: Final = ("camera", "speaker")
 # Whoever waits longer than the longest skill takes waits for something that will not end.
 WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
 
 
 def body_of(robot: RobotDescription) -> dict[str, int]:
-    """Return the robot's parts that one action at a time may use: its groups and its senses."""
-    return dict.fromkeys((*robot.groups, *SENSES), 1)
+    """Return what one action at a time may use: the robot's groups, its senses, its devices."""
+    devices = (f"{DEVICE} {name}" for name in robot.devices)
+    return dict.fromkeys((*robot.groups, *SENSES, *devices), 1)
 
 
 def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
-    """Return what an action needs, by the catalogue; "arm" is the chosen one, or all of them."""
+    """Return what an action needs, by the catalogue.
+
+    "arm" is the chosen one, or all of them; "device" is the one that the action names.
+    """
     needed: dict[str, int] = {}
     for resource in SKILLS[action.skill].resources:
         needed |= dict.fromkeys(_parts(resource, action, robot), 1)
@@ -29,6 +35,9 @@ def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
 
 
 def _parts(resource: str, action: Action, robot: RobotDescription) -> tuple[str, ...]:
+    if resource == DEVICE:
+        named = match_device(action.parameters.get("device"), spoken_devices(robot))
+        return (f"{DEVICE} {named}",) if named is not None else ()
     if resource not in (ARMS, ONE_ARM):
         return (resource,)
     chosen = action.parameters.get("arm") if resource == ONE_ARM else None

@@ -9,6 +9,7 @@ from vla_deploy.skills.actions.navigate import navigate_to
 from vla_deploy.skills.actions.pick import pick_up
 from vla_deploy.skills.actions.place import place
 from vla_deploy.skills.actions.simple import speak, stop, wait
+from vla_deploy.skills.actions.switch import turn_off, turn_on
 from vla_deploy.skills.context import SkillFunction
 from vla_deploy.skills.movements.arms import close_gripper, move_arm, open_gripper
 from vla_deploy.skills.movements.drive import move, turn
@@ -30,6 +31,8 @@ SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
         "move_arm": move_arm,
         "speak": speak,
         "wait": wait,
+        "turn_on": turn_on,
+        "turn_off": turn_off,
         "stop": stop,
     }
 )

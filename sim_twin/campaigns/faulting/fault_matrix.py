@@ -32,12 +32,14 @@ from vla_deploy.robots import RobotDescription, load_robot
 INSTANCES: Final = {
     Component.SERVO: ("left_elbow", "left_gripper"),
     Component.DRIVE: ("left_wheel",),
+    Component.HOME_DEVICE: ("lamp",),
 }
 _SENSORS: Final = (
     *(Component.LIDAR, Component.IMU, Component.CAMERA),
     *(Component.MICROPHONE, Component.SPEAKER),
+    *(Component.BROKER, Component.HOME_DEVICE),
 )
-"""Their drivers are in perception and speech: these faults need the whole stack."""
+"""Their drivers are in perception, speech and executor: these faults need the whole stack."""
 _WORST: Final[Mapping[tuple[Component, Fault], Mapping[str, float]]] = {
     (Component.LIDAR, Fault.WRONG): {"ratio": 2.0},
     (Component.CAMERA, Fault.WRONG): {"ratio": 2.0},

@@ -159,7 +159,7 @@ def library_without_gpiod(name: str) -> Any:
 def test_a_missing_library_is_refused_with_the_extra_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("drivers.estop.gpio_contact.import_module", library_without_gpiod)
+    monkeypatch.setattr("drivers.gpio.import_module", library_without_gpiod)
     with pytest.raises(Exception, match=r"vla-deploy\[gpio\]"):
         GpioContact("/dev/gpiochip0", 17)
 

@@ -110,8 +110,8 @@ def test_a_ramp_lowers_the_voltage_step_by_step(lockstep: Lockstep) -> None:
         ("servo", "left_elbow", "melted", {}, "fault: expected one of off, stuck"),
         ("servo", "left_elbow", "bus_off", {}, "it supports off, stuck, garbage"),
         ("imu", None, "id_clash", {}, "imu: there is no fault 'id_clash' here; it supports off"),
-        ("servo", "nose", "off", {}, r"expected a joint or an id of left_shoulder_yaw \(1\)"),
-        ("servo", None, "off", {}, "expected a joint or an id"),
+        ("servo", "nose", "off", {}, r"expected a name or an id of left_shoulder_yaw \(1\)"),
+        ("servo", None, "off", {}, "expected a name or an id"),
         ("lidar", "left", "off", {}, "there is only one"),
         ("servo", 3, "off", {"volts_v": 1.0}, "volts_v: unknown; expected start_s"),
         ("servo", 3, "delayed", {"delay_s": -1.0}, "delay_s: expected 0.001..60; got -1"),
@@ -145,8 +145,15 @@ def test_the_same_fault_twice_at_one_place_is_refused(lockstep: Lockstep) -> Non
 
 @pytest.mark.gl
 @pytest.mark.parametrize(("component", "fault"), list(EFFECTS))
-def test_every_effect_begins_and_ends(shared: Lockstep, component: Component, fault: Fault) -> None:
-    instances = {Component.SERVO: "left_elbow", Component.DRIVE: "left_wheel"}
+def test_every_effect_begins_and_ends(
+    shared: Lockstep, tmp_path: Path, component: Component, fault: Fault
+) -> None:
+    instances = {
+        Component.SERVO: "left_elbow",
+        Component.DRIVE: "left_wheel",
+        Component.HOME_DEVICE: "lamp",
+    }
+    shared.twin.begin_home(tmp_path / "mqtt")
     handle = shared.faults.inject(component, instances.get(component), fault)
     shared.run_for(0.04)  # every device has done something by then
     assert handle.is_on
@@ -154,6 +161,7 @@ def test_every_effect_begins_and_ends(shared: Lockstep, component: Component, fa
     assert not handle.is_on
     shared.run_for(0.04)
     assert shared.faults.pending == ()
+    shared.twin.leave_home()
 
 
 def test_the_fault_server_lists_injects_and_clears(lockstep: Lockstep) -> None:

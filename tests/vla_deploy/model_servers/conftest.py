@@ -5,9 +5,9 @@ import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.model_servers.calls.exchange import Exchange
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.secret import Secret
 
 
 class SteppedClock:

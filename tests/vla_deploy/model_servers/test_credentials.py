@@ -3,8 +3,9 @@ import pickle  # noqa: TID251 - to show that a secret does not go this way
 
 import pytest
 
-from vla_deploy.model_servers.credentials import Secret, find_credential
+from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import CredentialMissing
+from vla_deploy.runtime.secret import Secret
 
 KEY = "sk-very-secret-0123456789"
 

@@ -5,11 +5,11 @@ import pytest
 from pydantic import BaseModel, Field
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats import FORMATS
 from vla_deploy.model_servers.formats.base import is_closed, wire_schema
 from vla_deploy.model_servers.settings import Api
+from vla_deploy.runtime.secret import Secret
 
 JPEG = b"\xff\xd8 an image"
 BASE64 = base64.b64encode(JPEG).decode()

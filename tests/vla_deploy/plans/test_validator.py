@@ -6,7 +6,10 @@ from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.plans.validator import check_plan
 
 WORLD = World(
-    places={"kitchen": "kitchen", "galley": "kitchen"}, poses=frozenset({"tuck"}), holding={}
+    places={"kitchen": "kitchen", "galley": "kitchen"},
+    poses=frozenset({"tuck"}),
+    holding={},
+    devices={"lamp": "lamp", "light": "lamp"},
 )
 
 
@@ -46,6 +49,9 @@ def faults(*actions: Action) -> list[str]:
         (action("move", distance_m=True), "must be a number"),
         (action("speak", text="  "), "1 to 500 characters"),
         (action("move_arm", pose="dance"), "unknown pose"),
+        (action("turn_on"), 'turn_on needs "device", a known device of the home'),
+        (action("turn_off", device="oven"), 'unknown device "oven"; known: lamp'),
+        (action("turn_on", device=["lamp"]), "unknown device"),
         (action("place", destination="moon", relation="in"), "moon"),
     ],
 )
@@ -78,3 +84,7 @@ def test_an_infeasible_or_empty_plan_is_refused() -> None:
 
 def test_aliases_of_places_are_accepted() -> None:
     assert faults(action("navigate_to", place="the galley")) == []
+
+
+def test_a_device_may_be_called_by_any_of_its_names() -> None:
+    assert not faults(action("turn_on", device="the light"), action("turn_off", "b", device="lamp"))

@@ -330,6 +330,14 @@ def test_in_a_pause_nothing_goes_on_and_its_time_does_not_count(stage: Stage):
     assert execution.records[0].execution_time_s == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_paused_robot_still_answers(stage: Stage):
+    execution = stage.plan(a_speak=())
+    stage.context.link.pause()
+    stage.ends["a_speak"] = None
+    stage.step(execution, 2)
+    assert execution.succeeded
+
+
 def test_what_waits_for_a_part_of_the_robot_waits_on_after_a_long_pause(stage: Stage):
     execution = stage.plan(a_turn=(), b_move=())
     stage.step(execution)

@@ -1,4 +1,4 @@
-"""Type how page, stop door, ROS gateway and twin are."""
+"""Type how page, stop door, ROS gateway, devices of the home and twin are."""
 
 from typing import Literal, TypedDict
 
@@ -48,6 +48,28 @@ class RosGoalAct(TypedDict):
     act: Literal["cancel", "permit", "hold"]
     request_id: str
     reason: str
+
+
+class DeviceStatus(TypedDict):
+    """Say what is known of one device of the home; `is_on` is None where `fault` says why not.
+
+    `age_s` is from its last reading, None before the first. `called` is its own name for itself.
+    """
+
+    name: str
+    kind: str
+    place: str
+    called: str
+    where: str
+    is_on: bool | None
+    age_s: float | None
+    fault: str
+
+
+class DevicesStatus(TypedDict):
+    """Say what is known of every device of the home."""
+
+    devices: list[DeviceStatus]
 
 
 class TwinStatusDocument(TypedDict):

@@ -11,7 +11,6 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from vla_deploy.model_servers.calls.privacy import Resolve, resolve
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
     AnswerTooLarge,
@@ -23,6 +22,7 @@ from vla_deploy.model_servers.json_answer import strict_json
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
+from vla_deploy.runtime.secret import Secret
 
 _BYTES_PER_KB: Final = 1024
 

@@ -6,7 +6,6 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.base import (
     Json,
@@ -19,6 +18,7 @@ from vla_deploy.model_servers.formats.base import (
     wire_schema,
 )
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.secret import Secret
 
 OUTPUT_FORMAT: Final = "output_format"
 # Models that know no output format fill in the arguments of a tool that they must use.

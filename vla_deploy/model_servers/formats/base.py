@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from vla_deploy.model_servers.chat import Chat, Completion
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.secret import Secret
 
 _KEPT: Final = frozenset({"type", "enum", "const", "description", "$ref", "required"})
 _LISTS: Final = ("anyOf",)

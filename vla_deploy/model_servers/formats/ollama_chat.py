@@ -3,7 +3,6 @@
 from typing import Final
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerTruncated
 from vla_deploy.model_servers.formats.base import (
     Json,
@@ -17,6 +16,7 @@ from vla_deploy.model_servers.formats.base import (
     wire_schema,
 )
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.secret import Secret
 
 SCHEMA: Final = "schema"
 ANY_JSON: Final = "json"

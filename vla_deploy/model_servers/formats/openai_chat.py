@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from vla_deploy.model_servers.chat import Chat, ChatMessage, Completion
-from vla_deploy.model_servers.credentials import Secret
 from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
 from vla_deploy.model_servers.formats.base import (
     Json,
@@ -19,6 +18,7 @@ from vla_deploy.model_servers.formats.base import (
     wire_schema,
 )
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.runtime.secret import Secret
 
 JSON_SCHEMA: Final = "json_schema"
 # llama-cpp-python's server fails on `json_schema`, and takes the schema here instead.

@@ -8,8 +8,9 @@ from vla_deploy.client.battery import SILENT, battery_sentences
 from vla_deploy.memory.episode import at_words, place_words
 from vla_deploy.planning.dialogue.phrasing import listed
 from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.patterns.phrase import parts_of
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
-from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.knowledge import match_devices, match_place
 from vla_deploy.plans.plan import Skill
 from vla_deploy.plans.symbolic.state import Point
 from vla_deploy.world import Snapshot, Thing
@@ -76,6 +77,21 @@ def _tell_whether(fields: Fields, request: PlanRequest) -> list[Skill]:
     return _say(f"Yes, I see {_things(found)}." if found else "No, I do not see that.")
 
 
+def _tell_devices(fields: Fields, request: PlanRequest) -> list[Skill]:
+    """Say whether devices of the home are on, as they have told."""
+    world = request.world
+    parts = parts_of(fields["device"])
+    names = dict.fromkeys(name for one in parts for name in match_devices(one, world))
+    return _say(" ".join(_device(name, world.devices_on.get(name)) for name in names))
+
+
+def _device(name: str, is_on: bool | None) -> str:
+    called = name.replace("_", " ")
+    if is_on is None:
+        return f"I do not know whether the {called} is on: it does not answer."
+    return f"The {called} is {'on' if is_on else 'off'}."
+
+
 def _things(things: Sequence[Thing]) -> str:
     """Return things as one says them: "a red cup, a blue ball and 3 more"."""
     words = [_a(str(one)) for one in things[:MOST_TOLD]]
@@ -132,6 +148,7 @@ ANSWERS: Final[Mapping[str, Callable[[Fields, PlanRequest], list[Skill]]]] = {
     "seeing": _tell_sight,
     "place": _tell_place,
     "whether": _tell_whether,
+    "device": _tell_devices,
     "doing": _tell_doing,
     "able": lambda _fields, _request: _say(ABILITIES),
     # One that may not move refuses every plan before.

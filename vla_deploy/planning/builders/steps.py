@@ -16,11 +16,12 @@ from vla_deploy.planning.command_parser.grammar import CHARGING, Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotAble
 from vla_deploy.planning.interfaces import PlanRequest
+from vla_deploy.planning.patterns.phrase import parts_of
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.planning.understanding.places import pose_parameters
 from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quantity_words
 from vla_deploy.plans.errors import PlanInvalid, UnknownObject, UnknownPlace
-from vla_deploy.plans.knowledge import match_place
+from vla_deploy.plans.knowledge import match_devices, match_place
 from vla_deploy.plans.plan import Skill
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
@@ -44,7 +45,6 @@ _RELATIONS: Final[Mapping[str, str]] = {
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
-_AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 # What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
 _BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
 Handler = Callable[["Steps", Step], list[Skill]]
@@ -81,7 +81,7 @@ class Steps:
     def things(self, step: Step) -> tuple[list[Skill], list[str]]:
         """Return the way to what a step is about, and that, with where it is to be taken from."""
         what, _, inner = self._chosen(step).partition(" from ")
-        parts = _parts_of(what)
+        parts = parts_of(what)
         if "except" in step:
             parts = [f"{what} but {self.spoken(step, 'except')}"]
         where = self.spoken(step, "from") if "from" in step else inner
@@ -141,9 +141,9 @@ def way_back(request: PlanRequest) -> Skill:
     return "navigate_to", pose_parameters(poses[-1])
 
 
-def _parts_of(text: str) -> list[str]:
-    """Return the things of "the cup, the ball and the book"."""
-    return [part for part in _AND.split(text) if part]
+def _switch(spoken: Steps, step: Step) -> list[Skill]:
+    named = (match_devices(one, spoken.request.world) for one in parts_of(step["device"]))
+    return [(f"turn_{step['way']}", {"device": one}) for each in named for one in each]
 
 
 def _go(spoken: Steps, step: Step) -> list[Skill]:
@@ -155,7 +155,7 @@ def _go(spoken: Steps, step: Step) -> list[Skill]:
     if where == "back" or where in _SPEAKERS:
         return [("navigate_to", {"place": "here"})]
     places = re.sub(r" with (?:it|them|that|this)$", "", spoken.spoken(step, "where"))
-    return [_way_to(_NEAR.sub("", one), spoken.request) for one in _parts_of(places)]
+    return [_way_to(_NEAR.sub("", one), spoken.request) for one in parts_of(places)]
 
 
 def _way_to(place: str, request: PlanRequest) -> Skill:
@@ -255,7 +255,7 @@ def _say(_spoken: Steps, step: Step) -> list[Skill]:
 
 def _answer(spoken: Steps, step: Step) -> list[Skill]:
     tell = answering.ANSWERS[step["about"]]
-    return tell(spoken.fields(step, "what", "where"), spoken.request)
+    return tell(spoken.fields(step, "what", "where", "device"), spoken.request)
 
 
 def _refused(error: type[Declined | CannotBeDone], why: str) -> Handler:
@@ -282,6 +282,7 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "open": lambda _, step: [("open_gripper", _arm(step))],
     "close": lambda _, step: [("close_gripper", _arm(step))],
     "pose": _pose,
+    "switch": _switch,
     "say": _say,
     "wait": lambda spoken, step: [
         ("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})

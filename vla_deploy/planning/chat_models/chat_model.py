@@ -2,7 +2,6 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -16,7 +15,7 @@ from vla_deploy.model_servers.calls.picture import small_jpeg
 from vla_deploy.model_servers.chat import Chat, ChatMessage, ChatRole
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.server import ModelServer
-from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
+from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, PlanRequest, Proposal
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
@@ -41,9 +40,9 @@ class ChatModel(BackEnd):
     uses = frozenset({Aid.MEMORY})
     room = ROOM
 
-    def __init__(self, name: str, robot: str, places: Sequence[str], check: Check) -> None:
+    def __init__(self, name: str, robot: str, shape: type[PlanAnswer], check: Check) -> None:
         self.name = name
-        self.shape = answer_for(places)
+        self.shape = shape
         self._robot = robot
         self._check = check
 
@@ -98,9 +97,9 @@ class LocalModel(ChatModel):
     """Ask a model on board, whose answer is constrained to the shape; images are left out."""
 
     def __init__(
-        self, name: str, model: LanguageModel, robot: str, places: Sequence[str], check: Check
+        self, name: str, model: LanguageModel, robot: str, shape: type[PlanAnswer], check: Check
     ) -> None:
-        super().__init__(name, robot, places, check)
+        super().__init__(name, robot, shape, check)
         self.model = model
         self.claim = MemoryClaim()
         self._schema = self.shape.model_json_schema()
@@ -133,9 +132,9 @@ class ServedModel(ChatModel):
     """Ask a server, which is shown images where its model takes them and `servers.toml` lets it."""
 
     def __init__(
-        self, server: ModelServer, robot: str, places: Sequence[str], check: Check
+        self, server: ModelServer, robot: str, shape: type[PlanAnswer], check: Check
     ) -> None:
-        super().__init__(f"server {server.name}", robot, places, check)
+        super().__init__(f"server {server.name}", robot, shape, check)
         self._server = server
         self._asker = StructuredAsker(server, self.shape)
         # The schema is a part of the prompt, too.

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
 from vla_deploy.planning.prompts.composing import plain
-from vla_deploy.plans.catalogue import SKILLS, SkillParameter, SkillSpec, Type
+from vla_deploy.plans.catalogue import SKILLS, SWITCHING, SkillParameter, SkillSpec, Type
 from vla_deploy.plans.dialects import LISTS, parse_plan
 from vla_deploy.plans.plan import MOST_ACTIONS, Plan
 
@@ -14,6 +14,8 @@ _REASON_CHARACTERS: Final = 400
 _QUESTION_CHARACTERS: Final = 160
 _MOST_ASKED: Final = 60
 Schema = dict[str, Any]
+Names = Mapping[Type, Sequence[str]]
+"""What may be named by each type of parameter that is an enumeration."""
 
 
 class PlanAnswer(BaseModel):
@@ -54,13 +56,19 @@ class PlanAnswer(BaseModel):
         return parse_plan({"goal": goal, "reasoning": self.reasoning, "actions": actions})
 
 
-def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
-    """Return the shape of answers for a robot that knows these places.
+def answer_for(places: Sequence[str], devices: Sequence[str] = ()) -> type[PlanAnswer]:
+    """Return the shape of answers for a robot that knows these places and devices of the home.
 
-    Each step is a skill with its parameters next to it; places are an enumeration, and a parameter
-    that may be left out may be null.
+    Each step is a skill with its parameters next to it; places and devices are enumerations, and a
+    parameter that may be left out may be null.
     """
-    forms = [form for name, spec in SKILLS.items() for form in _forms(name, spec, places)]
+    names = {Type.PLACE: places, Type.DEVICE: devices}
+    forms = [
+        form
+        for name, spec in SKILLS.items()
+        if devices or name not in SWITCHING
+        for form in _forms(name, spec, names)
+    ]
     schema = {"type": "array", "maxItems": _MOST_ASKED, "items": {"anyOf": forms}}
 
     class Answer(PlanAnswer):
@@ -72,14 +80,14 @@ def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
     return Answer
 
 
-def _forms(name: str, spec: SkillSpec, places: Sequence[str]) -> Iterator[Schema]:
+def _forms(name: str, spec: SkillSpec, names: Names) -> Iterator[Schema]:
     """Yield one form for each group of parameters of which exactly one is given."""
     choices = {one for group in spec.one_of for one in group}
     for group in spec.one_of or ((),):
         given: Schema = {}
         for key, parameter in spec.parameters.items():
             if key in group or key not in choices:
-                schema = _typed(parameter, places)
+                schema = _typed(parameter, names)
                 is_given = key in group or parameter.required
                 given[key] = schema if is_given else {"anyOf": [schema, {"type": "null"}]}
         yield {
@@ -90,15 +98,15 @@ def _forms(name: str, spec: SkillSpec, places: Sequence[str]) -> Iterator[Schema
         }
 
 
-def _typed(parameter: SkillParameter, places: Sequence[str]) -> Schema:
+def _typed(parameter: SkillParameter, names: Names) -> Schema:
     match parameter.type:
         case Type.NUMBER:
             bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}
             return {"type": "number", **bounds}
         case Type.CHOICE:
             return {"type": "string", "enum": list(parameter.choices)}
-        case Type.PLACE:
-            return {"type": "string", "enum": list(places)}
+        case Type.PLACE | Type.DEVICE as kind:
+            return {"type": "string", "enum": list(names[kind])}
         case _:
             return {"type": "string"}
 

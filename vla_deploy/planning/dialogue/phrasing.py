@@ -71,6 +71,8 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",
     "speak": lambda given: f'say "{first_part(str(given["text"]))}"',
     "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
+    "turn_on": lambda given: f"turn on {_the(given['device'])}",
+    "turn_off": lambda given: f"turn off {_the(given['device'])}",
     "stop": lambda given: "stand still",
 }
 

@@ -58,6 +58,7 @@ class Situation:
         self._control = space.cell_reader(topics.CONTROL_STATUS)
         self._table = space.cell_reader(topics.PROCESS_TABLE)
         self._battery = space.cell_reader(topics.BATTERY)
+        self._devices = space.cell_reader(topics.DEVICE_STATUS)
         self._frames: FrameReader = space.frame_reader(topics.RGBD)
         self._log = TaskLog(space)
         self._called_up: tuple[tuple[str, str, bool], Experience] = ("", "", False), NO_EXPERIENCE
@@ -76,7 +77,7 @@ class Situation:
         return PlanRequest(
             command_id=command.command_id,
             text=command.text,
-            world=world_of(self._robot, self._holding(scene), self._is_free),
+            world=world_of(self._robot, self._holding(scene), self._is_free, self._devices_on()),
             scene=scene,
             here=here,
             conversation=conversation,
@@ -169,6 +170,12 @@ class Situation:
             name: None if is_denied(hands.get(name), kind) else kind
             for name, kind in sample.document().get("holding", {}).items()
         }
+
+    def _devices_on(self) -> Mapping[str, bool]:
+        """Return whether the devices of the home are on that answer."""
+        sample = self._fresh(self._devices, topics.DEVICE_STATUS.deadline_s)
+        rows = () if sample is None else sample.document()["devices"]
+        return {one["name"]: one["is_on"] for one in rows if one["is_on"] is not None}
 
     def _here(self) -> Pose | None:
         sample = self._fresh(self._pose, _POSE_AGE_S)

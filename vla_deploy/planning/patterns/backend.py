@@ -10,14 +10,14 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotUnderstood
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
 from vla_deploy.planning.patterns.follow_up import repeated
-from vla_deploy.planning.patterns.phrase import clauses
+from vla_deploy.planning.patterns.phrase import clauses, parts_of
 from vla_deploy.planning.patterns.table import PATTERNS, is_thing
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding import TurnOutcome
 from vla_deploy.planning.understanding.grounding import ground_plan
-from vla_deploy.plans.errors import UnknownPlace
-from vla_deploy.plans.knowledge import World, match_place
+from vla_deploy.plans.errors import UnknownDevice, UnknownPlace
+from vla_deploy.plans.knowledge import World, match_devices, match_place
 from vla_deploy.plans.plan import Plan, Skill, chained
 from vla_deploy.runtime.deadline import Deadline
 
@@ -108,18 +108,24 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
 
 
 def _fitting(clause: str, request: PlanRequest) -> Step:
-    unknown = ""
+    unknown = no_device = ""
     for pattern, given in PATTERNS:
         found = pattern.fullmatch(clause)
         if found is None:
             continue
         said = {name.rstrip(digits): text for name, text in found.groupdict().items() if text}
         named = [said[name] for name in ("where", "from") if name in said]
+        devices = parts_of(said.get("device", ""))
+        if not all(match_devices(one, request.world) for one in devices):
+            no_device = said["device"] if clause.startswith(("turn ", "switch ")) else ""
+            continue
         if all(_is_known(one, request) for one in named):
             return {**given, **said}
         unknown = unknown or ("" if "what" in said else said.get("where", ""))
     if unknown and not scope_words(clause):
         raise UnknownPlace(unknown, set(request.world.places.values()))
+    if no_device and request.world.devices and not scope_words(clause):
+        raise UnknownDevice(no_device, set(request.world.devices.values()))
     raise Declined(f'no pattern covers "{clause[:60]}"')
 
 

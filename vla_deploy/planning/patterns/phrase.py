@@ -7,7 +7,7 @@ MOST_CLAUSES: Final = 6
 MOST_LETTERS: Final = 300
 _VERBS: Final = (
     "go|drive|come|move|turn|look|pick|grab|take|get|put|place|set|drop|bring|fetch|give|hand|carry|"
-    "find|search|open|close|wait|say|tuck|tidy|tell|stop|return|lay|hold|locate|lift"
+    "find|search|open|close|wait|say|tuck|tidy|tell|stop|return|lay|hold|locate|lift|switch"
 )
 _BEFORE: Final = re.compile(
     r"^(?:(?:please|robot|butler|hey|hello|hi|ok|okay|well|so|now|just|and|then|next|also|"
@@ -23,6 +23,7 @@ _JOINT: Final = re.compile(
     r"[,;.!?]?\s+(?:and then|then|after that|and)\s+(?:please )?"
     rf"(?=(?:{_VERBS})\b)|[,;.!?]\s*(?:and |then |and then )?(?=(?:please |now )?(?:{_VERBS})\b)"
 )
+_AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
 
 def clauses(text: str) -> tuple[str, ...]:
@@ -41,3 +42,8 @@ def courtesy_off(text: str) -> str:
 def plain(text: str) -> str:
     """Return a text in lower case, with one space between words and no marks around."""
     return " ".join(text.lower().replace("’", "'").split()).strip(" .!?,")
+
+
+def parts_of(text: str) -> list[str]:
+    """Return the things of "the cup, the ball and the book"."""
+    return [part for part in _AND.split(text) if part]

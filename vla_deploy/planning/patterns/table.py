@@ -48,6 +48,8 @@ _THING: Final = rf"(?P<what>{THING})"
 # What is moved where: a thing that is told by where it stands leaves it open what goes where.
 _MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
 _WHERE: Final = rf"(?P<where>{WORDS})"
+# Not "turn on the spot".
+_DEVICE: Final = r"(?!(?:the )?spot\b)(?P<device>[a-z][a-z']*(?:,? [a-z']+){0,7}?)"
 _INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
 _TAKE: Final = "(?:pick up|grab|take|get|lift|hold)"
 _PUT: Final = "(?:put|place|set|lay|drop|leave)"
@@ -71,6 +73,9 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?: (?:to the )?{_SIDE})?", "turn", {}),
     (rf"(?:{_GO}|head|navigate|return)(?: back| over)?(?: to| into)? {_WHERE}", "go", {}),
     ("(?:turn|spin) (?:a?round once|in a circle)", "turn", {"by": "360 degrees"}),
+    # --- switch devices of the home; what is no device of it is refused by name
+    (rf"(?:turn|switch) (?P<way>on|off) {_DEVICE}|(?:turn|switch|put) {_DEVICE} (?P<way>on|off)",
+     "switch", {}),
     # --- look
     ("look a?round", "look", {"way": "around"}),
     (r"look(?: to the)? (?P<way>left|right|up|down|ahead)", "look", {}),
@@ -111,6 +116,7 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)", "ask",
      {"about": "ready"}),
     (r"help(?: me)?|what can you do|who are you", "ask", {"about": "able"}),
+    (rf"(?:is|are) {_DEVICE} (?:on|off)(?: now)?", "ask", {"about": "device"}),
     (rf"where(?: is| are|'s) {_THING}|have you seen {_THING}", "where", {}),
     (rf"what (?:do|can) you see|what(?:'s| is) on (?:the )?{_WHERE}", "ask", {"about": "seeing"}),
     (r"what (?:are you holding|do you hold|do you have in your hands?)", "ask",

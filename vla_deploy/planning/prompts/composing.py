@@ -14,7 +14,7 @@ from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.interfaces import ActionNote, PlanRequest
 from vla_deploy.planning.understanding import ConversationTurn
-from vla_deploy.plans.catalogue import SKILLS
+from vla_deploy.plans.catalogue import SKILLS, SWITCHING
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.access import GRIP_HEIGHTS_M, REACH_M
@@ -32,7 +32,10 @@ def chat_for(request: PlanRequest, robot: str, room: int = ROOM, jpeg: bytes | N
     extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
         "robot": plain(robot),
-        "skills": skills_in_words(has_hands=request.world.opening_max_m is not None),
+        "skills": skills_in_words(
+            has_hands=request.world.opening_max_m is not None,
+            has_devices=bool(request.world.devices),
+        ),
         "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
     system = "\n\n".join(filled(part, **fields) for part in ("plan", "safety", *extra))
@@ -56,12 +59,12 @@ def _template(name: str) -> Template:
 
 
 @cache
-def skills_in_words(*, has_hands: bool) -> str:
+def skills_in_words(*, has_hands: bool, has_devices: bool) -> str:
     """Return every skill of a robot on a line: its name, its parameters, what it does."""
     return "\n".join(
         f"- {name}({', '.join(spec.parameters)}): {spec.summary}"
         for name, spec in SKILLS.items()
-        if has_hands or "arm" not in spec.parameters
+        if (has_hands or "arm" not in spec.parameters) and (has_devices or name not in SWITCHING)
     )
 
 
@@ -84,6 +87,9 @@ def limits(world: World) -> Iterator[str]:
         )
     if world.poses:
         yield f"poses of the arms: {', '.join(sorted(map(plain, world.poses)))}"
+    if world.devices:
+        names = sorted({plain(one) for one in world.devices.values()})
+        yield f"devices of the home that it can switch: {', '.join(names)}"
     for zone in world.zones:
         yield f"it must not enter {plain(zone.name)}: {plain(zone.reason, 120)}"
     yield "it handles no people, animals, fire, blades, medicine or hot liquids"
@@ -107,6 +113,7 @@ MOST_FORBIDDEN: Final = 20
 # Farther than that from all of them, the robot is at no known place.
 AT_PLACE_M: Final = 1.0
 NOT_MEASURED: Final = "not measured"
+_ON_OFF: Final = {True: "on", False: "off", None: "unknown"}
 _UNKNOWN_KIND: Final = "object"
 
 
@@ -123,6 +130,10 @@ def situation_of(request: PlanRequest) -> dict[str, Any]:
         "gone": [] if scene is None else [plain(one.thing) for one in scene.lost],
         "hands": {
             plain(hand): what and plain(what) for hand, what in request.world.holding.items()
+        },
+        "devices": {
+            plain(name): _ON_OFF[request.world.devices_on.get(name)]
+            for name in sorted(set(request.world.devices.values()))
         },
         "places": sorted({plain(place) for place in request.world.places.values()}),
         "said_before": [_turn(one) for one in reversed(request.conversation.turns)],

@@ -24,7 +24,8 @@ from vla_deploy.planning.understanding.places import (
 from vla_deploy.planning.understanding.remembered import hand_to_take, place_to_look
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.plans.catalogue import SKILLS
-from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownPlace
+from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownDevice, UnknownPlace
+from vla_deploy.plans.knowledge import match_device
 from vla_deploy.plans.plan import (
     MOST_ACTIONS,
     PUT_IN,
@@ -61,6 +62,7 @@ def ground_plan(plan: Plan, request: PlanRequest) -> Plan:
         PlanInvalid: its ids are not unique, or its dependencies no order.
         UnknownObject: an expression names nothing that the robot knows.
         UnknownPlace: a place is not known.
+        UnknownDevice: a device is not known.
         Ambiguous: only the speaker can tell what is meant.
     """
     faults = dependency_faults(plan.actions)
@@ -179,6 +181,8 @@ class _Grounder:
                 yield from self._pick(given)
             case "hand_over" if isinstance(given.get("object"), str):
                 yield from self._hand_over(given)
+            case "turn_on" | "turn_off" if isinstance(given.get("device"), str):
+                yield action.skill, {**given, "device": self._device(given["device"])}
             case _:
                 yield action.skill, given
 
@@ -210,6 +214,13 @@ class _Grounder:
         if not station:
             raise NotAble("I know no place where I can charge: [battery] station names it")
         return station
+
+    def _device(self, text: str) -> str:
+        devices = self._request.world.devices
+        name = match_device(text, devices)
+        if name is None:
+            raise UnknownDevice(text, set(devices.values()))
+        return name
 
     def _here(self, text: str) -> Parameters:
         here = self._request.here

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
+from vla_deploy.plans.catalogue import SWITCHING
 from vla_deploy.plans.symbolic import conditions
 from vla_deploy.plans.symbolic.conditions import (
     SMALL_MOVE_M,
@@ -173,6 +174,9 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
             effect=lets_go,
         ),
         "open_gripper": Logic(needs={"nothing dropped": conditions.opens_empty}, effect=lets_go),
-        **dict.fromkeys(("close_gripper", "move_arm", "speak", "wait", "stop"), Logic(needs={})),
+        **dict.fromkeys(
+            ("close_gripper", "move_arm", "speak", "wait", "stop", *sorted(SWITCHING)),
+            Logic(needs={}),
+        ),
     }
 )

@@ -12,6 +12,7 @@ from vla_deploy.model_servers.calls.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 from vla_deploy.planning.chat_models.chat_model import ServedModel
+from vla_deploy.planning.chat_models.plan_answer import answer_for
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import checked
@@ -50,8 +51,8 @@ def served(loopback):
         server = ModelServer(
             "bench", settings, None, Exchange(settings), MonotonicClock(), lambda: 0.5
         )
-        places = ("charging_station", "kitchen")
-        return ServedModel(server, "butler", places, check)
+        shape = answer_for(("charging_station", "kitchen"), ("lamp",))
+        return ServedModel(server, "butler", shape, check)
 
     return served
 

@@ -9,6 +9,7 @@ from vla_deploy.inference.language_model import LanguageModel
 from vla_deploy.memory import Episode, EpisodeOutcome, MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.chat_models.chat_model import LocalModel
+from vla_deploy.planning.chat_models.plan_answer import answer_for
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import load_robot
@@ -16,7 +17,9 @@ from vla_deploy.robots import load_robot
 
 @pytest.fixture
 def chat(model: LanguageModel) -> LocalModel:
-    return LocalModel("chat", model, "butler", sorted(load_robot("butler").places), checked)
+    return LocalModel(
+        "chat", model, "butler", answer_for(sorted(load_robot("butler").places)), checked
+    )
 
 
 @pytest.fixture

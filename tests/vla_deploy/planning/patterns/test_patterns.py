@@ -1,5 +1,7 @@
 """The commonest commands are planned by whole patterns, whose slots hold known names alone."""
 
+from dataclasses import replace
+
 import pytest
 
 from vla_deploy.planning.errors import Declined, NotAble
@@ -7,11 +9,11 @@ from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
 from vla_deploy.planning.understanding import Conversation, ConversationTurn
-from vla_deploy.plans.errors import UnknownPlace
+from vla_deploy.plans.errors import UnknownDevice, UnknownPlace
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import load_robot
 
-WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
+WORLD = world_of(load_robot("butler"), {"left": None, "right": None}, devices_on={"lamp": True})
 HERE = (1.0, 2.0, 0.5)
 
 
@@ -40,6 +42,21 @@ def does(text: str, *turns: ConversationTurn) -> str:
         ("turn right a bit", "turn -0.3490658503988659"),
         ("drive forward 50 cm", "move 0.5"),
         ("turn left 90 degrees", "turn 1.5707963267948966"),
+        ("turn on the lamp", "turn_on lamp"),
+        ("please switch the floor lamp off", "turn_off lamp"),
+        ("put the light on", "turn_on lamp"),
+        ("turn on the lamp in the living room", "turn_on lamp"),
+        ("switch all the lights off", "turn_off lamp"),
+        ("turn off both of the lamps", "turn_off lamp"),
+        ("turn everything off", "turn_off lamp; turn_off socket"),
+        ("are the lights on", "speak The lamp is on."),
+        ("is the lamp on?", "speak The lamp is on."),
+        (
+            "are the light and the socket off",
+            "speak The lamp is on. I do not know whether the socket is on: it does not answer.",
+        ),
+        ("turn off the lamp and the socket", "turn_off lamp; turn_off socket"),
+        ("go to the kitchen and switch on the plug", "navigate_to the kitchen; turn_on socket"),
         ("look up", "look_at up"),
         ("look at the blue cup", "look_at the blue cup"),
         ("find my keys", "find_object my keys"),
@@ -86,6 +103,12 @@ def test_a_common_command_is_planned_as_it_is_said(text: str, expected: str) -> 
         "tell Anna to go to the kitchen",
         "pick up the cup that my sister gave me",
         "put the cup on the table next to the book",
+        "don't turn on the lamp",
+        "turn on the lamp when it gets dark",
+        "turn on the spot",
+        "switch off all the lights except the lamp",
+        "turn off every lamp but the floor lamp",
+        "put the cup on",
         "colourless green ideas",
         "x" * 5000,
         "",
@@ -99,6 +122,14 @@ def test_what_no_pattern_covers_whole_is_declined(text: str) -> None:
 def test_a_place_that_nobody_knows_is_named() -> None:
     with pytest.raises(UnknownPlace, match="narnia"):
         pattern_plan(request_for("go to narnia"))
+
+
+def test_a_device_that_nobody_knows_is_named_with_those_there_are() -> None:
+    with pytest.raises(UnknownDevice, match=r'"the radio"; I can switch: lamp, socket'):
+        pattern_plan(request_for("turn on the radio"))
+    without = replace(WORLD, devices={})
+    with pytest.raises(Declined):
+        pattern_plan(replace(request_for("turn on the radio"), world=without))
 
 
 def test_again_does_what_was_done_last() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.memory import Episode, EpisodeOutcome, Experience
-from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.interfaces import ActionNote, Forbidden, Prohibition
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.prompts.composing import TEMPLATES, as_data, chat_for, place_at, plain
@@ -133,6 +133,23 @@ def test_instructions_tell_the_robots_own_limits(ask):
     ):
         assert told in system
     assert "${" not in system
+
+
+def test_devices_are_offered_where_there_are_any(ask):
+    request = ask("go")
+    without = replace(request, world=replace(request.world, devices={}))
+    told = (
+        chat_for(request, "butler").system,
+        json.dumps(answer_for(("hall",), ("lamp",)).model_json_schema()),
+    )
+    untold = (
+        chat_for(without, "butler").system,
+        json.dumps(answer_for(("hall",)).model_json_schema()),
+    )
+    assert "devices of the home that it can switch: lamp, socket" in told[0]
+    assert all("turn_on" in one for one in told)
+    assert not any("turn_on" in one or "turn_off" in one for one in untold)
+    assert '"enum": ["lamp"]' in told[1]
 
 
 def test_failures_ask_for_another_way(ask):

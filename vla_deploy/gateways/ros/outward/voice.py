@@ -112,7 +112,7 @@ _BY_SKILL: Final = {
     **dict.fromkeys(("navigate_to", "charge", "move", "turn"), "navigation"),
     **dict.fromkeys(("pick_up", "place", "open_gripper", "close_gripper"), "manipulation"),
     **dict.fromkeys(("find_object", "look_at"), "search"),
-    **dict.fromkeys(("speak", "hand_over", "wait"), "assist"),
+    **dict.fromkeys(("speak", "hand_over", "wait", "turn_on", "turn_off"), "assist"),
     "stop": "stop",
 }
 

@@ -1,0 +1,34 @@
+"""Names by which a plan may call what is in the robot file."""
+
+from dataclasses import replace
+
+import pytest
+
+from vla_deploy.plans.knowledge import match_device, spoken_devices
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.home_devices import DeviceKind, HomeDevice
+
+BUTLER = load_robot("butler")
+OTHER = HomeDevice(name="desk_lamp", kind=DeviceKind.LAMP, place="bedroom", aliases=("light spot",))
+
+
+@pytest.mark.parametrize(
+    ("said", "device"),
+    [
+        ("lamp", "lamp"),
+        ("The Floor Lamp", "lamp"),
+        ("living room light", "lamp"),
+        ("the lamp in the lounge", "lamp"),
+        ("desk_lamp", "desk_lamp"),
+        ("my light spot in the bedroom", "desk_lamp"),
+        ("kitchen lamp", None),
+        ("the socket in the bedroom", None),
+        ("", None),
+        (7, None),
+    ],
+)
+def test_a_device_is_called_by_its_names_and_by_where_it_stands(
+    said: object, device: str | None
+) -> None:
+    robot = replace(BUTLER, devices={**BUTLER.devices, "desk_lamp": OTHER})
+    assert match_device(said, spoken_devices(robot)) == device
