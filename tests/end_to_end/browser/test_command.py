@@ -1,5 +1,6 @@
 """Type and say commands, watch their plans, read why one was refused, answer, cancel."""
 
+import json
 import re
 from typing import Any
 
@@ -124,7 +125,11 @@ def test_a_mission_shows_its_objectives_and_what_each_part_of_the_robot_did(page
 
 
 def test_a_mission_is_paused_goes_on_and_is_cancelled(page: Page, robot: ProcessStack) -> None:
-    shown = mission(page, "go to the kitchen; turn left 25 degrees")
+    document = {"goal": "a walk", "objectives": ["go to the kitchen", "turn left 25 degrees"]}
+    page.get_by_text("Give a plan or a mission as JSON").click()
+    page.get_by_label("Plan or mission as JSON").fill(json.dumps(document))
+    page.get_by_role("button", name="Check it, then run it").click()
+    shown = page.locator(".mission", has_text="a walk")
     assert robot.wait_until(lambda: robot.fastest_rad_s() > STANDSTILL_RAD_S), robot.status()
     shown.get_by_role("button", name="Pause").click()
     expect(shown.locator("summary").first).to_contain_text("Paused")

@@ -91,9 +91,12 @@ def test_a_plain_command_keeps_the_ids_of_its_actions(robot) -> None:
 
 def test_a_cancel_is_an_utterance_of_its_own_so_that_the_command_ends_once(robot) -> None:
     heard = robot.link.events("utterance", from_start=True)
-    order = robot.orders.give(text="turn left")
+    mission = {"objectives": ["turn left"]}
+    order = robot.orders.give(mission=mission, source="ros:/teleop")
     order.cancel()
     given, cancel = (event.payload for event in heard.drain())
+    assert (given["mission"], given["source"]) == (mission, "ros:/teleop")
+    assert "text" not in given
     assert cancel["cancel"] is True
     assert cancel["command_id"] != given["command_id"]
     heard.close()

@@ -77,9 +77,15 @@ class CommandOrders:
         self._orders: list[CommandOrder] = []
 
     def give(
-        self, *, text: str = "", plan: Any = None, source: str = "", is_answer: bool = False
+        self,
+        *,
+        text: str = "",
+        plan: Any = None,
+        mission: Any = None,
+        source: str = "",
+        is_answer: bool = False,
     ) -> CommandOrder:
-        """Give a command in words, or a plan, to the planner.
+        """Give a command in words, a plan or a mission to the planner.
 
         `source` says who gives it, for logs and the audit trail; words that are an answer are no
         command of their own.
@@ -87,7 +93,11 @@ class CommandOrders:
         Raises:
             OrderInvalid: it is longer than the planner takes.
         """
-        content: UtteranceContent = {"text": text} if plan is None else {"plan": plan}
+        content: UtteranceContent = {"text": text}
+        if plan is not None:
+            content = {"plan": plan}
+        if mission is not None:
+            content = {"mission": mission}
         if is_answer:
             content["answer"] = True
         try:

@@ -24,7 +24,7 @@ from vla_deploy.gateways.ros.inward.orders import (
     error_of,
     words_of,
 )
-from vla_deploy.gateways.ros.inward.words import OrderInvalid, parsed_plan, shown
+from vla_deploy.gateways.ros.inward.words import OrderInvalid, is_mission, parsed_plan, shown
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc.payloads.tasks import TaskEvent
 
@@ -53,7 +53,7 @@ class _Order:
 
 
 class PlanAction:
-    """Judge what is to be carried out, and hand it to the planner."""
+    """Judge what is to be carried out, words, a plan or a mission, and hand it to the planner."""
 
     kind = ExecutePlan
 
@@ -75,9 +75,10 @@ class PlanAction:
 
     def begin(self, judged: _Order, feedback: Feedback) -> "Carrying":
         """Give it to the planner."""
-        text, plan, source = judged.text, judged.plan, judged.source
+        plan, is_one = judged.plan, is_mission(judged.plan)
+        given = {"mission": plan} if is_one else {"text": judged.text, "plan": plan}
         try:
-            order = self._orders.give(text=text, plan=plan, source=source)
+            order = self._orders.give(**given, source=judged.source)
         except OrderInvalid as error:
             raise GoalRefused(Result.INVALID_PLAN, str(error)) from error
         return Carrying(order, feedback, of_plan=plan is not None)

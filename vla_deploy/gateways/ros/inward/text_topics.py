@@ -79,9 +79,12 @@ class CommandTopics(GatewayPart):
                 return  # what the robot itself has heard, and is doing already
             if len(self._open) >= MOST_OPEN and not is_stop_word(found.text):
                 raise OrderInvalid(f"{MOST_OPEN} commands are under way or wait; try again later")
-            is_answer = found.plan is None and self._is_asked(topic)
             order = self._orders.give(
-                text=found.text, plan=found.plan, source=sender, is_answer=is_answer
+                text=found.text,
+                plan=found.plan,
+                mission=found.mission,
+                source=sender,
+                is_answer=bool(found.text) and self._is_asked(topic),
             )
         except OrderInvalid as error:
             _log.warning("%s from %s refused: %s", topic, sender, error)
