@@ -128,7 +128,8 @@ def _read_json(text: str) -> CommandMessage:
             return CommandMessage(text=checked_text(found[key]), stated=found)
     raise OrderInvalid(
         f"expected words under one of {', '.join(WORDS_KEYS)}, or a list of actions under one of "
-        f"{', '.join(PLAN_KEYS)}, or objectives; got the keys {', '.join(map(repr, list(found)[:8])) or 'none'}"
+        f"{', '.join(PLAN_KEYS)}, or objectives; "
+        f"got the keys {', '.join(map(repr, list(found)[:8])) or 'none'}"
     )
 
 
