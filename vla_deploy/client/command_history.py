@@ -7,8 +7,14 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.action_status import summary_of
-from vla_deploy.client.command_record import CommandRecord, Kind, record_of
-from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
+from vla_deploy.client.command_record import (
+    CommandRecord,
+    Kind,
+    is_of_planner,
+    part_of,
+    record_of,
+)
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, LAST_EVENTS, Following
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import Event, topics
 from vla_deploy.ipc.payloads.tasks import FinishedEvent, TaskEvent, Utterance
@@ -81,13 +87,16 @@ class CommandHistory:
         record = record_of(event.payload, self._wall_s(event.stamp_ns))
         self._keep(record)
         if record.kind in (Kind.COMMAND, Kind.ANSWER):
-            link = self._link
-            self._open[record.command_id] = Following(
-                record.command_id,
-                planner=lambda: link.fresh(topics.PLANNER_STATUS, age_limit_s=2.0),
-                executor=lambda: link.fresh(topics.EXECUTOR_STATUS, age_limit_s=1.0),
-                clock=link.clock,
-            )
+            self._open[record.command_id] = self._following(record.command_id)
+
+    def _following(self, command_id: str) -> Following:
+        link = self._link
+        return Following(
+            command_id,
+            planner=lambda: link.fresh(topics.PLANNER_STATUS, age_limit_s=2.0),
+            executor=lambda: link.fresh(topics.EXECUTOR_STATUS, age_limit_s=1.0),
+            clock=link.clock,
+        )
 
     def _keep(self, record: CommandRecord) -> None:
         self._records[record.command_id] = record
@@ -98,12 +107,32 @@ class CommandHistory:
     def _note(self, event: Event[TaskEvent]) -> None:
         told, at_s = event.payload, self._wall_s(event.stamp_ns)
         command_id = told["command_id"]
-        if command_id not in self._records:  # its words were pushed out of the ring unread
-            self._keep(CommandRecord(command_id=command_id, source=_UNKNOWN, given_s=at_s))
+        if is_of_planner(command_id):
+            return
+        if command_id not in self._records:
+            self._keep(self._unheard(command_id, at_s))
+        has_ended = self._records[command_id].standing.is_final
+        if has_ended and told["event"] in LAST_EVENTS:
+            return  # who was asked to end it has answered, too
+        begins_again = told["event"] == "objective"
+        if command_id not in self._open and (begins_again or not has_ended):
+            self._open[command_id] = self._following(command_id)
         following = self._open.get(command_id)
         if following is not None:
             list(following.take([told]))
         self._finish(command_id, told, at_s)
+
+    def _unheard(self, command_id: str, at_s: float) -> CommandRecord:
+        """Return the record of a part of a mission, or of words pushed out of the ring unread."""
+        mission_id, part = part_of(command_id)
+        mission = self._records.get(mission_id)
+        return CommandRecord(
+            command_id=command_id,
+            source=mission.source if mission else _UNKNOWN,
+            text=_words_of(mission, part) if mission else "",
+            given_s=at_s,
+            mission=mission_id,
+        )
 
     def _finish(self, command_id: str, told: TaskEvent, at_s: float) -> None:
         record = self._records[command_id]
@@ -136,6 +165,13 @@ class CommandHistory:
 
     def _wall_s(self, stamp_ns: int) -> float:
         return (self._wall_ns() - self._link.clock.now_ns() + stamp_ns) / NS_PER_S
+
+
+def _words_of(mission: CommandRecord, part: str) -> str:
+    """Return what a mission has said of one of its parts; an objective may have no other part."""
+    names = (part, part.partition(".")[0])
+    told = (one for one in reversed(mission.events) if one.get("part") in names)
+    return next((str(one["words"]) for one in told), "")
 
 
 def _unanswered(command_id: str) -> FinishedEvent:

@@ -1,5 +1,6 @@
 """Remember one command: who gave it, what became of it, how it stands."""
 
+import re
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,10 @@ from vla_deploy.ipc.payloads.tasks import FinishedEvent, RejectedEvent, TaskEven
 MOST_EVENTS: Final = 400
 MOST_CHARACTERS: Final = 1000
 """Of one command in words."""
-_CANCELLED: Final = "cancelled on request"
+_ENDED_BY_PERSON: Final = ("cancelled on request", "stopped on request")
+_PART: Final = re.compile(r"(?P<mission>.+)/(?P<part>[\w-]+\.[\w-]+)(?:\+\d+)?")
+_OF_CANCEL: Final = "-cancel"
+"""Ends the id of what the planner asks the executor for by itself: to end one command."""
 
 
 class Kind(StrEnum):
@@ -63,6 +67,7 @@ _AFTER: Final[Mapping[str, Standing]] = {
     "accepted": Standing.ACTIVE,
     "plan": Standing.ACTIVE,
     "action": Standing.ACTIVE,
+    "objective": Standing.ACTIVE,
 }
 
 
@@ -72,11 +77,23 @@ def _finished(event: FinishedEvent) -> Standing:
         return Standing.SUCCEEDED
     if error.startswith("lost"):
         return Standing.LOST
-    return Standing.CANCELLED if error.endswith(_CANCELLED) else Standing.FAILED
+    return Standing.CANCELLED if error.endswith(_ENDED_BY_PERSON) else Standing.FAILED
 
 
 def _rejected(event: RejectedEvent) -> Standing:
-    return Standing.CANCELLED if event["reason"] == _CANCELLED else Standing.REJECTED
+    is_cancelled = event["reason"] in _ENDED_BY_PERSON
+    return Standing.CANCELLED if is_cancelled else Standing.REJECTED
+
+
+def part_of(command_id: str) -> tuple[str, str]:
+    """Return the mission that a command is a part of, and which part; "" and "" of none."""
+    found = _PART.fullmatch(command_id)
+    return (found["mission"], found["part"]) if found else ("", "")
+
+
+def is_of_planner(command_id: str) -> bool:
+    """Return whether nobody gave this command: the planner's own request to end another one."""
+    return command_id.endswith(_OF_CANCEL)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -84,7 +101,7 @@ class CommandRecord:
     """Hold one command; of its events the newest `MOST_EVENTS` are kept.
 
     `given_s` and each event's `at_s` are Unix seconds. `lost_events` were pushed out before anybody
-    could read them, or by newer ones.
+    could read them, or by newer ones. `mission` is the id of the one that it is a part of, or "".
     """
 
     command_id: str
@@ -94,6 +111,7 @@ class CommandRecord:
     plan: Any = None
     given_s: float
     standing: Standing = Standing.GIVEN
+    mission: str = ""
     lost_events: int = 0
     events: deque[dict[str, Any]] = field(default_factory=deque)
 
@@ -121,6 +139,7 @@ class CommandRecord:
             "given_s": round(self.given_s, 3),
             "state": self.standing.value,
             "is_final": self.standing.is_final,
+            "mission": self.mission,
             "lost_events": self.lost_events,
             "events": list(self.events),
         }
@@ -133,11 +152,20 @@ def record_of(utterance: Utterance, given_s: float) -> CommandRecord:
         kind = word if utterance.get(word.value) else kind
     if "pause" in utterance:
         kind = Kind.PAUSE if utterance["pause"] else Kind.RESUME
+    if "mission_act" in utterance:
+        kind = Kind.CANCEL
     return CommandRecord(
         command_id=str(utterance.get("command_id", "")),
         source=str(utterance.get("source", "")),
         kind=kind,
-        text=str(utterance.get("text", "")),
+        text=str(utterance.get("text", "")) or _goal_of(utterance.get("mission")),
         plan=utterance.get("plan"),
         given_s=given_s,
     )
+
+
+def _goal_of(mission: Any) -> str:
+    if mission is None:
+        return ""
+    named = mission if isinstance(mission, Mapping) else {}
+    return str(named.get("goal") or named.get("name") or "mission")

@@ -1,5 +1,6 @@
 """Type and say commands, watch their plans, read why one was refused, answer, cancel."""
 
+import json
 import re
 from typing import Any
 
@@ -96,3 +97,47 @@ def test_what_is_forbidden_for_good_is_shown_until_it_is_permitted(page: Page) -
     expect(told).to_be_visible()
     question.get_by_role("button", name="yes", exact=True).click()
     expect(told).to_have_count(0)
+
+
+def mission(page: Page, goal: str) -> Locator:
+    """Give several commands at once, and return what shows them."""
+    give(page, goal)
+    return page.locator(".mission", has_text=goal)
+
+
+def test_a_mission_shows_its_objectives_and_what_each_part_of_the_robot_did(page: Page) -> None:
+    shown = mission(page, "turn left 20 degrees; look left")
+    expect(shown.locator("summary").first).to_contain_text("Done")
+    rows = shown.get_by_label("Objectives").locator("> li")
+    expect(rows).to_have_count(2)
+    for row, words in zip(rows.all(), ("turn left 20 degrees", "look left"), strict=True):
+        expect(row).to_contain_text(words)
+        expect(row).to_contain_text("done")
+    lanes = shown.get_by_role("region", name="What each part did when")
+    expect(lanes.get_by_label("Base").get_by_role("listitem")).to_contain_text("turn")
+    expect(lanes.get_by_label("Head").get_by_role("listitem").last).to_contain_text("done, from 0:")
+    shown.get_by_text("As a table").click()
+    expect(
+        shown.get_by_role("row", name=re.compile("^turn turn left 20 degrees base"))
+    ).to_be_visible()
+    history = page.get_by_role("region", name="History")
+    expect(history.get_by_role("button", name="look left")).to_have_count(1)  # and not its parts
+
+
+def test_a_mission_is_paused_goes_on_and_is_cancelled(page: Page, robot: ProcessStack) -> None:
+    document = {"goal": "a walk", "objectives": ["go to the kitchen", "turn left 25 degrees"]}
+    page.get_by_text("Give a plan or a mission as JSON").click()
+    page.get_by_label("Plan or mission as JSON").fill(json.dumps(document))
+    page.get_by_role("button", name="Check it, then run it").click()
+    shown = page.locator(".mission", has_text="a walk")
+    assert robot.wait_until(lambda: robot.fastest_rad_s() > STANDSTILL_RAD_S), robot.status()
+    shown.get_by_role("button", name="Pause").click()
+    expect(shown.locator("summary").first).to_contain_text("Paused")
+    assert robot.wait_until(lambda: robot.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    shown.get_by_role("button", name="Resume").click()
+    expect(shown.locator("summary").first).to_contain_text("Running")
+    assert robot.wait_until(lambda: robot.fastest_rad_s() > STANDSTILL_RAD_S), robot.status()
+    shown.get_by_role("button", name="Cancel the mission").click()
+    expect(shown.locator("summary").first).to_contain_text("Cancelled")
+    assert robot.wait_until(lambda: robot.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    expect(shown.get_by_role("button", name="Cancel the mission")).to_have_count(0)

@@ -191,3 +191,30 @@ def test_a_follower_gets_each_new_event_with_its_command_and_none_of_before(robo
     assert followed == [("wave", "finished"), ("nod", "finished")]
     assert history.find(before).given_s == pytest.approx(robot.clock.wall_ns() / 1e9 - 5.5)
     history.stop()
+
+
+def test_the_parts_of_a_mission_have_its_source_and_their_own_words(robot):
+    mission = robot.link.utter(mission={"goal": "tidy up", "objectives": ["take it", "go"]})
+    part = f"{mission}/o1.s1+2"
+    robot.tell(mission, "accepted")
+    robot.tell(mission, "objective", part="o1", words="take it", state="executing")
+    robot.tell(part, "plan", plan=PLAN)
+    assert robot.state(mission) == "active"
+    told = robot.history.find(part).document()
+    assert (told["mission"], told["text"], told["state"]) == (mission, "take it", "active")
+    assert told["source"] == robot.history.find(mission).document()["source"]
+    assert robot.history.find(mission).document()["text"] == "tidy up"
+
+
+def test_a_mission_that_begins_again_is_followed_again_and_ends_once_each_time(robot):
+    mission = robot.link.utter(text="every hour, go")
+    done = {"success": True, "error": None, "actions": []}
+    robot.tell(mission, "finished", **done)
+    robot.tell(mission, "finished", **done)  # not heard twice
+    assert len(robot.history.find(mission).events) == 1
+    robot.tell(mission, "objective", part="o1", words="go", state="executing")
+    assert robot.state(mission) == "active"
+    for _ in range(13):
+        robot.clock.pass_s(0.5)
+        robot.history.step()
+    assert robot.state(mission) == "lost"  # the planner is away

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { pathToFileURL } from "node:url";
 import test from "node:test";
 
-const logic = await import(pathToFileURL(process.env.STOP_LOGIC));
+const logic = await import(pathToFileURL(`${process.env.PAGE}/stop_logic.js`));
 const LATCHED = { estop_latched: true };
 
 function play(...steps) {

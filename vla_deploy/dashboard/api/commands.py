@@ -82,9 +82,9 @@ async def history(
     return [record.document() for record in _history(request).newest(limit)]
 
 
-@router.get("/{command_id}", dependencies=[_Viewer])
+@router.get("/{command_id:path}", dependencies=[_Viewer])
 async def one(command_id: CommandId, request: Request) -> dict[str, Any]:
-    """Return one command with its events."""
+    """Return one command with its events; one of a mission has "/" in its id."""
     return _found(request, command_id).document()
 
 

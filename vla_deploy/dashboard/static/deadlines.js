@@ -23,7 +23,8 @@ const DEADLINES_S = {
   battery: 5,
   topics: 4,
   path: 4,
-  alarms: Infinity, // told on change
+  missions: Infinity, // told on change, as alarms are
+  alarms: Infinity,
 };
 
 /** Return the deadline of a topic. */

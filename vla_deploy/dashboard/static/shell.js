@@ -1,5 +1,6 @@
 /** Stand around every view: head with name and safety state, navigation, notices, content. */
 
+import { usePaused } from "./command/pause.js";
 import { useAlarms } from "./events/alarms.js";
 import { duration } from "./format.js";
 import { useConnection, useTicking, useTopic } from "./following.js";
@@ -72,7 +73,8 @@ function SafetyPill() {
 /** Say in one word what the robot does; the safety state beside it says why it is stopped. */
 function Activity() {
   const { data, stale } = useTopic("activity");
-  const word = data && !stale ? data.activity : "unknown";
+  const isPaused = usePaused();
+  const word = !data || stale ? "unknown" : isPaused && data.activity !== "stopped" ? "paused" : data.activity;
   return html`
     <span class="activity" title=${data?.stopped_by || null}>
       <span class="out-of-sight">The robot is:${" "}</span>${word}

@@ -8,6 +8,7 @@ from typing import Any, Final
 from vla_deploy.client.action_status import FINAL
 from vla_deploy.client.command_history import CommandHistory
 from vla_deploy.client.command_record import CommandRecord, Kind
+from vla_deploy.client.following import LAST_EVENTS
 from vla_deploy.client.link import RobotLink
 
 MOST_RECENT: Final = 5
@@ -51,6 +52,10 @@ class RobotCommands:
         begun = (one for one in found if one.has_begun)
         return next(begun, found[0] if found else PlanUnderWay())
 
+    def plan_of(self, command_id: str) -> PlanUnderWay:
+        """Return the plan of one command; an empty one for none."""
+        return self._under_way.get(command_id, PlanUnderWay())
+
     @property
     def actions_left(self) -> int:
         """Return how many actions of the plan under way have not ended."""
@@ -77,7 +82,7 @@ class RobotCommands:
             )
         elif name == "action":
             self._note_action(command_id, event)
-        elif name in ("finished", "rejected") and record.kind is Kind.COMMAND:
+        elif name in LAST_EVENTS and record.kind is Kind.COMMAND:
             self._end(command_id, event)
 
     def _end(self, command_id: str, event: Mapping[str, Any]) -> None:

@@ -39,6 +39,7 @@ def test_every_cell_and_ring_has_a_feed(feeds: Mapping[str, LiveFeed]) -> None:
     assert feeds["joint_state"].period_s == pytest.approx(0.1)
     assert feeds["scan"].period_s == pytest.approx(0.2)
     assert feeds["process_table"].period_s == pytest.approx(0.5)
+    assert feeds["missions"].period_s == pytest.approx(0.5)  # large, and told on change
 
 
 def test_a_document_passes_as_it_is_with_its_age_and_once(

@@ -6,6 +6,7 @@ import pytest
 
 from vla_deploy.gateways.ros.inward.words import (
     OrderInvalid,
+    is_mission,
     is_stop_word,
     parsed_plan,
     read_message,
@@ -41,6 +42,13 @@ def test_words_are_found(data) -> None:
 def test_plans_are_found(document, plan) -> None:
     message = read_message(json.dumps(document))
     assert (message.text, message.plan) == ("", plan)
+
+
+def test_a_mission_is_found_by_its_objectives_and_not_taken_for_the_words_of_its_goal() -> None:
+    mission = {"goal": "tidy up", "objectives": ["go to the kitchen", {"words": "look left"}]}
+    message = read_message(json.dumps(mission))
+    assert (message.text, message.plan, message.mission) == ("", None, mission)
+    assert not is_mission({"goal": "turn", "actions": [ACTION]})
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-/** Give a command: type it, say it, or paste a plan. */
+/** Give a command: type it, say it, or paste a plan or a mission. */
 
 import { post } from "../api.js";
 import { useAct } from "../asking.js";
@@ -61,7 +61,7 @@ export function Composer() {
 
 function PlanField() {
   const [text, setText] = useState("");
-  const [send, isBusy] = useAct((plan) => post("commands", { plan }));
+  const [send, isBusy] = useAct((given) => (isMission(given) ? post("missions", given) : post("commands", { plan: given })));
   const submit = (event) => {
     event.preventDefault();
     const plan = readPlan(text);
@@ -69,12 +69,12 @@ function PlanField() {
   };
   return html`
     <details class="plan-field">
-      <summary>Give a plan as JSON</summary>
+      <summary>Give a plan or a mission as JSON</summary>
       <form class="stack" onSubmit=${submit}>
         <textarea
           class="input mono"
           rows="6"
-          aria-label="Plan as JSON"
+          aria-label="Plan or mission as JSON"
           spellcheck="false"
           placeholder=${'{"goal": "greet", "actions": [{"id": "a1", "skill": "speak", "parameters": {"text": "hello"}}]}'}
           value=${text}
@@ -88,11 +88,16 @@ function PlanField() {
   `;
 }
 
+/** A mission has objectives, as no plan has; a list of words is one, too. */
+function isMission(given) {
+  return Array.isArray(given) || Boolean(given?.objectives);
+}
+
 function readPlan(text) {
   try {
     return JSON.parse(text);
   } catch (error) {
-    tell("bad", `This is no JSON: ${error.message}`, "Expected one object with goal and actions.");
+    tell("bad", `This is no JSON: ${error.message}`, "Expected a plan with goal and actions, or a mission with goal and objectives.");
     return null;
   }
 }

@@ -4,24 +4,25 @@ import { clock } from "../format.js";
 import { Icon } from "../icons.js";
 import { Badge, Card, Empty } from "../parts.js";
 import { html } from "../ui.js";
-import { STATES } from "./story.js";
+import { standingOf, usePaused } from "./pause.js";
 import { sourceWords } from "./words.js";
 
 export function History({ commands, chosen, onChoose }) {
+  const isPaused = usePaused();
   return html`
     <${Card} title="History" note=${commands.length ? `${commands.length}` : ""}>
       ${commands.length === 0 && html`<${Empty} icon="speech">No command in this run yet.<//>`}
       <ul class="history">
         ${commands.map(
-          (command) => html`<${Row} key=${command.command_id} command=${command} isChosen=${command.command_id === chosen} onChoose=${onChoose} />`,
+          (command) => html`<${Row} key=${command.command_id} command=${command} isChosen=${command.command_id === chosen} isPaused=${isPaused} onChoose=${onChoose} />`,
         )}
       </ul>
     <//>
   `;
 }
 
-function Row({ command, isChosen, onChoose }) {
-  const { text, tone, icon } = STATES[command.story.state];
+function Row({ command, isChosen, isPaused, onChoose }) {
+  const { text, tone, icon } = standingOf(command.story, isPaused);
   return html`
     <li>
       <button type="button" class="history-row" aria-pressed=${isChosen ? "true" : "false"} onClick=${() => onChoose(command.command_id)}>

@@ -10,6 +10,7 @@ export const STATES = {
   asked: { text: "Asks you", tone: "warn", icon: "question" },
   answered: { text: "Answer", tone: "quiet", icon: "check" },
   running: { text: "Running", tone: "info", icon: "play" },
+  paused: { text: "Paused", tone: "warn", icon: "pause" },
   mending: { text: "Seeks another way", tone: "warn", icon: "clock" },
   done: { text: "Done", tone: "ok", icon: "check" },
   cancelled: { text: "Cancelled", tone: "quiet", icon: "cross" },
@@ -30,6 +31,7 @@ const READERS = {
   plan: planned,
   action: acted,
   setback: (story, { error }) => ({ ...story, state: "mending", why: error }),
+  objective: reached,
   said: (story, { text }) => ({ ...story, said: [...story.said, text] }),
   rejected: (story, { reason, attempts }) => ({
     ...story,
@@ -41,9 +43,9 @@ const READERS = {
   finished,
 };
 
-/** Return `{state, actions, asked, why, said, plan, rung, confidence, attempts}` of events in order. */
+/** Return `{state, actions, objectives, asked, why, said, plan, summary, ...}` of events in order. */
 export function storyOf(events) {
-  const begin = { state: "given", actions: [], said: [], attempts: [], asked: null, why: "", plan: null };
+  const begin = { state: "given", actions: [], objectives: [], said: [], attempts: [], asked: null, why: "", plan: null };
   return events.reduce((story, event) => READERS[event.event]?.(story, event) ?? story, begin);
 }
 
@@ -73,14 +75,24 @@ function acted(story, { event, command_id, action_id, ...told }) {
   return { ...story, actions: merged(story.actions, [{ id: action_id, ...told }]) };
 }
 
-function finished(story, { success, error, actions }) {
+/** A mission goes on, or begins again: then nothing of it is done yet. */
+function reached(story, { part, words, state, error, note }) {
+  const before = OPEN_STATES.includes(story.state) ? story.objectives : [];
+  const row = { name: part, words, state, error, note };
+  const isNew = !before.some((one) => one.name === part);
+  const objectives = isNew ? [...before, row] : before.map((one) => (one.name === part ? row : one));
+  return { ...story, state: "running", why: "", objectives };
+}
+
+function finished(story, { success, error, summary, actions }) {
   const all = merged(story.actions, actions ?? []);
-  return { ...story, state: ending(success, error, all), why: error ?? "", actions: all, asked: null };
+  return { ...story, state: ending(success, error, all), why: error ?? "", summary, actions: all, asked: null };
 }
 
 function ending(success, error, actions) {
   if (success) return "done";
   if (String(error).startsWith("lost")) return "lost";
+  if (/(cancelled|stopped) on request$/.test(error)) return "cancelled";
   const ends = actions.map((action) => action.status);
   return ends.includes("cancelled") && !ends.includes("aborted") ? "cancelled" : "failed";
 }

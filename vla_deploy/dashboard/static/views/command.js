@@ -3,9 +3,10 @@
 import { CommandCard } from "../command/command_card.js";
 import { Composer } from "../command/composer.js";
 import { History } from "../command/history.js";
-import { openCommand, useCommands } from "../command/store.js";
+import { given, openCommand, useCommands } from "../command/store.js";
 import { useTopic } from "../following.js";
 import { sentence } from "../format.js";
+import { MissionsCard, useMissions } from "../missions/missions_card.js";
 import { More, Notice } from "../parts.js";
 import { html, useState } from "../ui.js";
 
@@ -13,7 +14,10 @@ export function View() {
   const commands = useCommands();
   const [chosen, setChosen] = useState(null);
   const open = openCommand(commands);
-  const shown = commands.find((one) => one.command_id === chosen) ?? open ?? commands[0];
+  const all = given(commands);
+  const shown = all.find((one) => one.command_id === chosen) ?? open ?? all[0];
+  const missions = useMissions();
+  const isMission = missions.missions.some((one) => one.mission_id === shown?.command_id); // has a card of its own
   return html`
     <div class="view-head"><h1>Command</h1></div>
     <${Refusal} />
@@ -21,9 +25,10 @@ export function View() {
     <div class="command-view">
       <div class="stack">
         <${Composer} />
-        ${shown && html`<${CommandCard} command=${shown} title=${shown === open ? "Under way" : "Command"} />`}
+        ${shown && !isMission && html`<${CommandCard} command=${shown} title=${shown === open ? "Under way" : "Command"} />`}
+        <${MissionsCard} shown=${missions} commands=${commands} chosen=${shown?.command_id} />
       </div>
-      <${History} commands=${commands} chosen=${shown?.command_id} onChoose=${setChosen} />
+      <${History} commands=${all} chosen=${shown?.command_id} onChoose=${setChosen} />
     </div>
   `;
 }

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from vla_deploy_msgs.action import ExecutePlan
 
+from vla_deploy.client.action_status import summary_of
 from vla_deploy.gateways.ros.graph import named
 from vla_deploy.gateways.ros.inward.action_server import (
     Feedback,
@@ -15,14 +16,22 @@ from vla_deploy.gateways.ros.inward.action_server import (
     GoalRefused,
     require_armed,
 )
-from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, error_of
-from vla_deploy.gateways.ros.inward.words import OrderInvalid, parsed_plan, shown
+from vla_deploy.gateways.ros.inward.orders import (
+    ActionPlace,
+    CommandOrder,
+    CommandOrders,
+    OrderProgress,
+    error_of,
+    words_of,
+)
+from vla_deploy.gateways.ros.inward.words import OrderInvalid, is_mission, parsed_plan, shown
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc.payloads.tasks import TaskEvent
 
 Result: Final = ExecutePlan.Result
 News: Final = ExecutePlan.Feedback
 _BUSY: Final = "the robot is busy"
+_CANCELLED: Final = ("cancelled on request", "stopped on request")
 _STATES: Final = {
     "queued": News.PLANNING,
     "planning": News.PLANNING,
@@ -31,6 +40,7 @@ _STATES: Final = {
     "plan": News.EXECUTING,
     "action": News.EXECUTING,
     "said": News.EXECUTING,
+    "objective": News.EXECUTING,
     "setback": News.RECOVERING,
 }
 
@@ -43,7 +53,7 @@ class _Order:
 
 
 class PlanAction:
-    """Judge what is to be carried out, and hand it to the planner."""
+    """Judge what is to be carried out, words, a plan or a mission, and hand it to the planner."""
 
     kind = ExecutePlan
 
@@ -65,9 +75,10 @@ class PlanAction:
 
     def begin(self, judged: _Order, feedback: Feedback) -> "Carrying":
         """Give it to the planner."""
-        text, plan, source = judged.text, judged.plan, judged.source
+        plan, is_one = judged.plan, is_mission(judged.plan)
+        given = {"mission": plan} if is_one else {"text": judged.text, "plan": plan}
         try:
-            order = self._orders.give(text=text, plan=plan, source=source)
+            order = self._orders.give(**given, source=judged.source)
         except OrderInvalid as error:
             raise GoalRefused(Result.INVALID_PLAN, str(error)) from error
         return Carrying(order, feedback, of_plan=plan is not None)
@@ -78,25 +89,23 @@ class PlanAction:
 
 
 class Carrying:
-    """Pursue one command, and publish each action's news."""
+    """Pursue one command, and publish each action's news; of a mission those of all its parts."""
 
     def __init__(self, order: CommandOrder, feedback: Feedback, *, of_plan: bool) -> None:
         self._order = order
         self._feedback = feedback
         self._of_plan = of_plan
         self._cancelled = ""
-        self._places: dict[str, int] = {}
+        self._progress = OrderProgress()
 
     def step(self, now_ns: int) -> GoalOutcome | None:
         """Publish what is new; return the outcome once the command has ended."""
         while self._order.news:
             event = self._order.news.popleft()
-            if event["event"] == "plan":
-                actions = event["plan"]["actions"]
-                self._places = {one["id"]: place for place, one in enumerate(actions)}
+            place = self._progress.note(event)
             state = _STATES.get(event["event"])
             if state is not None:
-                self._feedback(self._message(state, event))
+                self._feedback(_message(state, event, place))
         return None if self._order.last is None else self._finish(self._order.last)
 
     def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
@@ -108,32 +117,15 @@ class Carrying:
         result = Result(error_code=Result.CANCELLED, error=reason)
         return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
-    def _message(self, state: str, event: Mapping[str, Any]) -> Any:
-        action_id = str(event.get("action_id") or "")
-        return News(
-            state=state,
-            action_id=action_id,
-            skill=str(event.get("skill") or ""),
-            status=str(event.get("status") or ""),
-            index=self._places.get(action_id, 0),
-            total=len(self._places),
-            text=str(event.get("question") or event.get("text") or event.get("error") or ""),
-            choices=[str(one) for one in event.get("choices") or ()],
-        )
-
     def _finish(self, last: TaskEvent) -> GoalOutcome:
-        why, actions = error_of(last), last["actions"] if last["event"] == "finished" else []
-        succeeded = sum(one["status"] == "succeeded" for one in actions)
-        total = len(actions)
+        why = error_of(last)
+        summary = last["summary"] if last["event"] == "finished" else summary_of(())
         result = Result(
             success=not why and not self._cancelled,
             error_code=self._code(last, why),
             error=self._cancelled or why,
-            total_actions=total,
-            successful_actions=succeeded,
-            failed_actions=total - succeeded,
-            success_rate=succeeded / total if total else 0.0,
-            results_json=json.dumps(actions),
+            **summary,
+            results_json=json.dumps(self._progress.results),
         )
         if self._cancelled:
             return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
@@ -142,7 +134,7 @@ class Carrying:
         )
 
     def _code(self, last: TaskEvent, why: str) -> int:
-        if self._cancelled or why.endswith("cancelled on request"):
+        if self._cancelled or why.endswith(_CANCELLED):
             return int(Result.CANCELLED)
         if not why:
             return int(Result.OK)
@@ -151,3 +143,16 @@ class Carrying:
                 return int(Result.BUSY)
             return int(Result.INVALID_PLAN if self._of_plan else Result.REJECTED)
         return int(Result.LOST if why.startswith("lost") else Result.ABORTED)
+
+
+def _message(state: str, event: Mapping[str, Any], place: ActionPlace) -> Any:
+    return News(
+        state=state,
+        action_id=place.action_id,
+        skill=str(event.get("skill") or ""),
+        status=str(event.get("status") or ""),
+        index=place.index,
+        total=place.total,
+        text=words_of(event),
+        choices=[str(one) for one in event.get("choices") or ()],
+    )

@@ -6,7 +6,7 @@ feedback topics, and nothing else happens by it.
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
@@ -42,7 +42,17 @@ _log = logging.getLogger(__name__)
 class _Open:
     topic: str
     order: CommandOrder
-    has_asked: bool = False
+    asking: set[str] = field(default_factory=set)
+    """Ids of the commands that wait for an answer: parts of a mission may, one by one."""
+
+    def follow(self) -> None:
+        """Take what is new."""
+        while self.order.news:
+            event = self.order.news.popleft()
+            if event["event"] == "asked":
+                self.asking.add(event["command_id"])
+            else:
+                self.asking.discard(event["command_id"])
 
 
 class CommandTopics(GatewayPart):
@@ -58,8 +68,7 @@ class CommandTopics(GatewayPart):
     def step(self, now_ns: int) -> None:
         """Follow the commands that are under way, to know which of them wait for an answer."""
         for one in list(self._open):
-            while one.order.news:
-                one.has_asked = one.order.news.popleft()["event"] == "asked"
+            one.follow()
             if one.order.last is not None:
                 self._open.remove(one)
 
@@ -70,9 +79,12 @@ class CommandTopics(GatewayPart):
                 return  # what the robot itself has heard, and is doing already
             if len(self._open) >= MOST_OPEN and not is_stop_word(found.text):
                 raise OrderInvalid(f"{MOST_OPEN} commands are under way or wait; try again later")
-            is_answer = found.plan is None and self._is_asked(topic)
             order = self._orders.give(
-                text=found.text, plan=found.plan, source=sender, is_answer=is_answer
+                text=found.text,
+                plan=found.plan,
+                mission=found.mission,
+                source=sender,
+                is_answer=bool(found.text) and self._is_asked(topic),
             )
         except OrderInvalid as error:
             _log.warning("%s from %s refused: %s", topic, sender, error)
@@ -96,7 +108,7 @@ class CommandTopics(GatewayPart):
         )
 
     def _is_asked(self, topic: str) -> bool:
-        return any(one.topic == topic and one.has_asked for one in self._open)
+        return any(one.topic == topic and one.asking for one in self._open)
 
 
 class SayTopic(GatewayPart):

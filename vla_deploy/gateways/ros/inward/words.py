@@ -1,4 +1,4 @@
-"""Read what a command topic carries: words, or JSON with words or a plan in it."""
+"""Read what a command topic carries: words, or JSON with words, a plan or a mission in it."""
 
 import json
 import unicodedata
@@ -23,10 +23,11 @@ class OrderInvalid(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandMessage:
-    """Hold what a message asks for: words, or a `plan`; `stated` is the JSON around it."""
+    """Hold what a message asks for: words, a `plan` or a `mission`; `stated` is the JSON around."""
 
     text: str = ""
     plan: Any = None
+    mission: dict[str, Any] | None = None
     stated: Mapping[str, Any] | None = None
 
 
@@ -55,6 +56,11 @@ def parsed_plan(text: str) -> dict[str, Any] | list[Any]:
     if not isinstance(plan, dict | list):
         raise OrderInvalid(f"the plan: expected an object or a list, got {type(plan).__name__}")
     return plan
+
+
+def is_mission(document: Any) -> bool:
+    """Return whether JSON is a mission: it has objectives, as no plan has."""
+    return isinstance(document, dict) and isinstance(document.get("objectives"), list | dict)
 
 
 def checked_text(data: str) -> str:
@@ -111,6 +117,8 @@ def _read_json(text: str) -> CommandMessage:
         if not found:
             raise OrderInvalid("expected a plan of one action or more, got an empty list")
         return CommandMessage(plan=found)
+    if is_mission(found):
+        return CommandMessage(mission=found, stated=found)
     if isinstance(found.get("plan"), dict):
         return CommandMessage(plan=found["plan"], stated=found)
     if any(isinstance(found.get(key), list) for key in PLAN_KEYS):
@@ -120,7 +128,8 @@ def _read_json(text: str) -> CommandMessage:
             return CommandMessage(text=checked_text(found[key]), stated=found)
     raise OrderInvalid(
         f"expected words under one of {', '.join(WORDS_KEYS)}, or a list of actions under one of "
-        f"{', '.join(PLAN_KEYS)}; got the keys {', '.join(map(repr, list(found)[:8])) or 'none'}"
+        f"{', '.join(PLAN_KEYS)}, or objectives; "
+        f"got the keys {', '.join(map(repr, list(found)[:8])) or 'none'}"
     )
 
 

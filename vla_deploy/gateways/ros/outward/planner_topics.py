@@ -1,8 +1,6 @@
 """Publish plans and what becomes of them on the topics of planning nodes, in their JSON.
 
 `PLAN_TOPICS` is the table of topics that carry a plan; each is published when a plan was accepted.
-Feedback has `status`: success, failure, timeout, error or question; `stage`: planning or execution;
-the `command`, its `command_id` and `source`.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,6 +8,7 @@ from typing import Any, Final
 
 from vla_deploy.gateways.ros.commands import CommandNews
 from vla_deploy.gateways.ros.graph import JsonTopic
+from vla_deploy.gateways.ros.outward.feedback import feedback_of
 from vla_deploy.gateways.ros.outward.plan_dialects import (
     Where,
     ranked_actions,
@@ -21,8 +20,6 @@ from vla_deploy.gateways.ros.outward.scene import Locator
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 
 CURRENT_ACTION: Final = "/cognitive_planner/current_action"
-_LATE: Final = "late"
-_UNANSWERED: Final = "lost: no answer"
 
 
 def _list(news: CommandNews, where: Where) -> Any:
@@ -94,7 +91,7 @@ class PlannerTopics(GatewayPart):
 
     def _publish_action(self, news: CommandNews) -> None:
         event = news.event
-        actions = self._gateway.commands.current.actions
+        actions = self._gateway.commands.plan_of(news.record.command_id).actions
         planned = next((one for one in actions if one["id"] == event.get("action_id")), {})
         self._action.publish(
             {
@@ -105,83 +102,3 @@ class PlannerTopics(GatewayPart):
                 "retries": event.get("retries", 0),
             }
         )
-
-
-def feedback_of(news: CommandNews) -> dict[str, Any] | None:
-    """Return what feedback an event is worth, None for most."""
-    write = _WRITERS.get(str(news.event.get("event")))
-    if write is None:
-        return None
-    record = news.record
-    goal = str(record.plan.get("goal", "")) if isinstance(record.plan, dict) else ""
-    head = {
-        "command": record.text or goal,
-        "command_id": record.command_id,
-        "source": record.source,
-    }
-    return {**write(news), **head}
-
-
-def _planned(news: CommandNews) -> dict[str, Any]:
-    return {
-        "status": "success",
-        "stage": "planning",
-        "actions_planned": len(news.event["plan"]["actions"]),
-        "processing_time": _took_s(news),
-        "planned_by": str(news.event.get("rung", "")),
-    }
-
-
-def _took_s(news: CommandNews) -> float:
-    return float(round(max(news.event["at_s"] - news.record.given_s, 0.0), 3))
-
-
-def _asked(news: CommandNews) -> dict[str, Any]:
-    return {
-        "status": "question",
-        "stage": "planning",
-        "question": str(news.event.get("question", "")),
-        "choices": list(news.event.get("choices") or ()),
-        "answer_within_s": news.event.get("answer_within_s"),
-    }
-
-
-def _rejected(news: CommandNews) -> dict[str, Any]:
-    attempts = list(news.event.get("attempts") or ())
-    late = bool(attempts) and attempts[-1].get("outcome") == _LATE
-    return {
-        "status": "timeout" if late else "failure",
-        "stage": "planning",
-        "error": str(news.event.get("reason") or "rejected"),
-        "processing_time": _took_s(news),
-    }
-
-
-def _finished(news: CommandNews) -> dict[str, Any]:
-    actions = news.event.get("actions") or ()
-    error = str(news.event.get("error") or "")
-    status = "success" if news.event.get("success") else "failure"
-    if error.startswith(_UNANSWERED):
-        status = "timeout"
-    elif error.startswith("lost"):
-        status = "error"
-    succeeded = sum(one["status"] == "succeeded" for one in actions)
-    return {
-        "status": status,
-        "stage": "execution",
-        **({"error": error} if error else {}),
-        "summary": {
-            "total_actions": len(actions),
-            "successful_actions": succeeded,
-            "failed_actions": len(actions) - succeeded,
-            "success_rate": succeeded / len(actions) if actions else 0.0,
-        },
-    }
-
-
-_WRITERS: Final[Mapping[str, Callable[[CommandNews], dict[str, Any]]]] = {
-    "plan": _planned,
-    "asked": _asked,
-    "rejected": _rejected,
-    "finished": _finished,
-}

@@ -1,4 +1,4 @@
-"""Run the tests of the page's stop logic, which are in its own language."""
+"""Run the tests of the page's pure functions, which are in its own language."""
 
 import os
 import shutil
@@ -8,15 +8,17 @@ from pathlib import Path
 
 import pytest
 
+HERE = Path(__file__).parent
 
-def test_the_pages_stop_logic_holds() -> None:
+
+@pytest.mark.parametrize("name", sorted(path.name for path in HERE.glob("*.test.mjs")))
+def test_the_pages_logic_holds(name: str) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("needs node; the tests in a browser hold the same where it is missing")
-    logic = files("vla_deploy.dashboard") / "static" / "stop_logic.js"
     done = subprocess.run(
-        [node, "--test", str(Path(__file__).with_name("stop_logic.test.mjs"))],
-        env={**os.environ, "STOP_LOGIC": str(logic)},
+        [node, "--test", str(HERE / name)],
+        env={**os.environ, "PAGE": str(files("vla_deploy.dashboard") / "static")},
         capture_output=True,
         text=True,
         timeout=50,
