@@ -8,8 +8,8 @@ from pydantic import BaseModel, Field
 
 from vla_deploy.missions.mission import Mission, Objective, Subtask
 
-MOST_SPANS: Final = 400
-"""Of one mission: what its actions did when, for the time line."""
+MOST_SPANS: Final = 120
+"""Of one mission: what its actions did when, for the time line; the newest are kept."""
 MOST_TRIES: Final = 2
 """A subtask that an executor or a planner took with it when it ended is tried once more."""
 
@@ -196,6 +196,9 @@ class MissionRun(BaseModel):
         for name in (*self.subtasks, *self.objectives):
             self._cancel(name, why, now_s)
         self.state, self.error, self.due_unix_s = MissionState.CANCELLED, why, None
+        for span in self.spans:
+            if span.end_s is None:
+                span.end_s, span.status = now_s, "cancelled"
 
     def settle(self) -> bool:
         """End the mission where all its objectives have; return whether it has ended now."""

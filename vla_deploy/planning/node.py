@@ -191,7 +191,7 @@ class PlannerNode:
     def _hear(self, event: Event[Utterance]) -> None:
         self._manager.metrics.heard += 1
         if self._stops_all(event):
-            self._missions.stop("stopped on request")
+            self._missions.stop("cancelled on request")
             self._manager.stop_all(command_id_of(event))
             return
         try:

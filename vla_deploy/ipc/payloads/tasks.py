@@ -343,8 +343,10 @@ class PlannerStatus(PlannerCounts, BackEndsStatus):
 class MissionsDocument(TypedDict):
     """Hold the newest missions, the newest first, as `vla_deploy/missions/progress.py` has them.
 
-    `trouble` says why missions are not kept over a restart, "" where they are.
+    Those that have not ended come first, as far as there is room. `now_unix_s` is when that was
+    so, `trouble` says why missions are not kept over a restart, "" where they are.
     """
 
     missions: list[dict[str, Any]]
+    now_unix_s: float
     trouble: str

@@ -1,5 +1,6 @@
 """Carry missions out: give their subtasks to be planned, check criteria, begin at their times."""
 
+import json
 import logging
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -34,6 +35,8 @@ CHECK_WAIT_S: Final = 4.0
 MOST_OPEN: Final = 10
 """Missions that have not ended."""
 MOST_SHOWN: Final = 8
+MOST_SHOWN_BYTES: Final = 250_000
+MOST_TOLD_CHARACTERS: Final = 2000
 _PERIOD_NS: Final = NS_PER_S // 5
 _LOST: Final = "lost"
 _REPORTS: Final = re.compile(
@@ -169,6 +172,7 @@ class MissionManager:
             return
         if event["event"] == "action":
             _note_span(run, name, event, stamp_s)
+            self._is_changed = True
         elif event["event"] == "said":
             said: SaidEvent = {"command_id": run.mission_id, "event": "said", "text": event["text"]}
             self._publisher.publish(said)
@@ -181,8 +185,10 @@ class MissionManager:
             self._ended(run, name, error, is_lost=error.startswith(_LOST))
 
     def _ended(self, run: MissionRun, name: str, error: str, *, is_lost: bool = False) -> None:
+        states = {one: part.state for one, part in run.objectives.items()}
         run.end(name, self._wall_s(), error, is_lost=is_lost)
         self._tell_part(run, name)
+        self._tell_others(run, states, name)
         self._is_changed = True
 
     # --- what goes on ---------------------------------------------------------------------------
@@ -276,8 +282,10 @@ class MissionManager:
             is_over = now_s - part.checked_since_s >= CHECK_WAIT_S
             if (unmet or unknown) and not is_over:
                 continue
+            states = {one: run_of.state for one, run_of in run.objectives.items()}
             run.conclude(name, now_s, "; ".join(unmet), "; ".join(unknown))
             self._tell_part(run, name)
+            self._tell_others(run, states, name)
             self._is_changed = True
 
     # --- what is told ---------------------------------------------------------------------------
@@ -291,10 +299,7 @@ class MissionManager:
     def _tell_part(self, run: MissionRun, name: str) -> None:
         """Publish how a part stands; of an objective with one subtask the objective alone."""
         part = run.subtasks.get(name) or run.objectives[name]
-        objective = name.partition(".")[0]
-        is_only = name != objective and sum(
-            one.startswith(f"{objective}.") for one in run.subtasks
-        ) == 1  # fmt: skip
+        objective, is_only = name.partition(".")[0], _is_only(run, name)
         if part.state is PartState.CHECKING or (is_only and part.state is PartState.COMPLETED):
             return
         name = objective if is_only else name
@@ -305,10 +310,17 @@ class MissionManager:
                 "part": name,
                 "words": _words_of(run, name),
                 "state": part.state.value,
-                "error": part.error or None,
-                "note": part.note or None,
+                "error": _bounded(part.error) or None,
+                "note": _bounded(part.note) or None,
             }
         )
+
+    def _tell_others(self, run: MissionRun, states: Mapping[str, PartState], told: str) -> None:
+        """Publish which objectives ended with a part, because they depend on it or have it."""
+        for name, part in run.objectives.items():
+            is_told = name == told or (_is_only(run, told) and told.startswith(f"{name}."))
+            if part.state is not states[name] and part.state.is_final and not is_told:
+                self._tell_part(run, name)
 
     def _say(self, run: MissionRun, text: str) -> None:
         command = UserCommand(command_id=run.mission_id, told_ns=0, source=run.source)
@@ -325,7 +337,7 @@ class MissionManager:
                 "command_id": run.mission_id,
                 "event": "finished",
                 "success": is_success,
-                "error": None if is_success else run.error or run.report(),
+                "error": None if is_success else _bounded(run.error or run.report()),
                 "summary": summary_of(self._outcomes.pop(run.mission_id, ())),
                 "actions": [],
             }
@@ -344,9 +356,20 @@ class MissionManager:
             if not self._trouble:
                 _log.warning("%s", error)
             self._trouble = str(error)
-        shown = list(self._runs.values())[-MOST_SHOWN:]
-        missions = [one.model_dump(mode="json") for one in reversed(shown)]
-        self._shown.put_document({"missions": missions, "trouble": self._trouble})
+        missions, room = [], MOST_SHOWN_BYTES
+        for one in self._newest_first():
+            document = one.model_dump(mode="json")
+            room -= len(json.dumps(document))
+            missions += [document] if room >= 0 else []
+        self._shown.put_document(
+            {"missions": missions, "now_unix_s": self._wall_s(), "trouble": self._trouble}
+        )
+
+    def _newest_first(self) -> list[MissionRun]:
+        """Return all that have not ended, then the newest of the others."""
+        runs = list(reversed(self._runs.values()))
+        is_open = [one for one in runs if not one.state.is_final]
+        return [*is_open, *[one for one in runs if one.state.is_final][:MOST_SHOWN]]
 
     def _load(self) -> None:
         """Take up what another planner of this run left; what another run left does not move."""
@@ -382,6 +405,17 @@ def _command_id(run: MissionRun, name: str) -> str:
     """Return the id of a subtask's command: another one for each try."""
     tries = run.subtasks[name].tries
     return f"{run.mission_id}/{name}" + (f"+{tries}" if tries > 1 else "")
+
+
+def _bounded(text: str) -> str:
+    return text if len(text) <= MOST_TOLD_CHARACTERS else f"{text[:MOST_TOLD_CHARACTERS]} ..."
+
+
+def _is_only(run: MissionRun, name: str) -> bool:
+    """Return whether a subtask is the only one of its objective."""
+    objective = name.partition(".")[0]
+    beside = [one for one in run.subtasks if one.startswith(f"{objective}.")]
+    return name != objective and len(beside) == 1
 
 
 def _words_of(run: MissionRun, name: str) -> str:
@@ -429,7 +463,7 @@ def _note_span(run: MissionRun, name: str, event: Mapping[str, Any], stamp_s: fl
         ),
         None,
     )
-    if open_one is None and event["status"] == "active" and len(run.spans) < MOST_SPANS:
+    if open_one is None and event["status"] == "active":
         parameters = dict(event["parameters"])
         action = Action(id="a", skill=event["skill"], parameters=parameters)
         run.spans.append(
@@ -441,5 +475,6 @@ def _note_span(run: MissionRun, name: str, event: Mapping[str, Any], stamp_s: fl
                 begin_s=stamp_s,
             )
         )
+        del run.spans[:-MOST_SPANS]
     elif open_one is not None and event["status"] != "active":
         open_one.end_s, open_one.status = stamp_s, event["status"]

@@ -164,7 +164,7 @@ def test_a_stop_ends_what_is_carried_out_and_not_what_waits_for_its_time(flat) -
     give(flat, "go to the kitchen", "look left")
     told = flat.desk.answers_to("stop")
     assert ("c2", "finished") in events(told)
-    assert [one["state"] for one in flat.desk.missions()] == ["cancelled", "planning"]
+    assert [one["state"] for one in flat.desk.missions()] == ["planning", "cancelled"]
     assert flat.pass_s(2.0) == []
 
 
@@ -254,3 +254,23 @@ def test_words_that_were_heard_badly_are_no_mission_and_those_heard_well_keep_th
     flat.desk.give(text="look left; look right", source="voice", heard={"confidence": 0.9})
     flat.pass_s()
     assert flat.desk.missions()[0]["heard_confidence"] == 0.9
+
+
+def test_the_largest_missions_are_shown_as_far_as_there_is_room(flat) -> None:
+    words = "look left and " * 60
+    for _ in range(10):
+        give(flat, *[{"subtasks": [words] * 3} for _ in range(12)])
+    shown = flat.desk.missions()
+    assert shown[0]["mission_id"] == "c10"
+    assert 2 <= len(shown) < 10
+    assert len(json.dumps(shown)) < 262_144
+
+
+def test_what_an_objective_takes_with_it_is_told(flat) -> None:
+    give(flat, {"id": "a", "subtasks": ["bring me the unicorn", "look left"]},
+         {"id": "b", "words": "look left", "depends_on": ["a"]})  # fmt: skip
+    told = flat.desk.missions()[0]
+    assert {name: one["state"] for name, one in told["objectives"].items()} == {
+        "a": "failed",
+        "b": "cancelled",
+    }
