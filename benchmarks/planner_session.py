@@ -153,8 +153,9 @@ class PlannerSession:
         """Publish what the executor would: each action, and the end."""
         status = "aborted" if error else "succeeded"
         ended = [
-            {"id": one["id"], "skill": one["skill"], "status": status, "execution_time_s": 1.0,
-             "error": error}
+            {"id": one["id"], "skill": one["skill"], "parameters": one["parameters"],
+             "status": status, "execution_time_s": 1.0, "error": error or None, "retries": 0,
+             "note": None, "data": {}}
             for one in plan["actions"]
         ]  # fmt: skip
         for one in ended:
