@@ -123,6 +123,8 @@ class PlanExecution:
         now_ns = self._context.link.clock.now_ns()
         self._end_left()
         if self._context.link.is_paused and not self._only_speaks:
+            if refusal := refusal_of(self._context.link.control_status):
+                self.cancel(refusal)  # a stop ends what is paused, too
             return
         self._start_ready(now_ns)
         for name, branch in list(self._branches.items()):

@@ -330,6 +330,17 @@ def test_in_a_pause_nothing_goes_on_and_its_time_does_not_count(stage: Stage):
     assert execution.records[0].execution_time_s == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_stop_ends_what_is_paused(stage: Stage):
+    execution = stage.plan(a_turn=(), b_look_at=("a_turn",))
+    stage.step(execution)
+    stage.context.link.pause()
+    status = {"state": "stopped", "estop_latched": True, "cause": "estop", "detail": ""}
+    stage.space.cell_writer("control_status").put_document(status)
+    execution.step()
+    assert statuses(execution) == {"a": "cancelled", "b": "cancelled"}
+    assert "reset and arm" in execution.records[0].error
+
+
 def test_a_paused_robot_still_answers(stage: Stage):
     execution = stage.plan(a_speak=())
     stage.context.link.pause()
