@@ -10,7 +10,9 @@ import contextlib
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -124,19 +126,37 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     """Do `options.count` injections, 200 unless told otherwise."""
     count = INJECTIONS if options.count is None else options.count
     drawn = injections(count, options.seed)
-    return inject_all(chosen(drawn, options.only, lambda each: each.name), options.seed, tell)
+    drawn = chosen(drawn, options.only, lambda each: each.name)
+    return inject_all(drawn, options.seed, tell, options.workers)
 
 
 def inject_all(
-    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]
+    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None], workers: int = 1
 ) -> CampaignReport:
-    """Do injections one after the other on one machine."""
+    """Do injections on so many machines at a time, on each one after the other."""
+    shares = [drawn[first::workers] for first in range(min(workers, len(drawn)))]
+    is_over = Event()
+    with ThreadPoolExecutor(max(1, len(shares))) as pool:
+        done = pool.map(lambda share: _inject_on_one_machine(share, seed, tell, is_over), shares)
+        try:
+            cases = [case for share in done for case in share]
+        finally:
+            is_over.set()  # who asks for an end waits for the injections that are under way
+    return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+
+
+def _inject_on_one_machine(
+    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None], is_over: Event
+) -> list[CampaignCase]:
     with (
         tempfile.TemporaryDirectory(prefix="vla-kill-") as folder,
         contextlib.closing(KillCampaign(Path(folder), seed)) as campaign,
     ):
-        cases = [told(_injected(campaign, injection), tell) for injection in drawn]
-    return CampaignReport(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+        return [
+            told(_injected(campaign, injection), tell)
+            for injection in drawn
+            if not is_over.is_set()
+        ]
 
 
 def _injected(campaign: KillCampaign, injection: Injection) -> CampaignCase:
