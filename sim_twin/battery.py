@@ -83,6 +83,12 @@ class TwinBattery:
         self._files = PowerSupplyFiles(root, self.settings.supply or _DEFAULT_SUPPLY)
         self._files_due_ns = 0
 
+    def withdraw(self) -> None:
+        """Take the gauge's files away, at the twin's end."""
+        if self._files is not None:
+            self._files.remove()
+            self._files = None
+
     def step(self, now_ns: int) -> None:
         """Let the power of the last moment have acted."""
         before_ns = now_ns if self._stepped_ns is None else self._stepped_ns
@@ -135,7 +141,8 @@ class PowerSupplyFiles:
     """Show a pack as the kernel shows a gauge."""
 
     def __init__(self, root: Path, name: str) -> None:
-        self.folder = root / "sys/class/power_supply" / name
+        self._root = root / "sys"
+        self.folder = self._root / "class/power_supply" / name
 
     def write(self, pack: TwinBattery) -> None:
         """Write what the gauge measures; its percentage is whole, as the kernel's is."""
@@ -149,6 +156,10 @@ class PowerSupplyFiles:
                     self._put(name, "?")
             case GaugeFault.STUCK:
                 return
+
+    def remove(self) -> None:
+        """Take the whole tree away."""
+        shutil.rmtree(self._root, ignore_errors=True)
 
     def _write(self, pack: TwinBattery) -> None:
         self._put("type", "Battery")

@@ -144,6 +144,8 @@ class TwinProcess:
         self._referee.close()
         self._hub.close()
         self._twin.leave_home()
+        if self._twin.battery is not None:
+            self._twin.battery.withdraw()
         for line in self._lines.values():
             line.close()
         for stream in self._streams.values():

@@ -217,8 +217,10 @@ class Twin:
             self._hazards.step(now_ns)
 
     def close(self) -> None:
-        """Release OpenGL where the camera was used, and end the home's broker."""
+        """Release OpenGL where the camera was used, end the home's broker, withdraw the gauge."""
         self.leave_home()
+        if self.battery is not None:
+            self.battery.withdraw()
         if self._camera is not None:
             self._camera.close()
 

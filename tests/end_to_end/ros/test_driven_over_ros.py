@@ -28,9 +28,10 @@ def client(robot: ProcessStack, ros_graph: Any) -> Callable[[str], Any]:
 
 
 def segments_of(pid: int) -> set[Path]:
-    """Return the shared memory that Fast DDS keeps for a process."""
-    mapped = (line.split()[-1] for line in Path(f"/proc/{pid}/maps").read_text().splitlines())
-    return {Path(one) for one in mapped if re.fullmatch(r"/dev/shm/fastrtps_[0-9a-f]{16}", one)}
+    """Return the shared memory that a process itself made for Fast DDS: its locks are open."""
+    opened = {str(one.readlink()) for one in Path(f"/proc/{pid}/fd").iterdir() if one.is_symlink()}
+    own = (re.fullmatch(r"(/dev/shm/fastrtps_[0-9a-f]{16})_el", one) for one in opened)
+    return {Path(one[1]) for one in own if one}
 
 
 def age_s(file: Path) -> float:
