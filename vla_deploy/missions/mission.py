@@ -57,7 +57,7 @@ class Subtask(_Part):
     words: str = Field(default="", max_length=MOST_CHARACTERS)
     actions: tuple[Action, ...] = ()
     resources: tuple[str, ...] = ()
-    estimated_duration_s: float = Field(default=0.0, ge=0.0)
+    estimated_duration_s: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
 
 
 class Objective(_Part):

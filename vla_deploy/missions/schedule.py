@@ -41,7 +41,7 @@ class MissionSchedule(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    at_unix_s: float | None = None
+    at_unix_s: float | None = Field(default=None, allow_inf_nan=False)
     every_s: float | None = Field(default=None, ge=SHORTEST_PERIOD_S, le=LONGEST_WAIT_S)
     times: int | None = Field(default=None, ge=1, le=1000)
     when: str = ""

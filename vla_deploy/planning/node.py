@@ -1,6 +1,6 @@
 """Run the planner: commands in words or plans in any dialect in, validated plans out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Final
@@ -10,7 +10,6 @@ from platforms import Profile
 from vla_deploy.client.action_status import summary_of
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
 from vla_deploy.ipc.payloads.tasks import (
-    MissionAct,
     PlanMessage,
     PlannerStatus,
     TaskEvent,
@@ -222,8 +221,8 @@ class PlannerNode:
         if self._manager.dialogue.pending is not None or not self._missions.takes(command):
             self._manager.take(command)
 
-    def _act_on_mission(self, command_id: str, act: MissionAct) -> None:
-        mission_id = str(act["cancel"])
+    def _act_on_mission(self, command_id: str, act: object) -> None:
+        mission_id = str(act.get("cancel", "")) if isinstance(act, Mapping) else ""
         error = None
         if not self._missions.cancel(mission_id, "cancelled on request"):
             error = f'no mission "{mission_id}" that has not ended; see: vla-deploy mission list'

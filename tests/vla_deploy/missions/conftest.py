@@ -18,7 +18,7 @@ def butler() -> Any:
     return load_robot("butler")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def world(butler: Any) -> World:
     return world_of(butler, {"left": None, "right": None})
 

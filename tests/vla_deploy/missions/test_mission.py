@@ -4,6 +4,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vla_deploy.missions.errors import MissionInvalid
 from vla_deploy.missions.mission import check_mission, mission_from_words, read_mission
@@ -82,3 +84,24 @@ def task(**changes: Any) -> dict[str, Any]:
 def test_what_is_wrong_is_named(butler, world, document, why) -> None:
     with pytest.raises(MissionInvalid, match=why):
         check_mission(read_mission(document), world, list(body_of(butler)), NOW.timestamp())
+
+
+KEYS = st.sampled_from(
+    ["objectives", "tasks", "goal", "schedule", "words", "subtasks", "actions", "depends_on", "id",
+     "priority", "success_criteria", "required_resources", "at_unix_s", "every_s", "when", "skill",
+     "parameters", "x"]
+)  # fmt: skip
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=12),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=5),
+    max_leaves=30,
+)
+
+
+@settings(max_examples=300)
+@given(document=ANYTHING | st.fixed_dictionaries({"objectives": st.lists(ANYTHING, max_size=4)}))
+def test_whatever_a_document_holds_it_is_a_mission_or_refused(butler, world, document) -> None:
+    try:
+        check_mission(read_mission(document), world, list(body_of(butler)), NOW.timestamp())
+    except MissionInvalid as error:
+        assert str(error).count("\n") == 0

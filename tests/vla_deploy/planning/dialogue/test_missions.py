@@ -274,3 +274,9 @@ def test_what_an_objective_takes_with_it_is_told(flat) -> None:
         "a": "failed",
         "b": "cancelled",
     }
+
+
+@pytest.mark.parametrize("act", [None, 7, "c1", [], {}, {"cancel": None}, {"cancel": {"a": 1}}])
+def test_an_act_of_any_form_has_a_clear_outcome(flat, act) -> None:
+    (told,) = flat.desk.answers_to(mission_act=act)
+    assert (told["event"], told["success"]) == ("finished", False)
