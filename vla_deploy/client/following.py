@@ -6,7 +6,13 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import UNFINISHED, ActionStatus, summary_of
 from vla_deploy.ipc import Sample
-from vla_deploy.ipc.payloads.tasks import ActionResult, ExecutorStatus, PlannerStatus, TaskEvent
+from vla_deploy.ipc.payloads.tasks import (
+    ActionResult,
+    ExecutorStatus,
+    FinishedEvent,
+    PlannerStatus,
+    TaskEvent,
+)
 
 ANSWER_TIMEOUT_S: Final = 5.0
 SILENCE_LIMIT_S: Final = 5.0
@@ -14,6 +20,8 @@ LAST_EVENTS: Final = frozenset({"finished", "rejected"})
 
 PlannerLook = Callable[[], Sample[PlannerStatus] | None]
 ExecutorLook = Callable[[], Sample[ExecutorStatus] | None]
+_LOST: Final = "lost: "
+_GIVE_AGAIN: Final = "; look where the robot is, then give the command again"
 
 
 class Following:
@@ -126,10 +134,19 @@ def lost(command_id: str, why: str, actions: Mapping[str, ActionResult]) -> Task
         "command_id": command_id,
         "event": "finished",
         "success": False,
-        "error": f"lost: {why}; look where the robot is, then give the command again",
+        "error": f"{_LOST}{why}{_GIVE_AGAIN}",
         "summary": summary_of(one["status"] for one in told),
         "actions": told,
     }
+
+
+def is_lost(event: FinishedEvent) -> bool:
+    """Return whether the end of a command is the word of `lost`, and not of an action of it."""
+    return (
+        not event["success"]
+        and (event["error"] or "").startswith(_LOST)
+        and ((event["error"] or "").endswith(_GIVE_AGAIN))
+    )
 
 
 def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:

@@ -87,6 +87,13 @@ def mission_from_words(text: str, now: datetime) -> Mission | None:
     Raises:
         MissionInvalid: the time is none, or the condition cannot be checked.
     """
+    try:
+        return _of_words(text, now)
+    except ValidationError as error:
+        raise MissionInvalid(_faults_of(error)) from error
+
+
+def _of_words(text: str, now: datetime) -> Mission | None:
     rest, schedule = split_schedule(text, now)
     parts = [one.strip(" .") for one in _SEPARATOR.split(rest) if one.strip(" .")]
     if len(parts) < 2 and schedule.is_at_once:
@@ -133,8 +140,11 @@ def read_mission(document: Any) -> Mission:
     try:
         return Mission.model_validate(canonical)
     except ValidationError as error:
-        faults = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
-        raise MissionInvalid(faults) from error
+        raise MissionInvalid(_faults_of(error)) from error
+
+
+def _faults_of(error: ValidationError) -> list[str]:
+    return [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
 
 
 def _objective(given: Any, number: int) -> Json:

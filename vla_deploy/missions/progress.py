@@ -59,7 +59,10 @@ class ActionSpan(BaseModel):
 
 
 class PartRun(BaseModel):
-    """Hold how far a subtask or an objective is; times are Unix seconds."""
+    """Hold how far a subtask or an objective is; times are Unix seconds.
+
+    `given_ns`, by the clock of the run, is when its command was given.
+    """
 
     state: PartState = PartState.PENDING
     tries: int = 0
@@ -67,7 +70,7 @@ class PartRun(BaseModel):
     note: str = ""
     begin_s: float | None = None
     end_s: float | None = None
-    checked_since_s: float | None = None
+    given_ns: int = 0
 
 
 class MissionRun(BaseModel):
@@ -139,7 +142,7 @@ class MissionRun(BaseModel):
         if error:
             self._fail(name, error, now_s)
         else:
-            run.state, run.checked_since_s = PartState.CHECKING, now_s
+            run.state = PartState.CHECKING
 
     def checking(self) -> list[tuple[str, PartRun, Sequence[str]]]:
         """Return the subtasks, then the objectives, whose criteria are to be judged."""

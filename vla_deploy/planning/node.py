@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile
-from vla_deploy.client.action_status import summary_of
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
 from vla_deploy.ipc.payloads.tasks import (
     PlanMessage,
@@ -130,6 +130,8 @@ class PlannerNode:
             self._mission_store,
             run_id=self._run_dir.name,
         )
+        self._manager.ends_missions = partial(self._missions.stop, "cancelled on request")
+        self._manager.has_missions = lambda: bool(self._missions.under_way)
         self._missions.take_up(told)
         for command_id in before.in_work:
             self._refuse(command_id, AWAY)
@@ -190,7 +192,6 @@ class PlannerNode:
     def _hear(self, event: Event[Utterance]) -> None:
         self._manager.metrics.heard += 1
         if self._stops_all(event):
-            self._missions.stop("cancelled on request")
             self._manager.stop_all(command_id_of(event))
             return
         try:
@@ -223,19 +224,10 @@ class PlannerNode:
 
     def _act_on_mission(self, command_id: str, act: object) -> None:
         mission_id = str(act.get("cancel", "")) if isinstance(act, Mapping) else ""
-        error = None
+        error = ""
         if not self._missions.cancel(mission_id, "cancelled on request"):
             error = f'no mission "{mission_id}" that has not ended; see: vla-deploy mission list'
-        self._publisher.publish(
-            {
-                "command_id": command_id,
-                "event": "finished",
-                "success": error is None,
-                "error": error,
-                "summary": summary_of(()),
-                "actions": [],
-            }
-        )
+        self._publisher.done(command_id, error)
 
     def _refuse(self, command_id: str, reason: str) -> None:
         self._publisher.refused(UserCommand(command_id=command_id, told_ns=0), reason)

@@ -122,14 +122,16 @@ class PlanExecution:
         """Start what may start, and advance every action under way; in a pause it only speaks."""
         now_ns = self._context.link.clock.now_ns()
         self._end_left()
-        if self._context.link.is_paused and not self._only_speaks:
-            if refusal := refusal_of(self._context.link.control_status):
-                self.cancel(refusal)  # a stop ends what is paused, too
-            return
-        self._start_ready(now_ns)
+        is_paused = self._context.link.is_paused and not self._only_speaks
+        refusal = refusal_of(self._context.link.control_status)
+        if not is_paused:
+            self._start_ready(now_ns)
+        if refusal and (is_paused or not self._branches):
+            self.cancel(refusal)  # a stop ends what is paused, and what waits for its turn, too
         for name, branch in list(self._branches.items()):
             is_open = branch.record.status not in FINAL and name not in self._leaving
-            if is_open and now_ns >= branch.resume_ns:
+            is_due = refusal or now_ns >= branch.resume_ns
+            if is_open and is_due and not is_paused:
                 self._step_branch(branch, now_ns)
 
     def cancel(self, reason: str) -> None:

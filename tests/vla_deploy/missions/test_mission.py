@@ -32,6 +32,19 @@ def test_words_become_objectives_in_their_order(said, expected) -> None:
     assert told == expected
 
 
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (";".join(["go"] * 51), "at most 50 items"),
+        (f"go home in {'9' * 309} seconds", "at_unix_s"),
+        (f"{'a' * 1001}; go", "at most 1000 characters"),
+    ],
+)
+def test_words_that_make_no_mission_are_refused(said, why) -> None:
+    with pytest.raises(MissionInvalid, match=why):
+        mission_from_words(said, NOW)
+
+
 TASK = {
     "id": "grasp_cup_2", "name": "Grasp cup", "description": "pick up the cup", "priority": 2,
     "dependencies": [], "type": "manipulation", "estimated_duration": 10.0,

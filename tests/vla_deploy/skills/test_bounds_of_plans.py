@@ -22,6 +22,7 @@ class StandingBase:
 
     def __init__(self, executor: "Executor") -> None:
         self.executor, self.clock = executor, executor.clock
+        self.control_state = "armed"
         space = self.executor.space
         self._pose = space.cell_writer("pose")
         self._control = space.cell_writer("control_status")
@@ -36,8 +37,8 @@ class StandingBase:
                 x_m=1.0, y_m=2.0, yaw_rad=0.0, match_ratio=1.0, covariance=np.zeros(9),
                 state=PlaceState.TRACKING, doubt=0,
             )  # fmt: skip
-            status = {"state": "armed", "estop_latched": False, "cause": "", "detail": "",
-                      "blocked": []}  # fmt: skip
+            status = {"state": self.control_state, "estop_latched": False, "cause": "",
+                      "detail": "", "blocked": []}  # fmt: skip
             self._control.put_document(status)
             self._planner.put_document({})
             self.executor.node.step()
@@ -82,3 +83,13 @@ def test_another_plan_is_waited_for_as_long_as_the_planner_may_take(held) -> Non
     finished, after_s = robot.until("finished")
     assert "the planner has no other plan in time" in finished["error"]
     assert after_s == pytest.approx(42.0, abs=0.3)
+
+
+def test_a_stop_ends_what_waits_for_another_plan(held) -> None:
+    robot = held(plan_within_s=40.0, action_timeout_s=1.0)
+    robot.executor.give(MOVE)
+    robot.until("setback")
+    robot.control_state = "stopped"
+    finished, after_s = robot.until("finished")
+    assert "reset and arm" in finished["error"]
+    assert after_s < 0.3

@@ -341,6 +341,22 @@ def test_a_stop_ends_what_is_paused(stage: Stage):
     assert "reset and arm" in execution.records[0].error
 
 
+def test_a_stop_ends_what_only_waits_to_be_tried_again_or_for_a_part_of_the_robot(stage: Stage):
+    stage.context.claims.ask("somebody", {"left_arm": 1})
+    waiting = stage.plan(command_id="c2", a_open_gripper__left=())
+    backing_off = stage.plan(a_find_object=())
+    stage.step(backing_off)
+    stage.step(waiting)
+    stage.ends["a_find_object"] = TryAgain("not seen")
+    stage.step(backing_off)
+    status = {"state": "stopped", "estop_latched": True, "cause": "estop", "detail": ""}
+    stage.space.cell_writer("control_status").put_document(status)
+    for execution in (backing_off, waiting):
+        execution.step()
+        assert execution.finished
+        assert "reset and arm" in execution.records[0].error
+
+
 def test_a_paused_robot_still_answers(stage: Stage):
     execution = stage.plan(a_speak=())
     stage.context.link.pause()

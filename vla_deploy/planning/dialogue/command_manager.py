@@ -74,6 +74,10 @@ class CommandManager:
         self._turns = Turns(self._active, situation, events)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
+        self.is_paused = False
+        """Whether a person has paused the robot, until they let it go on or stop it."""
+        self.ends_missions: Callable[[], None] = lambda: None
+        self.has_missions: Callable[[], bool] = lambda: False
         self.dialogue = Dialogue(self._accept, situation, events, self._active, clock)
         self.metrics = self.dialogue.metrics
 
@@ -85,9 +89,15 @@ class CommandManager:
 
     def pause(self, command: UserCommand, *, pause: bool) -> None:
         """Have all that is carried out come to rest, or go on."""
-        self._events.paused(command.command_id, pause=pause)
+        is_for_something = self._is_at_something
+        self.is_paused = pause and is_for_something
+        if self._is_moving:
+            self._events.paused(command.command_id, pause=pause)
+        else:
+            error = "" if is_for_something else "nothing is under way"
+            self._events.done(command.command_id, error)
         says = Says.PAUSED if pause else Says.GOES_ON
-        self._events.say(command, says if self._is_moving else Says.NOTHING_GOES_ON)
+        self._events.say(command, says if is_for_something else Says.NOTHING_GOES_ON)
 
     def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
@@ -105,9 +115,9 @@ class CommandManager:
 
     def _takes_as_pause(self, command: UserCommand) -> bool:
         """Take "hold on" and "go on" while something is carried out."""
-        if self._is_moving and pauses(command.text):
+        if self._is_at_something and pauses(command.text):
             self.pause(command, pause=True)
-        elif resumes(command.text) and self._situation.is_paused:
+        elif resumes(command.text) and (self.is_paused or self._situation.is_paused):
             self.pause(command, pause=False)
         else:
             return False
@@ -128,7 +138,8 @@ class CommandManager:
             if is_all:
                 self._events.say(command, Says.LEFT)
                 return
-        if len(self._queue) + len(self._turns.waiting) >= MOST_WAITING:
+        waiting = (*self._queue, *(one.command for one in self._turns.waiting))
+        if sum(not one.mission for one in waiting) >= MOST_WAITING:
             self.dialogue.refuse(command, Says.MANY_WAIT)
             return
         self._queue.append(corrected or command)
@@ -144,6 +155,24 @@ class CommandManager:
     def _is_moving(self) -> bool:
         """Return whether a plan is carried out, be it one of a planner that has ended since."""
         return bool(self._active) or self._situation.is_executing
+
+    @property
+    def in_work(self) -> frozenset[str]:
+        """Return the commands that are planned, asked about, carried out, or wait."""
+        open_ones = (self.dialogue.pending, self.dialogue.held)
+        commands = [
+            self._async.command,
+            *(one.command for one in open_ones if one is not None),
+            *self._queue,
+            *(one.command for one in self._turns.waiting),
+        ]
+        return frozenset(self._active.plans) | {
+            one.command_id for one in commands if one is not None
+        }
+
+    @property
+    def _is_at_something(self) -> bool:
+        return self._goes_on or self.has_missions()
 
     @property
     def is_at_work(self) -> bool:
@@ -164,6 +193,7 @@ class CommandManager:
 
     def stop_all(self, command_id: str) -> None:
         """Drop every command, and let the executor end what it does."""
+        self.is_paused = False
         self._cancel_all(command_id)
         open_ones = (self.dialogue.settle(), self.dialogue.take_held())
         asked = [one.command for one in open_ones if one is not None]
@@ -187,13 +217,21 @@ class CommandManager:
             self.dialogue.settle()
         if self._async.command is not None and self._async.command.command_id == command_id:
             self._async.call_off()
-        self._queue = deque(one for one in self._queue if one.command_id != command_id)
+        self._unqueue(command_id)
         self._turns.drop(command_id)
-        if self._active.end(command_id) is not None:
+        is_known = self._active.end(command_id) is not None
+        if is_known or command_id in (self._situation.executing or ()):
             self._events.cancelled(f"{command_id}-cancel", command_id)
 
+    def _unqueue(self, command_id: str) -> None:
+        for one in [one for one in self._queue if one.command_id == command_id]:
+            self._queue.remove(one)
+
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
-        """Note how the executor ended a command."""
+        """Note how the executor ended a command; what is still planned for it is too late."""
+        if self._async.command is not None and self._async.command.command_id == command_id:
+            self._async.call_off()
+        self._unqueue(command_id)
         ended = self._active.end(command_id)
         self.dialogue.ended(command_id, success, error)
         if ended is not None and not ended[0].mission:
@@ -216,6 +254,7 @@ class CommandManager:
     def advance(self) -> None:
         """Go on with what has become possible."""
         self.dialogue.drop_overdue()
+        self.is_paused &= self._is_at_something
         self._look_after_job()
         self._look_after_turns()
         while self._queue and self._async.command is None and self.dialogue.pending is None:
@@ -280,11 +319,16 @@ class CommandManager:
 
     def _conclude(self, done: PlannedCommand) -> None:
         """Conclude a command, or try it next in other words that may have been said."""
+        command = done.command
+        if command.recovers and self._active.of(command.command_id) is None:
+            return  # the executor has given it up meanwhile
         found = self._retry.next(done)
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
             return
-        if _stands_still(found) and self._is_moving:  # nobody needs to be asked about a halt
+        if (
+            _stands_still(found) and self._is_moving and not found.command.mission
+        ):  # nobody needs to be asked about a halt
             self._cancel_all(f"{found.command.command_id}-stops")
         self._settle(found)
 
@@ -293,7 +337,7 @@ class CommandManager:
     def _settle(self, done: PlannedCommand) -> None:
         """Conclude a command, or let it wait while it would disturb what is carried out."""
         if self._turns.must_wait(done):
-            self._turns.put_off(done.command, partial(self._queue.append, done.command))
+            self._turns.put_off(done.command, partial(self._queue.appendleft, done.command))
         else:
             self.dialogue.conclude(done)
 
@@ -306,7 +350,7 @@ class CommandManager:
             why = "the executor does not know of it any more"
             self.has_ended(command_id, False, why)
             self._events.lost(command_id, why)
-        for turn in self._turns.take_due():
+        for turn in reversed(self._turns.take_due()):  # each goes before those that came later
             self._guarded(turn.command, turn.go_on)
 
     def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
@@ -322,6 +366,7 @@ class CommandManager:
 
         The person who wanted that needs no answer aloud.
         """
+        self.ends_missions()
         self._events.cancelled_all(command_id)
         self._active.end_all()
 

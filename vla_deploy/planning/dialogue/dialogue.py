@@ -123,7 +123,9 @@ class Dialogue:
             answer = replace(answer, proposal=replace(answer.proposal, is_unsure=True))
             done = replace(done, answer=answer)
         self.metrics.note(answer.attempts)
-        self.settle()  # what was chosen concerned this command alone
+        left = self.settle()  # what was chosen concerned this command alone
+        if left is not None and left.command.command_id != command.command_id:
+            self.drop(left, Says.REPLACED)
         try:
             if answer.is_final:
                 self._situation.check_ready()

@@ -3,6 +3,7 @@
 from typing import Final
 
 from drivers.clock import Clock
+from vla_deploy.client.action_status import summary_of
 from vla_deploy.client.following import lost
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.announcer import Announcer
@@ -30,6 +31,19 @@ class PlannerEvents:
     def publish(self, event: TaskEvent) -> None:
         """Publish an event of a mission."""
         self._events.publish(event)
+
+    def done(self, command_id: str, error: str = "") -> None:
+        """Publish that what was asked for is done, or why not."""
+        self._events.publish(
+            {
+                "command_id": command_id,
+                "event": "finished",
+                "success": not error,
+                "error": error or None,
+                "summary": summary_of(()),
+                "actions": [],
+            }
+        )
 
     def lost(self, command_id: str, why: str) -> None:
         """Publish the end of a command that nobody carries out any more."""

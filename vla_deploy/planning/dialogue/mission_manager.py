@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import summary_of
+from vla_deploy.client.following import is_lost
 from vla_deploy.ipc import CellWriter, Event
 from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
 from vla_deploy.missions.criteria import Facts, judge
@@ -22,6 +23,7 @@ from vla_deploy.missions.mission import (
 )
 from vla_deploy.missions.progress import MOST_SPANS, ActionSpan, MissionRun, MissionState, PartState
 from vla_deploy.missions.store import MissionStore, newest
+from vla_deploy.planning.dialogue.active_plans import LOST_NS
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
@@ -38,7 +40,8 @@ MOST_SHOWN: Final = 8
 MOST_SHOWN_BYTES: Final = 250_000
 MOST_TOLD_CHARACTERS: Final = 2000
 _PERIOD_NS: Final = NS_PER_S // 5
-_LOST: Final = "lost"
+MOST_AT_ONCE: Final = 6
+"""Subtasks that are planned or carried out: the executor takes eight commands."""
 _REPORTS: Final = re.compile(
     r"(?:give (?:me )?a )?report(?: back)?(?: to me)?|(?:tell me|say) (?:how it went|what you did)",
     re.IGNORECASE,
@@ -73,6 +76,8 @@ class MissionManager:
         self._run_id = run_id
         self._runs: dict[str, MissionRun] = {}
         self._outcomes: dict[str, list[str]] = {}
+        self._missed_ns: dict[str, int] = {}
+        self._checked_ns: dict[tuple[str, str], int] = {}
         self._trouble = ""
         self._is_changed = False
         self._due_ns = 0
@@ -97,6 +102,9 @@ class MissionManager:
             check_mission(found, facts.world, self._parts, self._wall_s())
         except MissionInvalid as error:
             raise CommandUnreadable(str(error)) from error
+        known = self._runs.get(command.command_id)
+        if known is not None and not known.state.is_final:
+            raise CommandUnreadable(f'a mission "{known.mission_id}" is open already')
         if sum(not one.state.is_final for one in self._runs.values()) >= MOST_OPEN:
             raise CommandUnreadable(f"{MOST_OPEN} missions are open already; cancel one first")
         self._accept(command, found)
@@ -170,6 +178,8 @@ class MissionManager:
         run, name = self._part_of(event["command_id"])
         if run is None or run.subtasks[name].state is not PartState.EXECUTING:
             return
+        if told.stamp_ns < run.subtasks[name].given_ns:
+            return  # of the cycle before
         if event["event"] == "action":
             _note_span(run, name, event, stamp_s)
             self._is_changed = True
@@ -182,7 +192,7 @@ class MissionManager:
             statuses = [one["status"] for one in event["actions"]]
             self._outcomes.setdefault(run.mission_id, []).extend(statuses)
             error = "" if event["success"] else event["error"] or "it failed"
-            self._ended(run, name, error, is_lost=error.startswith(_LOST))
+            self._ended(run, name, error, is_lost=is_lost(event))
 
     def _ended(self, run: MissionRun, name: str, error: str, *, is_lost: bool = False) -> None:
         states = {one: part.state for one, part in run.objectives.items()}
@@ -208,8 +218,13 @@ class MissionManager:
         if self._is_due(run):
             self._begin(run)
             self._is_changed = True
-        if run.state in (MissionState.EXECUTING, MissionState.PAUSED):
-            self._note_pause(run)
+        if run.state not in (MissionState.EXECUTING, MissionState.PAUSED):
+            return
+        if why := self._situation.why_not_ready():  # a stop ends it for good
+            self.cancel(run.mission_id, why)
+            return
+        self._note_pause(run)
+        self._end_forgotten(run)
         if run.state is not MissionState.EXECUTING:
             return
         self._check(run)
@@ -220,7 +235,28 @@ class MissionManager:
             self._is_changed = True
             return
         for name, subtask in run.ready():
+            if self._in_work >= MOST_AT_ONCE:
+                return
             self._give(run, name, subtask)
+
+    @property
+    def _in_work(self) -> int:
+        return sum(
+            part.state is PartState.EXECUTING
+            for run in self._runs.values()
+            for part in run.subtasks.values()
+        )
+
+    def _end_forgotten(self, run: MissionRun) -> None:
+        """End what is given, but neither planned nor carried out by anybody any more."""
+        now_ns = self._clock.now_ns()
+        known = self._manager.in_work | (self._situation.executing or frozenset())
+        for name, part in run.subtasks.items():
+            command_id = _command_id(run, name)
+            if part.state is not PartState.EXECUTING or command_id in known:
+                self._missed_ns.pop(command_id, None)
+            elif now_ns - self._missed_ns.setdefault(command_id, now_ns) > LOST_NS:
+                self._ended(run, name, "nobody carries it out any more", is_lost=True)
 
     def _is_due(self, run: MissionRun) -> bool:
         if run.state is not MissionState.PLANNING:
@@ -236,7 +272,7 @@ class MissionManager:
             return False
 
     def _note_pause(self, run: MissionRun) -> None:
-        is_paused = self._situation.is_paused
+        is_paused = self._manager.is_paused or self._situation.is_paused
         state = MissionState.PAUSED if is_paused else MissionState.EXECUTING
         if run.state is not state:
             run.state = state
@@ -248,6 +284,7 @@ class MissionManager:
 
     def _give(self, run: MissionRun, name: str, subtask: Subtask) -> None:
         run.start(name, self._wall_s())
+        run.subtasks[name].given_ns = self._clock.now_ns()
         plan: dict[str, Any] | None = None
         if _REPORTS.fullmatch(subtask.words.strip()):
             said = {"id": "a1", "skill": "speak", "parameters": {"text": run.spoken_report()}}
@@ -272,16 +309,17 @@ class MissionManager:
     def _check(self, run: MissionRun) -> None:
         """Judge the criteria of what has ended; the world has a moment to show them met."""
         facts = None
-        for name, part, criteria in run.checking():
-            now_s = self._wall_s()
-            part.checked_since_s = part.checked_since_s or now_s
+        for name, _, criteria in run.checking():
+            now_s, now_ns = self._wall_s(), self._clock.now_ns()
+            since_ns = self._checked_ns.setdefault((run.mission_id, name), now_ns)
             facts = facts or (self._situation.facts() if criteria else None)
             verdicts = [(text, _judged(text, facts)) for text in criteria if facts is not None]
             unmet = [f'"{text}" is not met: {why}' for text, why in verdicts if why]
             unknown = [f'"{text}" could not be checked' for text, why in verdicts if why is None]
-            is_over = now_s - part.checked_since_s >= CHECK_WAIT_S
+            is_over = now_ns - since_ns >= CHECK_WAIT_S * NS_PER_S
             if (unmet or unknown) and not is_over:
                 continue
+            del self._checked_ns[run.mission_id, name]
             states = {one: run_of.state for one, run_of in run.objectives.items()}
             run.conclude(name, now_s, "; ".join(unmet), "; ".join(unknown))
             self._tell_part(run, name)

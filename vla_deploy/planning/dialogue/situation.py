@@ -131,6 +131,14 @@ class Situation:
         skill = status.get("skill")
         return f"{words or 'a plan'}: {skill}" if skill else words or "a plan"
 
+    def why_not_ready(self) -> str:
+        """Return why the robot may not move now, "" where it may."""
+        try:
+            self.check_ready()
+        except NotReadyToMove as error:
+            return str(error)
+        return ""
+
     def check_ready(self) -> None:
         """Accept that the robot moves now.
 

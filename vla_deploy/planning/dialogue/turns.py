@@ -80,8 +80,9 @@ class Turns:
 
     def put_off(self, command: UserCommand, go_on: Callable[[], None]) -> None:
         """Let a command wait, and say so where its place is news."""
+        if not self.waiting:
+            self._behind = self._under_way
         self.waiting.append(Turn(command, go_on))
-        self._behind = self._under_way
         place = len(self.waiting)
         if self._told.get(command.command_id) == place:
             return
@@ -91,7 +92,8 @@ class Turns:
 
     def take_due(self) -> list[Turn]:
         """Take out all commands as soon as something else is carried out than when they came."""
-        if not self.waiting or self._under_way == self._behind:
+        under_way = self._under_way
+        if not self.waiting or (under_way and under_way == self._behind):
             return []
         due, self.waiting = self.waiting, []
         names = {one.command.command_id for one in due}

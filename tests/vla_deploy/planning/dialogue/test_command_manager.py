@@ -566,3 +566,16 @@ class TestTurns:
 
     def test_words_for_a_pause_mean_a_while_where_nothing_goes_on(self, desk):
         assert desk.plans_for("wait 5 seconds")[0]["plan"]["actions"][0]["skill"] == "wait"
+
+    def test_one_that_comes_while_others_wait_for_nothing_any_more_holds_nobody_up(self, busy):
+        busy.answers_to("pick up the cup")
+        busy.carried_out = ["c1"]
+        busy.executor_is("executing")
+        busy.ends("c1")
+        busy.answers()  # the executor's status still names it
+        busy.executor_is("idle")
+        busy.give(text="go to the bedroom")
+        told = busy.answers() + busy.answers()
+        assert ("c2", "plan") in events(told)
+        busy.ends("c2")
+        assert ("c3", "plan") in events(busy.answers() + busy.answers())

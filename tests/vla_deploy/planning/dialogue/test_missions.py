@@ -280,3 +280,110 @@ def test_what_an_objective_takes_with_it_is_told(flat) -> None:
 def test_an_act_of_any_form_has_a_clear_outcome(flat, act) -> None:
     (told,) = flat.desk.answers_to(mission_act=act)
     assert (told["event"], told["success"]) == ("finished", False)
+
+
+# --- what a person stops, pauses or cancels stays so ---------------------------------------------
+
+
+def test_an_emergency_stop_ends_a_mission_for_good_a_repeating_one_too(flat) -> None:
+    flat.desk.give(text="every thirty seconds, go to the kitchen")
+    flat.pass_s()
+    assert flat.given() == ["c1/o1.s1"]
+    flat.desk.control("stopped")
+    told = flat.desk.answers()
+    flat.desk.clock.pass_s(0.25)
+    told += flat.desk.answers()
+    assert ("c1", "finished") in events(told)
+    assert "reset and arm" in next(one for one in told if one["event"] == "finished")["error"]
+    flat.pass_s(60.0)
+    assert flat.given() == []
+    assert (flat.state()[0], flat.desk.missions()[0]["due_unix_s"]) == ("cancelled", None)
+
+
+@pytest.mark.parametrize("said", ["no, don't do that!", "stand still"])
+def test_an_objection_ends_missions_too(flat, said) -> None:
+    flat.desk.give(text="every thirty seconds, go to the kitchen")
+    flat.pass_s()
+    flat.given()
+    flat.desk.answers_to(said)
+    flat.pass_s(60.0)
+    assert [one for one in flat.given() if one.startswith("c1/")] == []
+    assert flat.state()[0] == "cancelled"
+
+
+def test_a_mission_is_cancelled_by_a_planner_that_was_started_again(flat) -> None:
+    give(flat, "go to the kitchen")
+    flat.desk.carried_out = ["c1/o1.s1"]
+    flat.desk.executor_is("executing")
+    flat.desk.start()
+    flat.desk.plans()
+    assert flat.desk.plans_for(mission_act={"cancel": "c1"}) == [
+        {"command_id": "c1/o1.s1-cancel", "cancel": True, "of": "c1/o1.s1"}
+    ]
+
+
+def test_what_no_executor_carries_out_after_both_were_started_again_is_begun_again(flat) -> None:
+    give(flat, "go to the kitchen")
+    flat.desk.carried_out = ["c1/o1.s1"]
+    flat.desk.executor_is("executing")
+    flat.desk.start()
+    flat.desk.plans()
+    flat.executor_is("idle")
+    flat.pass_s(5.0)
+    assert flat.given() == ["c1/o1.s1+2"]
+
+
+def test_a_pause_between_two_subtasks_holds_until_somebody_says_go_on(flat) -> None:
+    give(flat, {"id": "a", "words": "look left", "criteria": "the keys are in the box"},
+         {"id": "b", "words": "go to the kitchen", "depends_on": ["a"]})  # fmt: skip
+    flat.given()
+    flat.ends("c1/a.s1")  # nobody can see whether it is so: it waits for a moment
+    told = flat.desk.answers_to("hold on")
+    assert (events(told)[-1], told[-1]["success"]) == (("c2", "finished"), True)
+    flat.pass_s(10.0)
+    assert (flat.given(), flat.state()[0]) == ([], "paused")
+    flat.desk.answers_to("go on")
+    flat.pass_s(1.5)
+    assert flat.given() == ["c1/b.s1"]
+
+
+def test_no_more_are_carried_out_at_a_time_than_the_executor_takes(flat) -> None:
+    give(
+        flat,
+        *[
+            f"say {word}"
+            for word in ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine"]
+        ],
+    )
+    first = flat.given()
+    assert len(first) == 6
+    flat.ends(first[0])
+    assert len(flat.given()) == 1
+
+
+def test_the_parts_of_a_mission_take_nobody_elses_place(flat) -> None:
+    flat.desk.carried_out = ["c1/o1.s1"]
+    give(flat, *["go to the kitchen"] * 10)
+    assert events(flat.desk.answers_to("go to the bedroom")) == [("c2", "queued")]
+
+
+def test_the_end_of_a_cycle_before_ends_nothing_now(flat) -> None:
+    flat.desk.give(text="every thirty seconds, go to the kitchen")
+    flat.pass_s()
+    flat.ends("c1/o1.s1")
+    flat.pass_s(30.0)
+    assert flat.given() == ["c1/o1.s1", "c1/o1.s1"]
+    flat.desk.carried_out = ["c1/o1.s1"]
+    flat.desk.executor_is("executing")
+    flat.desk.start()  # it reads all that was told before
+    assert flat.desk.missions()[0]["subtasks"]["o1.s1"]["state"] == "executing"
+
+
+def test_an_id_that_is_in_use_is_refused(flat) -> None:
+    give(flat, "go to the kitchen")
+    flat.desk.give(command_id="c1", mission=["look left"])
+    told = flat.pass_s()
+    assert (told[0]["event"], told[0]["reason"]) == (
+        "rejected",
+        'a mission "c1" is open already',
+    )
