@@ -387,3 +387,23 @@ def test_an_id_that_is_in_use_is_refused(flat) -> None:
         "rejected",
         'a mission "c1" is open already',
     )
+
+
+def test_what_a_server_beyond_the_robot_lost_is_not_begun_again(flat) -> None:
+    give(flat, "go to the kitchen")
+    flat.given()
+    told = flat.ends("c1/o1.s1", "lost: the ROS gateway has been silent for 2 s")
+    assert (told[-1]["event"], told[-1]["success"]) == ("finished", False)
+    assert flat.given() == []
+
+
+def test_a_pause_of_an_executor_that_ended_holds_until_somebody_says_go_on(flat) -> None:
+    give(flat, "go to the kitchen")
+    flat.given()
+    flat.desk.answers_to("hold on")
+    flat.executor_is("idle")
+    flat.pass_s(6.0)
+    assert (flat.given(), flat.state()[0]) == ([], "paused")
+    flat.desk.answers_to("go on")
+    flat.pass_s()
+    assert flat.given() == ["c1/o1.s1+2"]
