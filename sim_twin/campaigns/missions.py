@@ -126,7 +126,7 @@ def _documents(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
 def _side_by_side(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     def play() -> tuple[list[str], dict[str, Any]]:
         endings = []
-        for objectives in (list(EIGHT), _one_after_another()):
+        for objectives in (list(EIGHT), one_after_another()):
             with _robot(seed) as stack:
                 endings.append(_carried_out(stack, mission={"objectives": objectives}))
         beside, after = endings
@@ -187,7 +187,8 @@ def _pause(stack: LockstepStack) -> float:
     return float(max(moved))
 
 
-def _one_after_another() -> list[dict[str, Any]]:
+def one_after_another() -> list[dict[str, Any]]:
+    """Return the eight objectives, each after the one before it."""
     first = EIGHT[0]
     return [first, *(one | {"depends_on": [before["id"]]} for before, one in pairwise(EIGHT))]
 

@@ -2,45 +2,15 @@
 
 import json
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import pytest
 
+from sim_twin.campaigns.missions import EIGHT, one_after_another
 from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.ipc import topics
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(240)]
-
-
-def of_arm(name: str, *skills: str, arm: str) -> dict[str, Any]:
-    actions = [
-        {
-            "id": skill,
-            "skill": skill,
-            "parameters": {"arm": arm} | ({"pose": "tuck"} if skill == "move_arm" else {}),
-            "depends_on": [before] if before else [],
-        }
-        for before, skill in pairwise((None, *skills))
-    ]
-    return {"id": name, "actions": actions}
-
-
-EIGHT: list[dict[str, Any]] = [
-    {"id": "turn", "words": "turn left 90 degrees"},
-    of_arm("left", "move_arm", arm="left"),
-    of_arm("right", "move_arm", arm="right"),
-    of_arm("left_hand", "open_gripper", "close_gripper", arm="left"),
-    of_arm("right_hand", "open_gripper", "close_gripper", arm="right"),
-    {"id": "look", "words": "look left"},
-    {"id": "say", "words": "say I am at work"},
-    {"id": "face", "words": "look ahead", "depends_on": ["turn", "look"]},
-]
-
-
-def one_after_another(objectives: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    rest = (one | {"depends_on": [before["id"]]} for before, one in pairwise(objectives))
-    return [objectives[0], *rest]
 
 
 def carried_out(stack: LockstepStack, objectives: list[dict[str, Any]]) -> float:
@@ -59,7 +29,7 @@ def test_eight_objectives_side_by_side_are_faster_and_come_to_the_same_end(
     make_stack: Callable[..., LockstepStack], coarse: str
 ) -> None:
     took_s, ends = [], []
-    for objectives in (EIGHT, one_after_another(EIGHT)):
+    for objectives in (list(EIGHT), one_after_another()):
         stack = make_stack(profile=coarse)
         stack.arm()
         took_s.append(carried_out(stack, objectives))

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.ipc.payloads.tasks import CommandSummary
+from vla_deploy.ipc.payloads.tasks import CommandSummary, FinishedEvent
 
 
 class ActionStatus(StrEnum):
@@ -33,4 +33,16 @@ def summary_of(statuses: Iterable[str]) -> CommandSummary:
         "successful_actions": successful,
         "failed_actions": sum(one in FAILED for one in told),
         "success_rate": round(successful / len(told), 3) if told else 0.0,
+    }
+
+
+def end_without_actions(command_id: str, error: str = "") -> FinishedEvent:
+    """Return the last event of a command for which no action was taken: done, or why not."""
+    return {
+        "command_id": command_id,
+        "event": "finished",
+        "success": not error,
+        "error": error or None,
+        "summary": summary_of(()),
+        "actions": [],
     }

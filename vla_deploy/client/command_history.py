@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.client.action_status import summary_of
+from vla_deploy.client.action_status import end_without_actions
 from vla_deploy.client.command_record import (
     CommandRecord,
     Kind,
@@ -17,7 +17,7 @@ from vla_deploy.client.command_record import (
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, LAST_EVENTS, Following
 from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import Event, topics
-from vla_deploy.ipc.payloads.tasks import FinishedEvent, TaskEvent, Utterance
+from vla_deploy.ipc.payloads.tasks import TaskEvent, Utterance
 
 MOST_COMMANDS: Final = 200
 _JUDGE_PERIOD_NS: Final = NS_PER_S // 2
@@ -159,7 +159,7 @@ class CommandHistory:
         for command_id, following in list(self._open.items()):
             last = following.conclude(reasons.get(command_id, ""))
             if last is None and following.is_unanswered:
-                last = _unanswered(command_id)
+                last = end_without_actions(command_id, _UNANSWERED)
             if last is not None:
                 self._finish(command_id, last, now_s)
 
@@ -172,14 +172,3 @@ def _words_of(mission: CommandRecord, part: str) -> str:
     names = (part, part.partition(".")[0])
     told = (one for one in reversed(mission.events) if one.get("part") in names)
     return next((str(one["words"]) for one in told), "")
-
-
-def _unanswered(command_id: str) -> FinishedEvent:
-    return {
-        "command_id": command_id,
-        "event": "finished",
-        "success": False,
-        "error": _UNANSWERED,
-        "summary": summary_of(()),
-        "actions": [],
-    }

@@ -4,6 +4,7 @@ holding the red cup          the hands are empty        at the kitchen
 the red cup is in the box    no cup on the coffee table    nothing on the dining table
 """
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -107,8 +108,7 @@ def _at(found: re.Match[str], world: World) -> Judge:
     def judged(facts: Facts) -> Verdict:
         if facts.here is None:
             return None
-        x_m, y_m = facts.here[:2]
-        away_m = ((site.pose.x_m - x_m) ** 2 + (site.pose.y_m - y_m) ** 2) ** 0.5
+        away_m = math.dist((site.pose.x_m, site.pose.y_m), facts.here[:2])
         return MET if away_m <= AT_M else f"the robot is {away_m:.1f} m from the {place}"
 
     return judged
@@ -121,8 +121,7 @@ def _near_thing(what: str) -> Judge:
         things = find(query, facts.scene) if facts.scene is not None else []
         if not things or facts.here is None:
             return None
-        (x_m, y_m), here = things[0].xy_m, facts.here
-        away_m = ((x_m - here[0]) ** 2 + (y_m - here[1]) ** 2) ** 0.5
+        away_m = math.dist(things[0].xy_m, facts.here[:2])
         return MET if away_m <= 2 * AT_M else f"the robot is {away_m:.1f} m from the {query}"
 
     return judged

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from graphlib import CycleError, TopologicalSorter
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -12,7 +11,7 @@ from vla_deploy.missions.criteria import read_criterion
 from vla_deploy.missions.errors import MissionInvalid
 from vla_deploy.missions.schedule import MissionSchedule, check_schedule, split_schedule
 from vla_deploy.plans.knowledge import World
-from vla_deploy.plans.plan import PRIORITIES, Action, Priority
+from vla_deploy.plans.plan import PRIORITIES, Action, Priority, order_faults
 
 MOST_OBJECTIVES: Final = 50
 MOST_SUBTASKS: Final = 200
@@ -239,16 +238,5 @@ def _criteria_faults(name: str, criteria: Sequence[str], world: World) -> list[s
 
 
 def _order_faults(what: str, parts: Sequence[_Part]) -> list[str]:
-    ids = [one.id for one in parts]
-    faults = [f'{what} id "{one}" is used twice' for one in sorted(set(ids)) if ids.count(one) > 1]
-    faults += [
-        f'{what} "{one.id}" depends on "{needed}", which is not there'
-        for one in parts
-        for needed in one.depends_on
-        if needed not in ids
-    ]
-    try:
-        TopologicalSorter({one.id: one.depends_on for one in parts}).prepare()
-    except CycleError as error:
-        faults.append(f"{what}s wait for each other: " + " -> ".join(reversed(error.args[1])))
-    return faults
+    earlier = [(one.id, one.depends_on) for one in parts]
+    return order_faults(what, earlier, "there", f"{what}s wait for each other")

@@ -119,8 +119,7 @@ class MissionRun(BaseModel):
             )
             if done and self.subtasks[name].state is PartState.PENDING:
                 found.append((objective.priority, subtask.priority, name, subtask))
-        order = {name: place for place, (name, _, _) in enumerate(self.all_subtasks())}
-        found.sort(key=lambda one: (one[0], one[1], order[one[2]]))
+        found.sort(key=lambda one: one[:2])
         return [(name, subtask) for _, _, name, subtask in found]
 
     # --- what comes of it -----------------------------------------------------------------------
@@ -177,17 +176,15 @@ class MissionRun(BaseModel):
         for other, one, _ in self.all_subtasks():
             if one.id == objective and self.subtasks[other].state is PartState.PENDING:
                 self._cancel(other, f"{name} failed", now_s)
+        self._cancel_after(objective, f"{objective} failed", now_s)
+
+    def _cancel_after(self, objective: str, why: str, now_s: float) -> None:
+        """End all objectives that depend on one, directly or not."""
         for later in self.mission.objectives:
             if objective in later.depends_on and not self.objectives[later.id].state.is_final:
-                self._give_up(later, f"{objective} failed", now_s)
-
-    def _give_up(self, objective: Objective, why: str, now_s: float) -> None:
-        self._cancel(objective.id, why, now_s)
-        for subtask in objective.subtasks:
-            self._cancel(f"{objective.id}.{subtask.id}", why, now_s)
-        for later in self.mission.objectives:
-            if objective.id in later.depends_on and not self.objectives[later.id].state.is_final:
-                self._give_up(later, why, now_s)
+                for name in (later.id, *(f"{later.id}.{one.id}" for one in later.subtasks)):
+                    self._cancel(name, why, now_s)
+                self._cancel_after(later.id, why, now_s)
 
     def _cancel(self, name: str, why: str, now_s: float) -> None:
         run = self.subtasks.get(name) or self.objectives[name]
@@ -205,13 +202,10 @@ class MissionRun(BaseModel):
 
     def settle(self) -> bool:
         """End the mission where all its objectives have; return whether it has ended now."""
-        states = [one.state for one in self.objectives.values()]
-        is_busy = any(not one.state.is_final for one in self.subtasks.values())
-        if self.state.is_final or not states or is_busy:
+        parts = (*self.objectives.values(), *self.subtasks.values())
+        if self.state.is_final or not parts or not all(one.state.is_final for one in parts):
             return False
-        if not all(one.is_final for one in states):
-            return False
-        is_done = all(one is PartState.COMPLETED for one in states)
+        is_done = all(one.state is PartState.COMPLETED for one in self.objectives.values())
         self.state = MissionState.COMPLETED if is_done else MissionState.FAILED
         self.error = "" if is_done else self.report()
         return True
@@ -225,28 +219,30 @@ class MissionRun(BaseModel):
 
     def spoken_report(self) -> str:
         """Say in short sentences what is done so far, and what is not, at most 500 characters."""
-        words = {one.id: one.words or one.id for one in self.mission.objectives}
-        done = [words[name] for name, one in self.objectives.items() if one.state == "completed"]
-        failed = [
-            f"{words[name]}, because {one.error}"
-            for name, one in self.objectives.items()
-            if one.state is PartState.FAILED
-        ]
+        done = [words for words, _ in self._told(PartState.COMPLETED)]
         told = [f"Done: {'; '.join(done)}." if done else "Nothing is done yet."]
-        told += [f"Not done: {one.rstrip('.')}." for one in failed]
+        told += [
+            f"Not done: {words}, because {one.error.rstrip('.')}."
+            for words, one in self._told(PartState.FAILED)
+        ]
         return " ".join(told)[:500]
 
     def report(self) -> str:
         """Say which objectives are done, and why the others are not."""
-        words = {one.id: one.words or one.id for one in self.mission.objectives}
-        done = [words[name] for name, one in self.objectives.items() if one.state == "completed"]
+        done = [words for words, _ in self._told(PartState.COMPLETED)]
         told = [
-            f"{len(done)} of {len(words)} objectives done"
+            f"{len(done)} of {len(self.objectives)} objectives done"
             + (f": {', '.join(done)}" if done else "")
         ]
         told += [
-            f"{words[name]}: {one.state}: {one.error}"
-            for name, one in self.objectives.items()
-            if one.state in (PartState.FAILED, PartState.CANCELLED)
+            f"{words}: {one.state}: {one.error}"
+            for words, one in self._told(PartState.FAILED, PartState.CANCELLED)
         ]
         return "; ".join(told)
+
+    def _told(self, *states: PartState) -> Iterator[tuple[str, PartRun]]:
+        """Yield the objectives that stand so, each in its words."""
+        for one in self.mission.objectives:
+            run = self.objectives[one.id]
+            if run.state in states:
+                yield one.words or one.id, run

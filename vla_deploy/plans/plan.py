@@ -109,20 +109,30 @@ def plan_schema() -> dict[str, Any]:
 
 def dependency_faults(actions: Sequence[Action]) -> list[str]:
     """Return every duplicate id, unknown dependency and cycle."""
-    ids = [action.id for action in actions]
-    faults = [
-        f'action id "{name}" is used twice' for name in sorted(set(ids)) if ids.count(name) > 1
-    ]
+    earlier = [(action.id, action.earlier) for action in actions]
+    return order_faults("action", earlier, "in the plan", "the dependencies form a cycle")
+
+
+def order_faults(
+    what: str, earlier: Sequence[tuple[str, Sequence[str]]], where: str, cycle: str
+) -> list[str]:
+    """Return every duplicate id, unknown dependency and cycle; `earlier` is what each id waits for.
+
+    `what` and `where` name the things and where they should be, `cycle` says that some wait for
+    each other.
+    """
+    ids = [one for one, _ in earlier]
+    faults = [f'{what} id "{one}" is used twice' for one in sorted(set(ids)) if ids.count(one) > 1]
     faults += [
-        f'action "{action.id}" depends on "{needed}", which is not in the plan'
-        for action in actions
-        for needed in action.earlier
+        f'{what} "{one}" depends on "{needed}", which is not {where}'
+        for one, needs in earlier
+        for needed in needs
         if needed not in ids
     ]
     try:
-        TopologicalSorter({action.id: action.earlier for action in actions}).prepare()
+        TopologicalSorter(dict(earlier)).prepare()
     except CycleError as error:
-        faults.append("the dependencies form a cycle: " + " -> ".join(reversed(error.args[1])))
+        faults.append(f"{cycle}: " + " -> ".join(reversed(error.args[1])))
     return faults
 
 

@@ -125,7 +125,7 @@ class PlanExecution:
         is_paused = self._context.link.is_paused and not self._only_speaks
         refusal = refusal_of(self._context.link.control_status)
         if not is_paused:
-            self._start_ready(now_ns)
+            self._start_ready()
         if refusal and (is_paused or not self._branches):
             self.cancel(refusal)  # a stop ends what is paused, and what waits for its turn, too
         for name, branch in list(self._branches.items()):
@@ -175,7 +175,7 @@ class PlanExecution:
     def _record(self, action_id: str) -> ActionRecord:
         return next(one for one in self.records if one.action.id == action_id)
 
-    def _start_ready(self, now_ns: int) -> None:
+    def _start_ready(self) -> None:
         done = {one.action.id for one in self.records if one.status is ActionStatus.SUCCEEDED}
         ended = {one.action.id for one in self.records if one.status in FINAL}
         ready = [
@@ -190,7 +190,7 @@ class PlanExecution:
         book = self._context.claims.look() if ready else None
         for record in ready:
             if book is not None and record.status is ActionStatus.PENDING:
-                self._start_if_granted(record, book, now_ns)
+                self._start_if_granted(record, book)
 
     def _ask_once(self, record: ActionRecord) -> None:
         if record.action.id not in self._asked and record.status not in FINAL:
@@ -209,7 +209,7 @@ class PlanExecution:
         except ClaimRefused as error:
             self._give_up(record, str(error))
 
-    def _start_if_granted(self, record: ActionRecord, book: Book, now_ns: int) -> None:
+    def _start_if_granted(self, record: ActionRecord, book: Book) -> None:
         holder = self._holder(record.action)
         working_ns = self._context.link.working_ns()
         waited_s = (working_ns - self._asked[record.action.id]) / NS_PER_S
@@ -217,7 +217,6 @@ class PlanExecution:
             self._branches[record.action.id] = _Branch(record=record, started_ns=working_ns)
             self._context.needs[holder] = needs_of(record.action, self._context.robot)
             record.status = ActionStatus.ACTIVE
-            record.started_ns = now_ns
             self._tell(record)
         elif book.waits(holder):
             return

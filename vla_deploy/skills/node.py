@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.client.action_status import FAILED, ActionStatus, summary_of
+from vla_deploy.client.action_status import FAILED, ActionStatus, end_without_actions, summary_of
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.devices import HomeDevices
 from vla_deploy.ipc import (
@@ -220,20 +220,8 @@ class ExecutorNode:
             link.pause()
             if ros is not None:
                 ros.pause()
-        self._answer(command_id, "" if self._jobs else "nothing is under way")
-
-    def _answer(self, command_id: str, error: str = "") -> None:
-        """Say that what was asked for is done, or why not."""
-        self._events.publish(
-            {
-                "command_id": command_id,
-                "event": "finished",
-                "success": not error,
-                "error": error or None,
-                "summary": summary_of(()),
-                "actions": [],
-            }
-        )
+        error = "" if self._jobs else "nothing is under way"
+        self._events.publish(end_without_actions(command_id, error))
 
     def _cancel(self, command_id: str, of: str | None) -> None:
         """End one command, or all; what else this executor moves comes to rest with the last."""
@@ -242,7 +230,7 @@ class ExecutorNode:
         if of is None:
             self._skills.link.halt()
             self._skills.link.resume()
-        self._answer(command_id)
+        self._events.publish(end_without_actions(command_id))
 
     def _advance(self, job: _Job) -> None:
         if job.execution is not None:

@@ -15,7 +15,6 @@ class ActionRecord:
 
     action: Action
     status: ActionStatus = ActionStatus.PENDING
-    started_ns: int = 0
     execution_time_s: float = 0.0
     error: str = ""
     retries: int = 0

@@ -159,16 +159,18 @@ class CommandManager:
     @property
     def in_work(self) -> frozenset[str]:
         """Return the commands that are planned, asked about, carried out, or wait."""
+        return frozenset((*self._active.plans, *self._to_be_done()))
+
+    def _to_be_done(self) -> list[str]:
+        """Return the commands that are planned, asked about, or wait."""
         open_ones = (self.dialogue.pending, self.dialogue.held)
-        commands = [
+        commands = (
             self._async.command,
             *(one.command for one in open_ones if one is not None),
             *self._queue,
             *(one.command for one in self._turns.waiting),
-        ]
-        return frozenset(self._active.plans) | {
-            one.command_id for one in commands if one is not None
-        }
+        )
+        return [one.command_id for one in commands if one is not None]
 
     @property
     def _is_at_something(self) -> bool:
@@ -264,14 +266,10 @@ class CommandManager:
 
     def document(self, memory: MemoryStatus | None) -> PlannerStatus:
         """Return which commands are in work, what was asked, and the counts; and of `memory`."""
-        pending, held = self.dialogue.pending, self.dialogue.held
-        waiting = [one.command for one in (pending, held) if one is not None]
-        turns = [one.command for one in self._turns.waiting]
-        in_work = (self._async.command, *waiting, *self._queue, *turns)
-        asked = pending or held
+        asked = self.dialogue.pending or self.dialogue.held
         return {
             **self.metrics.document(),
-            "commands": [one.command_id for one in in_work if one is not None],
+            "commands": self._to_be_done(),
             "question": None if asked is None else asked.question.text,
             **self.planner.document(),
             "prohibitions": self._prohibitions.document(),

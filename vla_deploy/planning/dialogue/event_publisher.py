@@ -3,7 +3,7 @@
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.client.action_status import summary_of
+from vla_deploy.client.action_status import end_without_actions
 from vla_deploy.client.following import lost
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.announcer import Announcer
@@ -34,16 +34,7 @@ class PlannerEvents:
 
     def done(self, command_id: str, error: str = "") -> None:
         """Publish that what was asked for is done, or why not."""
-        self._events.publish(
-            {
-                "command_id": command_id,
-                "event": "finished",
-                "success": not error,
-                "error": error or None,
-                "summary": summary_of(()),
-                "actions": [],
-            }
-        )
+        self._events.publish(end_without_actions(command_id, error))
 
     def lost(self, command_id: str, why: str) -> None:
         """Publish the end of a command that nobody carries out any more."""

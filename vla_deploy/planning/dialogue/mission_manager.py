@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import summary_of
+from vla_deploy.client.command_record import part_of
 from vla_deploy.client.following import is_lost
 from vla_deploy.ipc import CellWriter, Event
 from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
@@ -329,8 +330,8 @@ class MissionManager:
     # --- what is told ---------------------------------------------------------------------------
 
     def _part_of(self, command_id: str) -> tuple[MissionRun | None, str]:
-        mission_id, _, name = command_id.rpartition("/")
-        run, name = self._runs.get(mission_id), name.partition("+")[0]
+        mission_id, name = part_of(command_id)
+        run = self._runs.get(mission_id)
         is_it = run is not None and name in run.subtasks and _command_id(run, name) == command_id
         return (run, name) if is_it else (None, "")
 
