@@ -90,7 +90,7 @@ class TwinBattery:
             self._files = None
 
     def step(self, now_ns: int) -> None:
-        """Let the power of the last moment have acted."""
+        """Charge or drain the pack by the power since the last step."""
         before_ns = now_ns if self._stepped_ns is None else self._stepped_ns
         self._stepped_ns = now_ns
         self.due_ns = now_ns + _PERIOD_NS

@@ -141,7 +141,7 @@ def lost(command_id: str, why: str, actions: Mapping[str, ActionResult]) -> Task
 
 
 def is_lost(event: FinishedEvent) -> bool:
-    """Return whether the end of a command is the word of `lost`, and not of an action of it."""
+    """Return whether `lost` made this event, rather than an action that was lost."""
     return (
         not event["success"]
         and (event["error"] or "").startswith(_LOST)

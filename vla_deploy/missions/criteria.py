@@ -39,7 +39,7 @@ Judge = Callable[[Facts], Verdict]
 
 
 def judge(text: str, facts: Facts) -> Verdict:
-    """Return MET, why a criterion is not met, or None where nobody can know.
+    """Return MET, why a criterion is not met, or None where it cannot be judged.
 
     Raises:
         MissionInvalid: no form of criterion fits the text, or it names what is not known.

@@ -143,11 +143,8 @@ class ExecutorNode:
             self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
             self._take(event.payload)
-        refusal = refusal_of(self._skills.link.control_status)
         for job in list(self._jobs.values()):
             self._advance(job)
-            if refusal and job.execution is None and job.recovery.is_awaited:
-                self._finish(job, refusal)
         if not self._jobs and self._knows_hands:
             believe_fingers(self._skills)  # an action under way feels for itself
         self._tell_status()
@@ -237,6 +234,8 @@ class ExecutorNode:
             self._acting = job.command_id
             job.execution.step()
             self._conclude(job)
+        elif refusal := refusal_of(self._skills.link.control_status):
+            self._finish(job, refusal)
         elif job.recovery.is_overdue(self._clock.now_ns()):
             self._finish(job, "the planner has no other plan in time")
 

@@ -18,7 +18,7 @@ from vla_deploy.runtime.deadline import Deadline
 
 RESTARTED: Final = "the planner was started again meanwhile"
 LOST_NS: Final = 3 * NS_PER_S
-"""So long the executor, which tells ten times a second what it does, may leave a command out."""
+"""For so long the executor's status, ten a second, may leave out a command."""
 _MOST_REMEMBERED: Final = 16
 
 

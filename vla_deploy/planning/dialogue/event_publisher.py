@@ -37,7 +37,7 @@ class PlannerEvents:
         self._events.publish(end_without_actions(command_id, error))
 
     def lost(self, command_id: str, why: str) -> None:
-        """Publish the end of a command that nobody carries out any more."""
+        """Publish the end of a command that no process carries out any more."""
         self._events.publish(lost(command_id, why, {}))
 
     def say(self, command: UserCommand, text: str) -> None:
@@ -57,11 +57,11 @@ class PlannerEvents:
         self._plans.publish({"command_id": command_id, "cancel": True})
 
     def cancelled(self, command_id: str, of: str) -> None:
-        """Let the executor end one of the commands that it carries out."""
+        """Ask the executor to end one of its commands."""
         self._plans.publish({"command_id": command_id, "cancel": True, "of": of})
 
     def paused(self, command_id: str, *, pause: bool) -> None:
-        """Let the executor come to rest with all that it does, or go on."""
+        """Ask the executor to pause all of its commands, or to resume them."""
         self._plans.publish({"command_id": command_id, "pause": pause})
 
     def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:

@@ -13,7 +13,7 @@ from vla_deploy.client.command_record import part_of
 from vla_deploy.client.following import is_lost
 from vla_deploy.ipc import CellWriter, Event
 from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
-from vla_deploy.missions.criteria import Facts, judge
+from vla_deploy.missions.criteria import Facts, judge, read_criterion
 from vla_deploy.missions.errors import MissionInvalid, MissionsUnusable
 from vla_deploy.missions.mission import (
     Mission,
@@ -92,15 +92,11 @@ class MissionManager:
         Raises:
             CommandUnreadable: it is a mission with faults; all are named.
         """
-        now = datetime.fromtimestamp(self._wall_s(), UTC).astimezone()
-        facts = self._situation.facts()
         try:
-            found = (
-                self._of_words(command, now, facts) if mission is None else read_mission(mission)
-            )
+            found = self._of_words(command) if mission is None else read_mission(mission)
             if found is None:
                 return False
-            check_mission(found, facts.world, self._parts, self._wall_s())
+            check_mission(found, self._situation.facts().world, self._parts, self._wall_s())
         except MissionInvalid as error:
             raise CommandUnreadable(str(error)) from error
         known = self._runs.get(command.command_id)
@@ -111,15 +107,16 @@ class MissionManager:
         self._accept(command, found)
         return True
 
-    def _of_words(self, command: UserCommand, now: datetime, facts: Facts) -> Mission | None:
+    def _of_words(self, command: UserCommand) -> Mission | None:
         if command.plan is not None or command.is_answer:
             return None
         if command.is_doubted or command.is_unsure or command.awaits_word:
             return None  # such words are read back or held as a whole
+        now = datetime.fromtimestamp(self._wall_s(), UTC).astimezone()
         found = mission_from_words(command.text, now)
         if found is not None and found.schedule.when:
             try:
-                judge(found.schedule.when, facts)
+                read_criterion(found.schedule.when, self._situation.facts().world)
             except MissionInvalid:  # a condition that only a person can judge is for the dialogue
                 return None
         return found

@@ -15,7 +15,7 @@ from vla_deploy.plans.plan import Plan
 from vla_deploy.plans.symbolic.simulation import parts_of
 
 ALL: Final = frozenset({"all"})
-"""What is under way while nobody knows which parts of the robot a plan uses."""
+"""Stands for all parts of the robot, where those that a plan uses are unknown."""
 BASE: Final = "base"
 _NEVER_BETTER: Final = (
     *(Ambiguous, CommandUnreadable, NotAble, NotUnderstood),
@@ -79,7 +79,7 @@ class Turns:
         return disturbs or bool(self.waiting) or (bool(busy) and not parts)
 
     def put_off(self, command: UserCommand, go_on: Callable[[], None]) -> None:
-        """Let a command wait, and say so where its place is news."""
+        """Queue a command, and publish its place where that has changed."""
         if not self.waiting:
             self._behind = self._under_way
         self.waiting.append(Turn(command, go_on))
