@@ -1,9 +1,14 @@
 import fcntl
 import os
 import signal
+import tempfile
 from pathlib import Path
 
-from vla_deploy.gateways.ros.shared_memory import find_leftovers, remove_leftovers
+from vla_deploy.gateways.ros.shared_memory import (
+    SHARED_MEMORY,
+    find_leftovers,
+    remove_leftovers,
+)
 
 NODE = """
 import os, signal, threading
@@ -71,19 +76,21 @@ def test_of_real_nodes_the_killed_ones_files_go_and_the_living_ones_stay(ros_gra
         node: [Path(one) for one in node.stdout.readline().split()] for node in ros_graph.started
     }
     assert all(locks.values())
-    # Aged, so that those of other tests' processes, which are as young, are not looked into.
-    for lock in (*locks[killed], *locks[living]):
-        os.utime(lock, (1.0, 1.0))
-    assert not {one.name for one in find_leftovers()} & {
-        lock.name[:-3] for held in locks.values() for lock in held
-    }
-    killed.send_signal(signal.SIGKILL)
-    killed.wait()
+    with tempfile.TemporaryDirectory(dir=SHARED_MEMORY) as name:
+        # Second names of the same files, where no other test looks for what is left over.
+        folder = Path(name)
+        files = {node: [folder / lock.name for lock in held] for node, held in locks.items()}
+        for lock in (*locks[killed], *locks[living]):
+            for file in (lock, lock.with_name(lock.name[:-3])):
+                (folder / file.name).hardlink_to(file)
+        assert find_leftovers(folder, young_s=0.0) == ()
+        killed.send_signal(signal.SIGKILL)
+        killed.wait()
 
-    removed = {lock for one in remove_leftovers() for lock in one.locks}
-    assert set(locks[killed]) <= removed
-    assert not any(
-        lock.exists() or lock.with_name(lock.name[:-3]).exists() for lock in locks[killed]
-    )
-    assert not set(locks[living]) & removed
-    assert all(lock.exists() and lock.with_name(lock.name[:-3]).exists() for lock in locks[living])
+        removed = {lock for one in remove_leftovers(folder, young_s=0.0) for lock in one.locks}
+        assert removed == set(files[killed])
+        left = {file for lock in files[living] for file in (lock, lock.with_name(lock.name[:-3]))}
+        assert set(folder.iterdir()) == left
+    for lock in locks[killed]:
+        lock.unlink()
+        lock.with_name(lock.name[:-3]).unlink()
