@@ -85,6 +85,7 @@ class Twin:
         self._hazards: HazardWatch | None = None
         self._camera: HeadCamera | None = None
         self._home: EmulatedHome | None = None
+        self._shining: tuple[str, ...] | None = None
         self._camera_line: LineTamper | None = None
         self._seed = seed
 
@@ -211,7 +212,7 @@ class Twin:
         if self.battery is not None and now_ns >= self.battery.due_ns:
             self.battery.step(now_ns)
         if self._camera is not None:
-            show_lamps(self.engine.model, self.switched_on)
+            self._show_lamps()
             self._camera.device.step(now_ns)
         if self._hazards is not None:
             self._hazards.step(now_ns)
@@ -223,6 +224,11 @@ class Twin:
             self.battery.withdraw()
         if self._camera is not None:
             self._camera.close()
+
+    def _show_lamps(self) -> None:
+        if (switched_on := self.switched_on) != self._shining:
+            show_lamps(self.engine.model, switched_on)
+            self._shining = switched_on
 
     def _battery(self, robot: RobotDescription) -> TwinBattery | None:
         """Return the pack of the robot file; servos hang on it where they measure it."""

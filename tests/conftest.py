@@ -31,6 +31,9 @@ settings.register_profile(
 )
 settings.load_profile("any machine")
 
+# Collecting garbage as often as usual takes a twentieth of all tests: thousands of test items stay.
+gc.set_threshold(50_000, 20, 20)
+
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 

@@ -91,7 +91,7 @@ def test_fingers_that_close_on_nothing_are_reported(coarse_at_table: LockstepSta
 
 
 def pause_at(stack: LockstepStack, command_id: str, skill: str, seconds: float) -> None:
-    """Pause some time into a skill for 5 s: all rests, and the hands hold what they hold."""
+    """Pause some time into a skill for 3 s: all rests, and the hands hold what they hold."""
 
     def began() -> bool:
         assert stack.outcome(command_id) is None, stack.outcome(command_id)
@@ -105,9 +105,9 @@ def pause_at(stack: LockstepStack, command_id: str, skill: str, seconds: float) 
     held = holding(stack)
     stack.give(pause=True)
     assert stack.lockstep.run_until(lambda: fastest(stack) < STANDSTILL_RAD_S, 2.0)
-    stack.lockstep.run_for(3.0)
+    stack.lockstep.run_for(1.0)
     at = stack.lockstep.truth()["joints"]
-    stack.lockstep.run_for(2.0)
+    stack.lockstep.run_for(1.0)
     later = stack.lockstep.truth()["joints"]
     moved = {name: abs(later[name]["position"] - at[name]["position"]) for name in at}
     assert max(moved.values()) < 0.01, max(moved.items(), key=lambda one: one[1])

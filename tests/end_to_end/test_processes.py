@@ -170,7 +170,7 @@ def test_kill_9_of_the_twin_stops_control_until_another_twin_is_armed(run: Run) 
 @pytest.mark.parametrize("name", ["executor", "planner"])
 def test_a_mission_goes_on_when_what_carries_it_out_is_killed(run: Run, name: str) -> None:
     pid = run.row(name)["pid"]
-    saying = run.begin("say", "turn left 300 degrees; look left; turn right 20 degrees")
+    saying = run.begin("say", "turn left 120 degrees; look left; turn right 20 degrees")
     assert run.wait_until(lambda: run.fastest_rad_s() > MOVING_RAD_S)
     run.kill(name)
     assert run.is_back(name, pid)
