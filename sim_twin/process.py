@@ -110,6 +110,9 @@ class TwinProcess:
             "truth": self._truth,
             "inside": self._inside,
             "hazards": self._hazards,
+            "things": self._things,
+            "take": self._take,
+            "put": self._put,
             **FaultServer(self._twin.faults, robot).operations,
             **SoundServer(self._twin, devices, options.seed, self._clock_ns).operations,
         }
@@ -154,7 +157,7 @@ class TwinProcess:
             drawing.close()
 
     def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Answer the referee's `truth` and `inside`, and what the fault desk is asked.
+        """Answer the referee, the person in the world, and what the fault desk is asked.
 
         Raises:
             RefereeRefusal: the operation, object or container is unknown.
@@ -301,6 +304,17 @@ class TwinProcess:
         if request.get("begin"):
             watch.begin()
         return found
+
+    def _things(self, _request: Mapping[str, Any]) -> dict[str, Any]:
+        return self._twin.person.document()
+
+    def _take(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        self._twin.person.take(str(request.get("object")))
+        return self._twin.person.document()
+
+    def _put(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        self._twin.person.put(str(request.get("object")), request)
+        return self._twin.person.document()
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:
         names = str(request.get("object")), str(request.get("container"))

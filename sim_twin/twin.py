@@ -18,6 +18,7 @@ from sim_twin.home.appliances import EmulatedHome
 from sim_twin.physics.hazards import HazardWatch
 from sim_twin.physics.lamps import show_lamps
 from sim_twin.physics.load import load_engine
+from sim_twin.physics.person import WorldPerson
 from sim_twin.pictures.head_camera import HeadCamera, camera_line
 from sim_twin.ports.streams import StreamedDevice, streamed_devices
 from sim_twin.sensors.estop import EstopButtonDevice
@@ -52,6 +53,7 @@ class Twin:
         """
         self.robot = robot
         self.engine = load_engine(robot, world, seed)
+        self.person = WorldPerson(self.engine)
         shafts = self.engine.servos
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)
         self.servos = ServoBank(_servo_specs(robot), timing=servo_timing, coupling=coupling)
@@ -202,6 +204,7 @@ class Twin:
         """
         self.faults.step()
         self._drive_motors()
+        self.person.step()
         self.engine.step()
         now_ns = self.engine.now_ns
         if now_ns >= self.lidar.due_ns:

@@ -1,6 +1,6 @@
 """Carry missions out on the lock-step twin, and judge them by what MuJoCo knows.
 
-documents/SEED      the mission of the seed documents: go, fetch, clean, report
+documents/SEED      the mission of the seed documents: go, fetch and hand over, clean, report
 side_by_side/SEED   eight objectives with two arms, against the same one after the other
 paused/PHASE        the main job paused for 5 s in one of its phases, against the same unpaused
 """
@@ -18,6 +18,8 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
+from vla_deploy.ipc import RingReader, topics
+from vla_deploy.ipc.payloads.speech import SayCancel, SayOrder
 
 COUNT: Final = 3
 MOST_SHARE: Final = 0.8
@@ -26,9 +28,12 @@ MOST_APART_M: Final = 0.03
 PAUSE_S: Final = 5.0
 REST_RAD_S: Final = 0.02
 DOCUMENTS: Final = (
-    "go to the kitchen; find the red cup and bring it to the living room; "
-    "clean the coffee table; report"
+    "go to the kitchen; find the red cup and bring it to me; clean the coffee table; report"
 )
+CUP: Final = "red_cup"
+TABLE: Final = "coffee_table"
+OFFER: Final = "Pull a little"
+"""What the robot says when somebody may take what it holds."""
 MAIN_JOB: Final = "pick up the red cup and put it in the box"
 PHASES: Final = ("find_object", "navigate_to", "pick_up", "place")
 _LIMIT_S: Final = 400.0
@@ -111,16 +116,53 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
 def _documents(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     def play() -> tuple[list[str], dict[str, Any]]:
         with _robot(seed) as stack:
-            ending = _carried_out(stack, text=DOCUMENTS)
-            cup = stack.lockstep.inside("red_cup", "box")
-            failures = ending.failures
+            said = stack.space.ring_reader(topics.SAY, from_start=True)
+            on_table = _on(stack, TABLE) - {CUP}
+            begun_s = stack.lockstep.now_s
+            command_id = stack.give(text=DOCUMENTS)
+            failures = [] if _takes_what_is_offered(stack, said, command_id) else ["no offer"]
+            ending = _end_of(stack, command_id, begun_s)
+            failures += ending.failures
             if ending.truth["held"]:
                 failures.append(f"still held: {', '.join(ending.truth['held'])}")
-            if not cup["inside"]:
-                failures.append("the red cup, which stood on the cleaned table, is not in the box")
+            if stack.lockstep.twin.person.taken != (CUP,):
+                failures.append("the person has not got the red cup")
+            if left := on_table & _on(stack, TABLE):
+                failures.append(f"still on the cleaned table: {', '.join(sorted(left))}")
             return failures, {"took_s": ending.took_s} | _counts(ending)
 
     return play
+
+
+def _takes_what_is_offered(
+    stack: LockstepStack, said: RingReader[SayOrder | SayCancel], command_id: str
+) -> bool:
+    """Run until the robot offers the cup, take it, and return whether there was an offer."""
+
+    def is_offered() -> bool:
+        orders = (one.payload for one in said.drain())
+        return any("text" in order and OFFER in order["text"] for order in orders)
+
+    def is_over() -> bool:
+        return stack.outcome(command_id) is not None or is_offered()
+
+    stack.lockstep.run_until(is_over, _LIMIT_S)
+    if stack.outcome(command_id) is not None:
+        return False
+    stack.lockstep.twin.person.take(CUP)
+    return True
+
+
+def _on(stack: LockstepStack, furniture: str) -> set[str]:
+    """Return the things whose middle is over a piece of furniture, and above it."""
+    data = stack.lockstep.twin.engine.data
+    middle, size = data.geom(furniture).xpos, stack.lockstep.twin.engine.model.geom(furniture).size
+    return {
+        name
+        for name, one in stack.lockstep.truth()["objects"].items()
+        if all(abs(one["position_m"][axis] - middle[axis]) < size[axis] for axis in (0, 1))
+        and one["position_m"][2] > middle[2]
+    }
 
 
 def _side_by_side(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:

@@ -72,6 +72,14 @@ class Referee:
             "placement_error_m": float(np.hypot(*(centre - middle)[:2])),
         }
 
+    def touches_robot(self, name: str) -> bool:
+        """Return whether a part of the robot touches an object.
+
+        Raises:
+            RefereeRefusal: the world has no such object.
+        """
+        return self._touches_robot(self._body(name))
+
     def _robot(self) -> dict[str, float]:
         x_m, y_m, z_m = self._data.xpos[self._root]
         matrix = self._data.xmat[self._root]

@@ -1,32 +1,15 @@
 """Somebody takes a cup out of the robot's hand: it lets go when it is pulled at, and not before."""
 
-import numpy as np
 import pytest
 
 from platforms import load_profile
+from sim_twin.errors import RefereeRefusal
 from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.skills.node import ExecutorNode
 
 pytestmark = pytest.mark.gl
 
 CUP = "red_cup"
-STEP_S = 0.02
-PULL_N_S, MOST_N = 15.0, 8.0
-"""How fast a person takes a light thing, and how hard."""
-
-
-def _pull(stack: LockstepStack, direction: tuple[float, float, float]) -> bool:
-    """Pull at the cup ever harder; return whether the hand has let go of it."""
-    engine = stack.lockstep.twin.engine
-    body = engine.model.body(CUP).id
-    for step in range(100):
-        force_n = min(MOST_N, PULL_N_S * STEP_S * step)
-        engine.data.xfrc_applied[body, :3] = force_n * np.array(direction)
-        stack.lockstep.run_for(STEP_S)
-        if CUP not in stack.lockstep.truth()["held"]:
-            break
-    engine.data.xfrc_applied[body] = 0.0
-    return CUP not in stack.lockstep.truth()["held"]
 
 
 def _knock(stack: LockstepStack) -> None:
@@ -44,6 +27,13 @@ def _knock(stack: LockstepStack) -> None:
 def test_a_cup_that_nobody_takes_is_kept(coarse_at_table: LockstepStack) -> None:
     stack = coarse_at_table
     assert stack.say("pick up the red cup")["success"]
+    person = stack.lockstep.twin.person
+    person.take(CUP)  # which nobody has offered
+    assert stack.lockstep.run_until(lambda: person.pulls_at is None, 6.0)
+    assert person.document()["told"] == "the robot did not let go of the red_cup within 5 s"
+    assert stack.status()["state"] == "stopped", "so hard a pull is a collision"
+    stack.insist("reset")
+    stack.insist("arm")
     kept = stack.say("hand me the cup")
     assert not kept["success"]
     assert "nobody took the cup" in kept["error"]
@@ -70,8 +60,14 @@ def test_a_cup_is_kept_over_a_restart_of_the_executor_and_until_somebody_pulls_a
     _knock(stack)
     assert stack.outcome(command) is None
     assert CUP in stack.lockstep.truth()["held"]
-    assert _pull(stack, (0.8, -0.6, 0.0))
+    person = stack.lockstep.twin.person
+    person.take(CUP)
+    with pytest.raises(RefereeRefusal, match="pulls at red_cup; wait"):
+        person.take("book")
+    with pytest.raises(RefereeRefusal, match="touches the red_cup; take it first"):
+        person.put(CUP, {"x_m": 2.0, "y_m": 1.6, "z_m": 0.5, "yaw_rad": 0.0})
     assert stack.lockstep.run_until(lambda: stack.outcome(command) is not None, 30.0)
+    assert person.taken == (CUP,)
     outcome = stack.outcome(command)
     assert outcome is not None
     assert outcome["success"], outcome["error"]

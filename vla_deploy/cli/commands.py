@@ -86,6 +86,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "can": CommandEntry("devices.can", "find CAN nodes and watch the traffic"),
     "fault": CommandEntry("devices.fault", "make the twin's devices fail"),
+    "person": CommandEntry("devices.person", "take and put down things in the twin's world"),
     "flight": CommandEntry("recording.flight", "show what the flight recorder saved"),
     "record": CommandEntry(
         "recording.record", "record what the robot does: rolling files, or one of your own"

@@ -35,7 +35,7 @@ def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
     path = run_dir / _SOCKET
     if not has_twin(run_dir):
         raise UsageError(
-            f"this run has no twin ({path} is not there): faults are for the twin alone; "
+            f"this run has no twin ({path} is not there), and this is for the twin alone; "
             "start one: vla-deploy run --twin"
         )
     try:

@@ -23,6 +23,8 @@ REFUSALS = [
     ("status", "no robot runs in "),
     ("shutdown", "no robot runs in "),
     ("fault list", "no robot runs"),
+    ("person take red_cup", "no robot runs"),
+    ("person put red_cup 1 2 far", "argument Z: expected metres from -50 to 50"),
     ("run --seed -1", "vla-deploy run: argument --seed: expected a whole number from 0"),
     ("run --twin --viewer --headless", "argument --headless: not allowed with argument --viewer"),
     ("run --viewer", "add --twin"),

@@ -1,0 +1,151 @@
+"""Be a person in the twin's world: take things, also out of the robot's hands, and put them down.
+
+A thing that a hand holds is pulled at ever harder, away from the robot, until the hand lets go or
+the person gives up; the robot feels it in its joints as it would feel a real pull.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_twin.errors import RefereeRefusal
+from sim_twin.physics.compose import STEP_S
+from sim_twin.physics.engine import Engine
+
+PULL_N_S: Final = 15.0
+MOST_N: Final = 8.0
+"""How fast a person takes a light thing, and how hard."""
+PATIENCE_S: Final = 5.0
+FREE_S: Final = 0.05
+"""The fingers may touch a thing again just after they have opened."""
+AWAY_M: Final = (100.0, 0.0)
+"""Where things are that the person keeps: on the ground, far from every wall."""
+REACH_M: Final = 50.0
+"""The map's bounds: nothing is put further away."""
+
+
+@dataclass(slots=True)
+class _Pull:
+    name: str
+    direction: NDArray[np.float64]
+    for_s: float = 0.0
+    free_s: float = 0.0
+
+
+class WorldPerson:
+    """Take and put down what lies about or what the robot holds; step it before the physics."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._pull: _Pull | None = None
+        self._taken: list[str] = []
+        self._told = ""
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """Return the names of the things that the person has."""
+        return tuple(self._taken)
+
+    @property
+    def pulls_at(self) -> str | None:
+        """Return the name of the thing in the robot's hand that the person pulls at."""
+        return None if self._pull is None else self._pull.name
+
+    def document(self) -> dict[str, Any]:
+        """Return where each thing is, what the person has and pulls at, and why a pull ended."""
+        truth = self._engine.referee.truth()
+        things = {name: one["position_m"] for name, one in truth["objects"].items()}
+        return {
+            "things": {name: at for name, at in things.items() if name not in self._taken},
+            "held_by_robot": truth["held"],
+            "taken": list(self._taken),
+            "pulls_at": self.pulls_at,
+            "told": self._told,
+        }
+
+    def take(self, name: str) -> None:
+        """Take a thing at once, or begin to pull at it where the robot touches it.
+
+        Raises:
+            RefereeRefusal: there is no such thing, or the person has it, or pulls at another.
+        """
+        at_m = self._position_m(name)
+        if name in self._taken:
+            raise RefereeRefusal(f"the person has the {name} already; put it somewhere first")
+        if self._pull is not None:
+            raise RefereeRefusal(f"the person pulls at {self._pull.name}; wait until that ends")
+        self._told = ""
+        robot = self._engine.referee.truth()["robot"]
+        away = np.array([at_m[0] - robot["x_m"], at_m[1] - robot["y_m"], 0.0])
+        self._pull = _Pull(name, away / max(float(np.linalg.norm(away)), 1e-6))
+        if not self._engine.referee.touches_robot(name):
+            self._keep()
+
+    def put(self, name: str, place: Mapping[str, Any]) -> None:
+        """Put a thing down, at rest: `x_m`, `y_m`, `z_m` of its origin in the map, `yaw_rad`.
+
+        Raises:
+            RefereeRefusal: there is no such thing, the place is no place, or the robot holds it.
+        """
+        self._position_m(name)
+        numbers = [place.get(key) for key in ("x_m", "y_m", "z_m", "yaw_rad")]
+        if not all(isinstance(one, int | float) and abs(one) <= REACH_M for one in numbers):
+            raise RefereeRefusal(
+                f"expected x_m, y_m, z_m and yaw_rad within {REACH_M:g}, got {dict(place)}"
+            )
+        if self.pulls_at == name or self._engine.referee.touches_robot(name):
+            raise RefereeRefusal(f"the robot touches the {name}; take it first")
+        self._engine.place(name, *(float(one) for one in numbers if one is not None))
+        self._taken = [one for one in self._taken if one != name]
+
+    def step(self) -> None:
+        """Pull a little harder, keep what has come free, or give up."""
+        if (pull := self._pull) is None:
+            return
+        pull.for_s += STEP_S
+        is_free = not self._engine.referee.touches_robot(pull.name)
+        pull.free_s = pull.free_s + STEP_S if is_free else 0.0
+        if pull.free_s > FREE_S:
+            self._keep()
+        elif pull.for_s > PATIENCE_S:
+            self._let_go(f"the robot did not let go of the {pull.name} within {PATIENCE_S:g} s")
+        else:
+            body = self._engine.model.body(pull.name).id
+            force_n = min(MOST_N, PULL_N_S * pull.for_s)
+            self._engine.data.xfrc_applied[body, :3] = force_n * pull.direction
+
+    def _keep(self) -> None:
+        if (pull := self._pull) is None:
+            return
+        self._let_go("")
+        model = self._engine.model
+        geoms = np.flatnonzero(model.geom_bodyid == model.body(pull.name).id)
+        radius_m = max(
+            float(np.linalg.norm(model.geom_pos[geom]) + model.geom_rbound[geom]) for geom in geoms
+        )
+        row_m = AWAY_M[1] + float(len(self._taken))
+        self._engine.place(pull.name, AWAY_M[0], row_m, radius_m, 0.0)
+        self._taken.append(pull.name)
+
+    def _let_go(self, told: str) -> None:
+        if self._pull is not None:
+            self._engine.data.xfrc_applied[self._engine.model.body(self._pull.name).id] = 0.0
+        self._pull, self._told = None, told
+
+    def _position_m(self, name: str) -> tuple[float, float]:
+        """Return where a thing is.
+
+        Raises:
+            RefereeRefusal: the world has no such thing.
+        """
+        things = self._engine.referee.truth()["objects"]
+        if name not in things:
+            raise RefereeRefusal(f"the world has no thing {name!r}; there are {', '.join(things)}")
+        x_m, y_m, _ = things[name]["position_m"]
+        if not math.isfinite(x_m) or not math.isfinite(y_m):
+            raise RefereeRefusal(f"the {name} is nowhere: the physics has lost it")
+        return float(x_m), float(y_m)
