@@ -18,8 +18,6 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
-from vla_deploy.ipc import RingReader, topics
-from vla_deploy.ipc.payloads.speech import SayCancel, SayOrder
 
 COUNT: Final = 3
 MOST_SHARE: Final = 0.8
@@ -116,11 +114,10 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
 def _documents(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     def play() -> tuple[list[str], dict[str, Any]]:
         with _robot(seed) as stack:
-            said = stack.space.ring_reader(topics.SAY, from_start=True)
             on_table = _on(stack, TABLE) - {CUP}
             begun_s = stack.lockstep.now_s
             command_id = stack.give(text=DOCUMENTS)
-            failures = [] if _takes_what_is_offered(stack, said, command_id) else ["no offer"]
+            failures = [] if _takes_what_is_offered(stack, command_id) else ["no offer"]
             ending = _end_of(stack, command_id, begun_s)
             failures += ending.failures
             if ending.truth["held"]:
@@ -134,20 +131,16 @@ def _documents(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     return play
 
 
-def _takes_what_is_offered(
-    stack: LockstepStack, said: RingReader[SayOrder | SayCancel], command_id: str
-) -> bool:
+def _takes_what_is_offered(stack: LockstepStack, command_id: str) -> bool:
     """Run until the robot offers the cup, take it, and return whether there was an offer."""
 
     def is_offered() -> bool:
-        orders = (one.payload for one in said.drain())
-        return any("text" in order and OFFER in order["text"] for order in orders)
+        return any(one["event"] == "said" and OFFER in one["text"] for one in stack.events)
 
-    def is_over() -> bool:
-        return stack.outcome(command_id) is not None or is_offered()
-
-    stack.lockstep.run_until(is_over, _LIMIT_S)
-    if stack.outcome(command_id) is not None:
+    stack.lockstep.run_until(
+        lambda: stack.outcome(command_id) is not None or is_offered(), _LIMIT_S
+    )
+    if not is_offered():
         return False
     stack.lockstep.twin.person.take(CUP)
     return True

@@ -152,7 +152,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         devices_command=_DEVICES,
         ready_topic="joint_state",
         ready_files=("ready/control",),
-        stop_timeout_s=12.0,  # it ramps down, and lowers the arms where power is switched off
+        stop_timeout_s=14.0,  # it ramps down, and lowers the arms where power is switched off
         watched=(
             Watched(topic="control_status", silence_limit_s=5.0),
             Watched(topic="joint_state", profile_rate="control_rate_hz"),

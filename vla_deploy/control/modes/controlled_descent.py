@@ -10,8 +10,8 @@ from vla_deploy.control.output.joint_output import JointOutput
 from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.robots import RobotDescription
 
-LOWERING_S: Final = 5.0
-"""After this, power goes wherever the arms are."""
+LOWERING_S: Final = 8.0
+"""After this, power goes wherever the arms are; from over a table the way down takes five."""
 
 # Of a joint's top speed: slow enough to step aside, and to knock nothing over.
 _RATE_RATIO: Final = 0.3
