@@ -21,7 +21,7 @@ _PULL_RATIOS: Final = (0.02, 0.06)
 # Of the weight: what a motor leaves to gravity at most. It never presses on what the arm meets.
 _GIVEN_RATIO: Final = 0.9
 _STANDS_RAD: Final = 0.02  # less than this, within that time, is no way down
-_STANDS_FOR_S: Final = 0.3
+_STANDS_FOR_S: Final = 0.6
 
 
 class Lowering:
