@@ -1,6 +1,7 @@
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +18,7 @@ def make_stack(tmp_path: Path) -> Iterator[Callable[..., LockstepStack]]:
     """Build whole robots in the flat with a seed, and a robot file or profile if one is named."""
     built: list[LockstepStack] = []
 
-    def make(seed: int = 0, **chosen: str) -> LockstepStack:
+    def make(seed: int = 0, **chosen: Any) -> LockstepStack:
         run_dir = tmp_path / f"run{len(built)}"
         run_dir.mkdir()
         built.append(LockstepStack(run_dir, seed=seed, **chosen))
@@ -47,7 +48,7 @@ def coarse_stack(make_stack: Callable[..., LockstepStack], coarse: str) -> Locks
 @pytest.fixture
 def make_stack_at_table(
     make_stack: Callable[..., LockstepStack], tmp_path: Path
-) -> Callable[[str], LockstepStack]:
+) -> Callable[..., LockstepStack]:
     """Switch the robot on before a table with the red cup and the box on it, and arm it.
 
     It knows where it stands and has still to see the things: only the drive there is left out.
@@ -59,8 +60,8 @@ def make_stack_at_table(
     moved = text.replace(START, 'start = "coffee_table"')
     (robot_dir / ROBOT_FILE).write_text(moved, encoding="utf-8")
 
-    def make(profile: str) -> LockstepStack:
-        made = make_stack(robot=str(robot_dir), profile=profile)
+    def make(profile: str, **chosen: Any) -> LockstepStack:
+        made = make_stack(robot=str(robot_dir), profile=profile, **chosen)
         engine = made.lockstep.twin.engine
         engine.pose(made.robot.poses["tuck"])
         engine.place("red_cup", *CUP_ON_THE_TABLE)
@@ -73,7 +74,7 @@ def make_stack_at_table(
 
 @pytest.fixture
 def coarse_at_table(
-    make_stack_at_table: Callable[[str], LockstepStack], coarse: str
+    make_stack_at_table: Callable[..., LockstepStack], coarse: str
 ) -> LockstepStack:
     """The robot before the table, in fewer ticks."""
     return make_stack_at_table(coarse)

@@ -50,15 +50,18 @@ def hand_over(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from settle(context, arm_joints(context, hand))
     alone = _efforts(context, hand)
     here = "Here you are" if kind == ANY_CLASS else f"Here is the {kind}"
-    yield from speak(context, {"text": f"{here}. Pull a little, and I let go."})
-    yield from _taken(context, hand, kind, alone)
+    talk = speak(context, {"text": f"{here}. Pull a little, and I let go."})
+    yield from _taken(context, hand, kind, alone, talk)
     yield from open_gripper(context, {"arm": hand})
     context.tell(arm=hand, **{"class": kind})
+    yield from talk
     yield from pause(context, AWAY_S)
 
 
-def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill:
-    """Wait until somebody pulls at what a hand holds, or has it already.
+def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts, talk: Skill) -> Skill:
+    """Talk, and wait until somebody pulls at what a hand holds, or has it already.
+
+    Who stands there waiting pulls at the first word.
 
     Raises:
         NotPossible: nobody does.
@@ -66,6 +69,7 @@ def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill
     end_ns = context.link.working_ns() + round(PATIENCE_S * NS_PER_S)
 
     def is_over() -> bool:
+        next(talk, None)
         return _is_gone(context, hand) or _is_pulled(context, hand, alone)
 
     while (left_s := (end_ns - context.link.working_ns()) / NS_PER_S) > 0.0:
