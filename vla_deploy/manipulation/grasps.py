@@ -44,6 +44,9 @@ GRASP_RULES: Mapping[str, GraspRule] = MappingProxyType(
 TIP_BEYOND_GRIP_M = 0.012
 SUPPORT_CLEARANCE_M = 0.006
 OPENING_MARGIN_M = 0.02
+SIZE_DOUBT_M = 0.02
+"""A thing is seen that much too wide at times (a book of 65 mm as 86): from close by it is judged
+anew, and until then only what is wider is refused."""
 ROUND_YAWS = 16
 
 
@@ -57,6 +60,24 @@ class Grasp:
     opening_m: float
     effort_ratio: float
     below_grip_m: float
+
+
+def require_fit(
+    kind: str, size_m: tuple[float, float, float], opening_max_m: float, doubt_m: float = 0.0
+) -> float:
+    """Return how wide an object is between the fingers.
+
+    Raises:
+        TooWide: it is wider than they open, by more than `doubt_m`.
+    """
+    rule = GRASP_RULES.get(kind, GRASP_RULES["object"])
+    width_m = max(size_m[:2]) if rule.round else min(size_m[:2])
+    if width_m + 0.5 * OPENING_MARGIN_M > opening_max_m + doubt_m:
+        raise TooWide(
+            f"the {kind} is {width_m * 1000:.0f} mm wide where the fingers would take it; "
+            f"they open {opening_max_m * 1000:.0f} mm"
+        )
+    return width_m
 
 
 def grasps_from_above(
@@ -75,12 +96,7 @@ def grasps_from_above(
     """
     rule = GRASP_RULES.get(kind, GRASP_RULES["object"])
     length_m, across_m, height_m = size_m
-    width_m = max(length_m, across_m) if rule.round else min(length_m, across_m)
-    if width_m + 0.5 * OPENING_MARGIN_M > opening_max_m:
-        raise TooWide(
-            f"the {kind} is {width_m * 1000:.0f} mm wide where the fingers would take it; "
-            f"they open {opening_max_m * 1000:.0f} mm"
-        )
+    width_m = require_fit(kind, size_m, opening_max_m)
     depth_m = min(rule.depth_ratio * height_m, rule.depth_max_m)
     lowest_m = TIP_BEYOND_GRIP_M + SUPPORT_CLEARANCE_M
     above_bottom_m = max(height_m - depth_m, lowest_m)

@@ -27,10 +27,10 @@ _NEIGHBOURS = tuple(
 
 
 def clearance_of(grid: GridMap) -> NDArray[np.float32]:
-    """Return each cell's distance in metres to the nearest cell that is not free."""
-    free = (~grid.blocked).astype(np.uint8)
+    """Return each cell's distance in metres to the nearest cell that is not free, or not mapped."""
+    free = np.pad((~grid.blocked).astype(np.uint8), 1)  # nobody knows what is off the map
     cells: NDArray[np.float32] = cv2.distanceTransform(free, cv2.DIST_L2, 5).astype(np.float32)
-    return cells * np.float32(grid.resolution_m)
+    return cells[1:-1, 1:-1] * np.float32(grid.resolution_m)
 
 
 class PathPlanner:

@@ -47,7 +47,8 @@ class SkillContext:
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
     robot, where the robot file names any. `keeps_out` are the places that the plan may not enter,
-    `devices` those of the home that are switched.
+    `devices` those of the home that are switched. `out_of_reach` are the things that the base found
+    no place to take them from, by id, with when that was, ns.
     """
 
     robot: RobotDescription
@@ -67,6 +68,7 @@ class SkillContext:
     keeps_out: frozenset[str] = frozenset()
     devices: HomeDevices | None = None
     needs: dict[str, Mapping[str, int]] = field(default_factory=dict)
+    out_of_reach: dict[str, int] = field(default_factory=dict)
 
     def keep_only(self, hand: str) -> None:
         """Leave all but the base and one arm, with its hand, to others for a phase of the action.

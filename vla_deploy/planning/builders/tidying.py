@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
+from vla_deploy.manipulation.errors import TooWide
+from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, require_fit
 from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
@@ -24,7 +26,7 @@ REACH_M: Final = 1.0
 def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
     """Put away what lies on a piece of furniture, or everywhere; look first where none is known.
 
-    What fits the words of "except" stays.
+    What fits the words of "except" stays, and so does what no hand can take, which is said.
     """
     lying = _lying(fields.get("where", ""), request)
     if "except" in fields:
@@ -34,17 +36,35 @@ def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
     if not lying:
         said = "I know of nothing there to put away. I look around."
         return [("speak", {"text": said}), *look_around(fields.get("where"))]
+    wide = [one for one in lying if _is_too_wide(one, request)]
+    narrow = [one for one in lying if one not in wide]
     where = {"destination": STORE, "relation": "in"}
     steps: list[Skill] = [
-        ("place", {"object": one.thing_id, **where}) for one in lying[:MOST_THINGS]
+        ("place", {"object": one.thing_id, **where}) for one in narrow[:MOST_THINGS]
     ]
-    left = len(lying) - MOST_THINGS
-    said = f"{left} more things are left; tell me again." if left > 0 else "That is put away."
-    return [*steps, ("speak", {"text": said})]
+    left = len(narrow) - MOST_THINGS
+    kinds = ", ".join(one.kind for one in wide)
+    told = (
+        "That is put away." if narrow and left <= 0 else "",
+        f"{left} more things are left; tell me again." if left > 0 else "",
+        f"What is too wide for my hands stays: {kinds}." if wide else "",
+    )
+    return [*steps, ("speak", {"text": " ".join(filter(None, told))})]
+
+
+def _is_too_wide(thing: Thing, request: PlanRequest) -> bool:
+    opening_m = request.world.opening_max_m
+    if opening_m is None:
+        return False
+    try:
+        require_fit(thing.kind, thing.size_m, opening_m, SIZE_DOUBT_M)
+    except TooWide:
+        return True
+    return False
 
 
 def _lying(place: str, request: PlanRequest) -> list[Thing]:
-    """Return what can be put away: not what is in a box already, nor what a hand cannot take.
+    """Return what may be put away: not what is in a box already, nor of a kind that stays.
 
     Raises:
         UnknownPlace: the place is none that the robot knows.

@@ -15,7 +15,14 @@ from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.movements.carrying import carry
 from vla_deploy.skills.movements.drive import drive_to
 from vla_deploy.skills.movements.frames import to_base
-from vla_deploy.skills.movements.gaze import DRIVING_GAZE, gaze_at, remembered, turn_head, watch_for
+from vla_deploy.skills.movements.gaze import (
+    DRIVING_GAZE,
+    gaze_at,
+    is_out_of_reach,
+    remembered,
+    turn_head,
+    watch_for,
+)
 from vla_deploy.world import Query
 from vla_deploy.world.surfaces import FURNITURE_AHEAD_M
 
@@ -131,4 +138,9 @@ def _left_out(context: SkillContext) -> str:
 def _nowhere(context: SkillContext, query: Query) -> str:
     seen = sorted({f"{one['colour']} {one['class']}" for one in context.link.objects})
     left_out = f", and left out the {_left_out(context)}" if context.keeps_out else ""
-    return f"I cannot find a {query}; I have seen: {', '.join(seen) or 'nothing'}{left_out}"
+    known = {one["id"] for one in context.link.objects if one["class"] == query.kind}
+    shut = any(is_out_of_reach(context, one) for one in known)
+    other = "another" if shut else "a"
+    beyond = ", and one is out of my reach" if shut else ""
+    told = f"I cannot find {other} {query}{beyond}; I have seen: "
+    return f"{told}{', '.join(seen) or 'nothing'}{left_out}"

@@ -82,6 +82,7 @@ def reach(
             continue
         return
     why = reasons[0] if reasons else "walls or furniture stand around it"
+    context.out_of_reach[known["id"]] = context.link.clock.now_ns()
     raise NotPossible(f"I cannot get within reach of the {query}: {why}")
 
 

@@ -32,6 +32,8 @@ WATCH_TIMEOUT_S = 2.0
 CONFIRMED_S = 0.4
 MEMORY_S = 600.0
 SURE_CONFIDENCE = 0.3
+OUT_OF_REACH_S = 120.0
+"""So long another one is looked for: what nobody can get at may be no thing at all."""
 
 
 def look_at(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -66,7 +68,10 @@ def gaze_at(context: SkillContext, position_m: Any) -> Skill:
 
 
 def remembered(context: SkillContext, query: Query) -> Mapping[str, Any] | None:
-    """Return the nearest object meant that was seen surely and within MEMORY_S, or None."""
+    """Return the nearest object meant that was seen surely and within MEMORY_S, or None.
+
+    What has just proved to be out of reach counts only where it is meant by its id.
+    """
     now_ns = context.link.clock.now_ns()
     objects = context.link.objects
     if not objects:
@@ -75,9 +80,19 @@ def remembered(context: SkillContext, query: Query) -> Mapping[str, Any] | None:
     pose = context.link.pose
     here = Viewpoint(x_m=pose.x_m, y_m=pose.y_m, yaw_rad=pose.yaw_rad)
     for thing in query.among(snapshot, here):
+        if not query.thing_id and is_out_of_reach(context, thing.thing_id):
+            continue
         if thing.confidence >= SURE_CONFIDENCE and snapshot.unseen_s(thing) <= MEMORY_S:
             return next(one for one in objects if one["id"] == thing.thing_id)
     return None
+
+
+def is_out_of_reach(context: SkillContext, thing_id: str) -> bool:
+    """Return whether no place was found, a short while ago, from which to take a thing."""
+    since_ns = context.out_of_reach.get(thing_id)
+    return (
+        since_ns is not None and context.link.clock.now_ns() - since_ns < OUT_OF_REACH_S * NS_PER_S
+    )
 
 
 def kept_in_sight(context: SkillContext, query: Query) -> Mapping[str, Any]:

@@ -1,6 +1,7 @@
 """Steps become actions in the speaker's words; what cannot be done says so."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -79,6 +80,19 @@ def test_what_is_excepted_from_tidying_stays(scene: Snapshot) -> None:
     request = PlanRequest(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
     found = planned(command, {"do": "tidy", "except": "red cup"}, request=request)
     assert [given.get("object") for skill, given in found if skill == "place"] == ["cup_2"]
+
+
+def test_what_is_too_wide_for_any_hand_stays_and_is_told(scene: Snapshot) -> None:
+    wide = replace(scene.things[0], thing_id="bowl_1", kind="bowl", size_m=(0.14, 0.14, 0.06))
+    for things, places, said in (
+        ((*scene.things, wide), ["cup_1", "cup_2"], "That is put away. "),
+        ((wide,), [], ""),
+    ):
+        known = replace(scene, things=things)
+        request = PlanRequest(command_id="c", text="tidy up", world=WORLD, here=HERE, scene=known)
+        *puts, (_, spoken) = planned("tidy up", {"do": "tidy"}, request=request)
+        assert [given["object"] for _, given in puts] == places
+        assert spoken == {"text": f"{said}What is too wide for my hands stays: bowl."}
 
 
 def test_back_is_where_the_command_before_was_told() -> None:
