@@ -6,15 +6,18 @@ paused/PHASE        the main job paused for 5 s in one of its phases, against th
 """
 
 import argparse
+import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
@@ -35,6 +38,8 @@ OFFER: Final = "Pull a little"
 MAIN_JOB: Final = "pick up the red cup and put it in the box"
 PHASES: Final = ("find_object", "navigate_to", "pick_up", "place")
 _LIMIT_S: Final = 400.0
+_Played = tuple[list[str], dict[str, Any]]
+"""What was wrong, and figures."""
 
 
 def _of_arm(name: str, arm: str, *skills: str) -> dict[str, Any]:
@@ -63,12 +68,6 @@ EIGHT: Final[tuple[dict[str, Any], ...]] = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Case:
-    name: str
-    play: Callable[[], tuple[list[str], dict[str, Any]]]
-
-
 @dataclass(slots=True, kw_only=True)
 class _Ending:
     """Hold how a command ended, how long it took, and what the physics knows then."""
@@ -86,49 +85,53 @@ class _Ending:
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
-    """Play every case; `options.count` seeds, 3 unless given."""
+    """Play every case, several at a time; `options.count` seeds, 3 unless given."""
     seeds = range(options.seed, options.seed + (COUNT if options.count is None else options.count))
-    cases = [_Case(name=f"documents/{seed}", play=_documents(seed)) for seed in seeds]
-    cases += [_Case(name=f"side_by_side/{seed}", play=_side_by_side(seed)) for seed in seeds]
-    cases += [_Case(name=f"paused/{one}", play=_paused(one, options.seed)) for one in PHASES]
-    clock, played = MonotonicClock(), []
-    for case in chosen(cases, options.only, lambda one: one.name):
-        begun_ns = clock.now_ns()
-        failures, figures = case.play()
-        played.append(
-            told(
-                CampaignCase(
-                    name=case.name,
-                    failures=tuple(failures),
-                    figures=figures,
-                    seconds=(clock.now_ns() - begun_ns) / NS_PER_S,
-                ),
-                tell,
-            )
-        )
+    names = [f"documents/{seed}" for seed in seeds]
+    names += [f"side_by_side/{seed}" for seed in seeds]
+    names += [f"paused/{phase}" for phase in PHASES]
+    mine = chosen(names, options.only, str)
+    with multiprocessing.get_context("spawn").Pool(
+        options.workers, initializer=end_on_sigterm, maxtasksperchild=1
+    ) as pool:
+        cases = pool.imap(partial(play, seed=options.seed), mine)
+        played = tuple(told(case, tell) for case in cases)
     shares = [one.figures["share"] for one in played if "share" in one.figures]
     summary = {"longest share of the time one after the other": max(shares)} if shares else {}
-    return CampaignReport(campaign="missions", cases=tuple(played), summary=summary)
+    return CampaignReport(campaign="missions", cases=played, summary=summary)
 
 
-def _documents(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
-    def play() -> tuple[list[str], dict[str, Any]]:
-        with _robot(seed) as stack:
-            on_table = _on(stack, TABLE) - {CUP}
-            begun_s = stack.lockstep.now_s
-            command_id = stack.give(text=DOCUMENTS)
-            failures = [] if _takes_what_is_offered(stack, command_id) else ["no offer"]
-            ending = _end_of(stack, command_id, begun_s)
-            failures += ending.failures
-            if ending.truth["held"]:
-                failures.append(f"still held: {', '.join(ending.truth['held'])}")
-            if stack.lockstep.twin.person.taken != (CUP,):
-                failures.append("the person has not got the red cup")
-            if left := on_table & _on(stack, TABLE):
-                failures.append(f"still on the cleaned table: {', '.join(sorted(left))}")
-            return failures, {"took_s": ending.took_s} | _counts(ending)
+def play(name: str, seed: int) -> CampaignCase:
+    """Play the case of that name; `seed` is that of the paused jobs."""
+    kind, _, which = name.partition("/")
+    clock = MonotonicClock()
+    begun_ns = clock.now_ns()
+    match kind:
+        case "documents":
+            failures, figures = _documents(int(which))
+        case "side_by_side":
+            failures, figures = _side_by_side(int(which))
+        case _:
+            failures, figures = _paused(which, seed)
+    seconds = (clock.now_ns() - begun_ns) / NS_PER_S
+    return CampaignCase(name=name, failures=tuple(failures), figures=figures, seconds=seconds)
 
-    return play
+
+def _documents(seed: int) -> _Played:
+    with _robot(seed) as stack:
+        on_table = _on(stack, TABLE) - {CUP}
+        begun_s = stack.lockstep.now_s
+        command_id = stack.give(text=DOCUMENTS)
+        failures = [] if _takes_what_is_offered(stack, command_id) else ["no offer"]
+        ending = _end_of(stack, command_id, begun_s)
+        failures += ending.failures
+        if ending.truth["held"]:
+            failures.append(f"still held: {', '.join(ending.truth['held'])}")
+        if stack.lockstep.twin.person.taken != (CUP,):
+            failures.append("the person has not got the red cup")
+        if left := on_table & _on(stack, TABLE):
+            failures.append(f"still on the cleaned table: {', '.join(sorted(left))}")
+        return failures, {"took_s": ending.took_s} | _counts(ending)
 
 
 def _takes_what_is_offered(stack: LockstepStack, command_id: str) -> bool:
@@ -158,56 +161,50 @@ def _on(stack: LockstepStack, furniture: str) -> set[str]:
     }
 
 
-def _side_by_side(seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
-    def play() -> tuple[list[str], dict[str, Any]]:
-        endings = []
-        for objectives in (list(EIGHT), one_after_another()):
-            with _robot(seed) as stack:
-                endings.append(_carried_out(stack, mission={"objectives": objectives}))
-        beside, after = endings
-        share = beside.took_s / after.took_s
-        failures = [*beside.failures, *after.failures]
-        if share > MOST_SHARE:
-            failures.append(f"took {share:.2f} of the time one after the other")
-        apart_rad = max(
-            abs(joint["position"] - after.truth["joints"][name]["position"])
-            for name, joint in beside.truth["joints"].items()
-        )
-        if apart_rad > MOST_APART_M:
-            failures.append(f"a joint ended {apart_rad:.3f} rad elsewhere")
-        figures = {"beside_s": beside.took_s, "after_s": after.took_s, "share": share}
-        return failures, figures | {"apart_rad": apart_rad}
-
-    return play
-
-
-def _paused(phase: str, seed: int) -> Callable[[], tuple[list[str], dict[str, Any]]]:
-    def play() -> tuple[list[str], dict[str, Any]]:
+def _side_by_side(seed: int) -> _Played:
+    endings = []
+    for objectives in (list(EIGHT), one_after_another()):
         with _robot(seed) as stack:
-            plain = _carried_out(stack, text=MAIN_JOB)
-            plain.inside = stack.lockstep.inside("red_cup", "box")
-        with _robot(seed) as stack:
-            failures: list[str] = []
-            command_id = stack.give(text=MAIN_JOB)
-            begun_s = stack.lockstep.now_s
-            if not stack.lockstep.run_until(lambda: _is_in(stack, command_id, phase), _LIMIT_S):
-                return [f"{phase} never began"], {}
-            stack.lockstep.run_for(1.0)
-            moved_rad = _pause(stack)
-            if moved_rad > REST_RAD_S:
-                failures.append(f"a joint moved by {moved_rad:.3f} rad in the pause")
-            ending = _end_of(stack, command_id, begun_s)
-            inside = stack.lockstep.inside("red_cup", "box")
-        failures += [*plain.failures, *ending.failures]
-        if not inside["inside"]:
-            failures.append("the red cup is not in the box")
-        apart_m = abs(inside["placement_error_m"] - plain.inside["placement_error_m"])
-        if apart_m > MOST_APART_M:
-            failures.append(f"placed {1000 * apart_m:.0f} mm from where it was without a pause")
-        figures = {"plain_s": plain.took_s, "paused_s": ending.took_s, "apart_m": apart_m}
-        return failures, figures | {"moved_rad": moved_rad}
+            endings.append(_carried_out(stack, mission={"objectives": objectives}))
+    beside, after = endings
+    share = beside.took_s / after.took_s
+    failures = [*beside.failures, *after.failures]
+    if share > MOST_SHARE:
+        failures.append(f"took {share:.2f} of the time one after the other")
+    apart_rad = max(
+        abs(joint["position"] - after.truth["joints"][name]["position"])
+        for name, joint in beside.truth["joints"].items()
+    )
+    if apart_rad > MOST_APART_M:
+        failures.append(f"a joint ended {apart_rad:.3f} rad elsewhere")
+    figures = {"beside_s": beside.took_s, "after_s": after.took_s, "share": share}
+    return failures, figures | {"apart_rad": apart_rad}
 
-    return play
+
+def _paused(phase: str, seed: int) -> _Played:
+    with _robot(seed) as stack:
+        plain = _carried_out(stack, text=MAIN_JOB)
+        plain.inside = stack.lockstep.inside("red_cup", "box")
+    with _robot(seed) as stack:
+        failures: list[str] = []
+        command_id = stack.give(text=MAIN_JOB)
+        begun_s = stack.lockstep.now_s
+        if not stack.lockstep.run_until(lambda: _is_in(stack, command_id, phase), _LIMIT_S):
+            return [f"{phase} never began"], {}
+        stack.lockstep.run_for(1.0)
+        moved_rad = _pause(stack)
+        if moved_rad > REST_RAD_S:
+            failures.append(f"a joint moved by {moved_rad:.3f} rad in the pause")
+        ending = _end_of(stack, command_id, begun_s)
+        inside = stack.lockstep.inside("red_cup", "box")
+    failures += [*plain.failures, *ending.failures]
+    if not inside["inside"]:
+        failures.append("the red cup is not in the box")
+    apart_m = abs(inside["placement_error_m"] - plain.inside["placement_error_m"])
+    if apart_m > MOST_APART_M:
+        failures.append(f"placed {1000 * apart_m:.0f} mm from where it was without a pause")
+    figures = {"plain_s": plain.took_s, "paused_s": ending.took_s, "apart_m": apart_m}
+    return failures, figures | {"moved_rad": moved_rad}
 
 
 def _pause(stack: LockstepStack) -> float:
