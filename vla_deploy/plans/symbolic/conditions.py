@@ -136,11 +136,9 @@ def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
     except TooWide as error:
         return str(error)
     widest_m = opening_m + SIZE_DOUBT_M
-    grasp = grasps_from_above(thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, widest_m)[
-        0
-    ]
+    grasps = grasps_from_above(thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, widest_m)
     low_m, high_m = GRIP_HEIGHTS_M
-    height_m = grasp.point_m[2]
+    height_m = grasps[0].point_m[2]
     if low_m <= height_m <= high_m:
         return MET
     return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
