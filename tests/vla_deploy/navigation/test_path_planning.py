@@ -96,3 +96,13 @@ def test_room_is_the_distance_to_what_blocks_and_none_off_the_map() -> None:
     assert planner.room_m(4.05, 2.45) == pytest.approx(1.1, abs=0.06)
     assert planner.room_m(2.45, 2.45) == 0.0
     assert planner.room_m(-1.0, 2.0) == 0.0
+
+
+def test_a_body_does_not_fit_where_it_would_stand_over_the_rim_of_the_map() -> None:
+    open_field = GridMap(
+        resolution_m=0.1, origin_m=(0.0, 0.0), blocked=np.zeros((60, 60), dtype=bool)
+    )
+    planner = PathPlanner(open_field, RADIUS_M)
+    assert planner.is_free(3.0, 3.0)
+    assert not planner.is_free(0.05, 3.0)
+    assert not planner.is_free(3.0, 5.95)
