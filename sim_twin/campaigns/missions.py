@@ -96,6 +96,8 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     ) as pool:
         cases = pool.imap(partial(play, seed=options.seed), mine)
         played = tuple(told(case, tell) for case in cases)
+        pool.close()
+        pool.join()  # to leave the block would end them as they close their OpenGL
     shares = [one.figures["share"] for one in played if "share" in one.figures]
     summary = {"longest share of the time one after the other": max(shares)} if shares else {}
     return CampaignReport(campaign="missions", cases=played, summary=summary)
