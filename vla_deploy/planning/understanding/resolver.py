@@ -125,9 +125,11 @@ class Resolver:
         self, read: Expression, thing: Thing, use: ThingUse, why: str, by_id: bool = False
     ) -> Referent:
         """Return what is in the scene: by its words where they will find it later, too."""
-        held = [one for one in self.context.scene.things if one.held_by]
-        fits_held = use is ThingUse.TAKE and any(map(read.query.fits, held))
-        name = thing.thing_id if by_id or _needs_id(read) or fits_held else str(read.query)
+        others = [one for one in self.context.scene.things if one.thing_id != thing.thing_id]
+        if use is ThingUse.TAKE:
+            others = [one for one in others if one.held_by]
+        is_one_of = use in (ThingUse.TAKE, ThingUse.ONTO) and any(map(read.query.fits, others))
+        name = thing.thing_id if by_id or _needs_id(read) or is_one_of else str(read.query)
         self._remember(Mention.of(thing, read.said), use, f"{thing.thing_id} ({thing})", why)
         return Referent(name=name, kind=thing.kind, thing=thing)
 

@@ -237,3 +237,14 @@ def test_any_plan_is_refused_by_name_or_grounded_and_then_judged(
         return
     with suppress(PlanInvalid):
         check_plan(found, request.world, request.scene, request.here)
+
+
+def test_a_box_that_nobody_can_get_at_is_not_the_one_to_put_into(home: "Home") -> None:
+    in_the_wall = replace(home.things["box_1"], thing_id="box_9", position_m=(-3.0, -3.0, 1.18))
+    world = replace(home.world, is_free=lambda x_m, y_m: x_m > 0.0 and y_m > 0.0)
+    put = ("place", {"object": "red cup", "destination": "the box", "relation": "in"})
+    for boxes, name in (((in_the_wall, "box_1"), "box_1"), ((in_the_wall,), "box")):
+        found = steps_of(grounded(home, put, scene=("cup_1", *boxes), world=world))
+        assert ("place", {"destination": name, "relation": "in"}) in found, found
+        looks = ("find_object", {"object": name}) in found
+        assert looks, found
