@@ -10,7 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
+from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.floor_pose import Pose2D
@@ -83,6 +85,15 @@ class StandingLink:
     positions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     efforts: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     is_silent: bool = False
+    place_state: PlaceState = PlaceState.TRACKING
+
+    def working_ns(self) -> int:
+        """Return the time that pauses do not count in."""
+        return self.clock.now_ns()
+
+    def drive(self, twist: Twist) -> None:
+        """Take an order to the base, which stays where it is."""
+        assert twist == AT_REST
 
     def snapshot(self) -> Snapshot | None:
         """Return what it has seen as values, None while perception tells nothing."""

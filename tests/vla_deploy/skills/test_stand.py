@@ -1,6 +1,9 @@
 import math
 from typing import TYPE_CHECKING
 
+from vla_deploy.plans.knowledge import parse_object
+from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.skills.actions.navigate import reach
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.stand import SIDE_M, standing_poses
@@ -41,6 +44,17 @@ def test_the_robot_stays_where_it_already_reaches(
     standing.pose = standing_poses(context, ON_TABLE_M)[0]
     assert standing_poses(context, ON_TABLE_M) == [standing.pose]
     assert len(standing_poses(context, ON_TABLE_M, anew=True)) > 1
+
+
+def test_it_stays_also_where_it_would_not_be_sent(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.pose = Pose2D(x_m=3.0, y_m=1.44, yaw_rad=-math.pi / 2)
+    assert not context.planner.is_free(standing.pose.x_m, standing.pose.y_m)
+    box = {"id": "box_1", "class": "box", "colour": "red", "position_m": [*ON_TABLE_M]}
+    standing.objects = [box | {"last_seen_ns": context.link.clock.now_ns(), "confidence": 0.9}]
+    assert list(reach(context, parse_object("box"))) == []
+    assert context.out_of_reach == {}
 
 
 def test_an_object_beyond_the_walls_has_no_pose(context: SkillContext) -> None:
