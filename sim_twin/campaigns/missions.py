@@ -6,7 +6,6 @@ paused/PHASE        the main job paused for 5 s in one of its phases, against th
 """
 
 import argparse
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,8 +16,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.campaigns.orderly_end import end_on_sigterm
-from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.processes import played
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 
@@ -91,16 +90,10 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     names += [f"side_by_side/{seed}" for seed in seeds]
     names += [f"paused/{phase}" for phase in PHASES]
     mine = chosen(names, options.only, str)
-    with multiprocessing.get_context("spawn").Pool(
-        options.workers, initializer=end_on_sigterm, maxtasksperchild=1
-    ) as pool:
-        cases = pool.imap(partial(play, seed=options.seed), mine)
-        played = tuple(told(case, tell) for case in cases)
-        pool.close()
-        pool.join()  # to leave the block would end them as they close their OpenGL
-    shares = [one.figures["share"] for one in played if "share" in one.figures]
+    cases = played(partial(play, seed=options.seed), mine, options.workers, tell, 1)
+    shares = [one.figures["share"] for one in cases if "share" in one.figures]
     summary = {"longest share of the time one after the other": max(shares)} if shares else {}
-    return CampaignReport(campaign="missions", cases=played, summary=summary)
+    return CampaignReport(campaign="missions", cases=cases, summary=summary)
 
 
 def play(name: str, seed: int) -> CampaignCase:
@@ -138,14 +131,10 @@ def _documents(seed: int) -> _Played:
 
 def _takes_what_is_offered(stack: LockstepStack, command_id: str) -> bool:
     """Run until the robot offers the cup, take it, and return whether there was an offer."""
-
-    def is_offered() -> bool:
-        return any(one["event"] == "said" and OFFER in one["text"] for one in stack.events)
-
     stack.lockstep.run_until(
-        lambda: stack.outcome(command_id) is not None or is_offered(), _LIMIT_S
+        lambda: stack.outcome(command_id) is not None or stack.has_said(OFFER), _LIMIT_S
     )
-    if not is_offered():
+    if not stack.has_said(OFFER):
         return False
     stack.lockstep.twin.person.take(CUP)
     return True

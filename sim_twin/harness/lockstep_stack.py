@@ -258,6 +258,10 @@ class LockstepStack(LockstepControl):
                 self._outcomes.setdefault(event.payload["command_id"], {**event.payload})
         return self._outcomes.get(command_id)
 
+    def has_said(self, words: str) -> bool:
+        """Return whether a skill has said something with these words in it."""
+        return any(one["event"] == "said" and words in one["text"] for one in self.events)
+
     def say(self, text: str, timeout_s: float = COMMAND_TIMEOUT_S) -> dict[str, Any]:
         """Give a command and run until it has ended.
 

@@ -73,13 +73,13 @@ class WorldPerson:
         Raises:
             RefereeRefusal: there is no such thing, or the person has it, or pulls at another.
         """
-        at_m = self._position_m(name)
+        truth = self._truth_with(name)
         if name in self._taken:
             raise RefereeRefusal(f"the person has the {name} already; put it somewhere first")
         if self._pull is not None:
             raise RefereeRefusal(f"the person pulls at {self._pull.name}; wait until that ends")
         self._told = ""
-        robot = self._engine.referee.truth()["robot"]
+        robot, at_m = truth["robot"], truth["objects"][name]["position_m"]
         away = np.array([at_m[0] - robot["x_m"], at_m[1] - robot["y_m"], 0.0])
         self._pull = _Pull(name, away / max(float(np.linalg.norm(away)), 1e-6))
         if not self._engine.referee.touches_robot(name):
@@ -91,7 +91,7 @@ class WorldPerson:
         Raises:
             RefereeRefusal: there is no such thing, the place is no place, or the robot holds it.
         """
-        self._position_m(name)
+        self._truth_with(name)
         numbers = [place.get(key) for key in ("x_m", "y_m", "z_m", "yaw_rad")]
         if not all(isinstance(one, int | float) and abs(one) <= REACH_M for one in numbers):
             raise RefereeRefusal(
@@ -136,16 +136,16 @@ class WorldPerson:
             self._engine.data.xfrc_applied[self._engine.model.body(self._pull.name).id] = 0.0
         self._pull, self._told = None, told
 
-    def _position_m(self, name: str) -> tuple[float, float]:
-        """Return where a thing is.
+    def _truth_with(self, name: str) -> dict[str, Any]:
+        """Return what the physics knows of the world and of a thing in it.
 
         Raises:
             RefereeRefusal: the world has no such thing.
         """
-        things = self._engine.referee.truth()["objects"]
+        truth = self._engine.referee.truth()
+        things = truth["objects"]
         if name not in things:
             raise RefereeRefusal(f"the world has no thing {name!r}; there are {', '.join(things)}")
-        x_m, y_m, _ = things[name]["position_m"]
-        if not math.isfinite(x_m) or not math.isfinite(y_m):
+        if not all(map(math.isfinite, things[name]["position_m"])):
             raise RefereeRefusal(f"the {name} is nowhere: the physics has lost it")
-        return float(x_m), float(y_m)
+        return truth

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from platforms import load_profile
+from sim_twin.campaigns.missions import OFFER
 from sim_twin.errors import RefereeRefusal
 from sim_twin.harness.lockstep_stack import LockstepStack
 from vla_deploy.skills.node import ExecutorNode
@@ -16,7 +17,7 @@ CUP = "red_cup"
 
 def _offers(stack: LockstepStack, command_id: str) -> bool:
     assert stack.outcome(command_id) is None
-    return any(one["event"] == "said" and "Pull a little" in one["text"] for one in stack.events)
+    return stack.has_said(OFFER)
 
 
 def _knock(stack: LockstepStack) -> None:

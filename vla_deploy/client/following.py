@@ -142,11 +142,8 @@ def lost(command_id: str, why: str, actions: Mapping[str, ActionResult]) -> Task
 
 def is_lost(event: FinishedEvent) -> bool:
     """Return whether `lost` made this event, rather than an action that was lost."""
-    return (
-        not event["success"]
-        and (event["error"] or "").startswith(_LOST)
-        and ((event["error"] or "").endswith(_GIVE_AGAIN))
-    )
+    error = event["error"] or ""
+    return not event["success"] and error.startswith(_LOST) and error.endswith(_GIVE_AGAIN)
 
 
 def _note_action(actions: dict[str, ActionResult], event: TaskEvent) -> None:

@@ -86,17 +86,18 @@ def grasps_from_above(
     size_m: tuple[float, float, float],
     yaw_rad: float,
     opening_max_m: float,
+    doubt_m: float = 0.0,
 ) -> list[Grasp]:
     """Return the grasps of an object in the frame of `centre_m`, the plainest first.
 
     `size_m` is length along `yaw_rad`, width across it, height.
 
     Raises:
-        TooWide: its narrow side is wider than the fingers open.
+        TooWide: its narrow side is wider than the fingers open, by more than `doubt_m`.
     """
     rule = GRASP_RULES.get(kind, GRASP_RULES["object"])
     length_m, across_m, height_m = size_m
-    width_m = require_fit(kind, size_m, opening_max_m)
+    width_m = require_fit(kind, size_m, opening_max_m, doubt_m)
     depth_m = min(rule.depth_ratio * height_m, rule.depth_max_m)
     lowest_m = TIP_BEYOND_GRIP_M + SUPPORT_CLEARANCE_M
     above_bottom_m = max(height_m - depth_m, lowest_m)

@@ -144,7 +144,7 @@ class GraspAccess:
 def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> GraspAccess:
     """Judge one thing; the obstacles are in the order in which one would clear them."""
     grasps, too_wide = _grasps(thing, body)
-    way = _way(thing, snapshot.robot, body)
+    way = grasp_stand(thing, snapshot.robot, body.is_free)
     found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps)]
     found += _in_corridor(thing, grasps, snapshot) if grasps else []
     if way is GraspStand.NONE:
@@ -186,12 +186,13 @@ def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
                        f"hands that point down reach {low_m:g} to {high_m:g} m")  # fmt: skip
 
 
-def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> GraspStand:
+def grasp_stand(thing: Thing, robot: Viewpoint | None, is_free: IsFree | None) -> GraspStand:
+    """Return from where a thing can be taken; without a map, after driving."""
     if robot is not None and is_in_reach(robot.local(thing.position_m)):
         return GraspStand.HERE
-    if body.is_free is None:
+    if is_free is None:
         return GraspStand.AFTER_DRIVING
-    has_stand = next(stands_around(thing.position_m, body.is_free), None) is not None
+    has_stand = next(stands_around(thing.position_m, is_free), None) is not None
     return GraspStand.AFTER_DRIVING if has_stand else GraspStand.NONE
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -16,8 +15,8 @@ import numpy as np
 from sim_twin.campaigns.faulting.phases import PAYLOAD, NotSet, Phase, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.faulting.witness import FaultWitness
-from sim_twin.campaigns.orderly_end import end_on_sigterm
-from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.processes import played
+from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
@@ -215,12 +214,8 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     """Play every case whose name contains `options.only`, several at a time."""
     robot = load_robot("butler")
     mine = chosen(cells(robot), options.only, lambda cell: cell.name)
-    with multiprocessing.get_context("spawn").Pool(
-        options.workers, initializer=end_on_sigterm, maxtasksperchild=20
-    ) as pool:
-        played = pool.imap(partial(play, seed=options.seed), mine)
-        cases = [told(case, tell) for case in played]
-    return CampaignReport(campaign="faults", cases=tuple(cases), summary=_summary(cases))
+    cases = played(partial(play, seed=options.seed), mine, options.workers, tell, 20)
+    return CampaignReport(campaign="faults", cases=cases, summary=_summary(cases))
 
 
 def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:

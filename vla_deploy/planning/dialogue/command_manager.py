@@ -217,23 +217,21 @@ class CommandManager:
         asked = self.dialogue.pending
         if asked is not None and asked.command.command_id == command_id:
             self.dialogue.settle()
-        if self._async.command is not None and self._async.command.command_id == command_id:
-            self._async.call_off()
-        self._unqueue(command_id)
+        self._plan_no_more(command_id)
         self._turns.drop(command_id)
         is_known = self._active.end(command_id) is not None
         if is_known or command_id in (self._situation.executing or ()):
             self._events.cancelled(f"{command_id}-cancel", command_id)
 
-    def _unqueue(self, command_id: str) -> None:
+    def _plan_no_more(self, command_id: str) -> None:
+        if self._async.command is not None and self._async.command.command_id == command_id:
+            self._async.call_off()
         for one in [one for one in self._queue if one.command_id == command_id]:
             self._queue.remove(one)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; what is still planned for it is too late."""
-        if self._async.command is not None and self._async.command.command_id == command_id:
-            self._async.call_off()
-        self._unqueue(command_id)
+        self._plan_no_more(command_id)
         ended = self._active.end(command_id)
         self.dialogue.ended(command_id, success, error)
         if ended is not None and not ended[0].mission:
@@ -324,9 +322,8 @@ class CommandManager:
         if isinstance(found, UserCommand):
             self._queue.appendleft(found)
             return
-        if (
-            _stands_still(found) and self._is_moving and not found.command.mission
-        ):  # nobody needs to be asked about a halt
+        halts = _stands_still(found) and not found.command.mission
+        if halts and self._is_moving:  # nobody needs to be asked about a halt
             self._cancel_all(f"{found.command.command_id}-stops")
         self._settle(found)
 

@@ -13,7 +13,7 @@ from vla_deploy.planning.understanding.expressions import Expression, Scope, rea
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.plans.errors import DependsOnView
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint, find
-from vla_deploy.world.access import is_in_reach, stands_around
+from vla_deploy.world.access import GraspStand, grasp_stand
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.resting import IN
 from vla_deploy.world.vocabulary import ANY_CLASS
@@ -129,7 +129,8 @@ def _suits(thing: Thing, use: ThingUse, query: Query, context: CommandContext) -
     match use:
         case ThingUse.ONTO:
             moved = [one.thing_id for one in context.mentions if one.role is MentionRole.OBJECT]
-            is_meant = bool(query.thing_id) or _can_be_got_at(thing, context)
+            stand = grasp_stand(thing, context.view, context.request.world.is_free)
+            is_meant = bool(query.thing_id) or stand is not GraspStand.NONE
             return not thing.held_by and thing.thing_id not in moved and is_meant
         case ThingUse.TAKE:
             return may_move and (not thing.held_by or bool(query.thing_id))
@@ -137,14 +138,6 @@ def _suits(thing: Thing, use: ThingUse, query: Query, context: CommandContext) -
             return may_move
         case ThingUse.SEE | ThingUse.REACH:
             return True
-
-
-def _can_be_got_at(thing: Thing, context: CommandContext) -> bool:
-    """Return whether the base may stand somewhere so that the arms reach a thing; yes in doubt."""
-    is_free, view = context.request.world.is_free, context.view
-    if is_free is None or (view is not None and is_in_reach(view.local(thing.position_m))):
-        return True
-    return next(stands_around(thing.position_m, is_free), None) is not None
 
 
 def _kind_spoken_of(query: Query, use: ThingUse, context: CommandContext) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
-from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, grasps_from_above, require_fit
+from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, grasps_from_above
 from vla_deploy.plans.knowledge import World, match_place
 from vla_deploy.plans.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
@@ -132,11 +132,11 @@ def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
         return None
     thing = subject.thing
     try:
-        require_fit(thing.kind, thing.size_m, opening_m, SIZE_DOUBT_M)
+        grasps = grasps_from_above(
+            thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, opening_m, SIZE_DOUBT_M
+        )
     except TooWide as error:
         return str(error)
-    widest_m = opening_m + SIZE_DOUBT_M
-    grasps = grasps_from_above(thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, widest_m)
     low_m, high_m = GRIP_HEIGHTS_M
     height_m = grasps[0].point_m[2]
     if low_m <= height_m <= high_m:

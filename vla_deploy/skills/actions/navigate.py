@@ -8,7 +8,6 @@ from vla_deploy.plans.knowledge import match_place, parse_object, spoken_places
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
-from vla_deploy.skills.movements.bearings import find_myself
 from vla_deploy.skills.movements.carrying import carry
 from vla_deploy.skills.movements.drive import drive_to, tell_place, turn_by
 from vla_deploy.skills.movements.frames import to_base
@@ -74,11 +73,8 @@ def reach(
     for place in () if scene is None else scene.below(known["id"]):
         if place in context.keeps_out:
             raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
-    here, reasons = context.link.pose, []
+    reasons = []
     for goal in standing_poses(context, known["position_m"], anew=anew):
-        if goal == here:  # which may be tighter by millimetres than where it would be sent
-            yield from find_myself(context)
-            return
         try:
             yield from drive_to(context, goal, speed_m_s=speed_m_s)
         except NotPossible as error:

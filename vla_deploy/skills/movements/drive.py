@@ -66,6 +66,8 @@ def drive_to(
     """
     yield from find_myself(context)
     pose = context.link.pose
+    if goal == pose:  # which may be tighter by millimetres than where it would be sent
+        return
     try:
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
     except NavigationError as error:

@@ -311,11 +311,16 @@ def test_an_objection_ends_missions_too(flat, said) -> None:
     assert flat.state()[0] == "cancelled"
 
 
-def test_a_mission_is_cancelled_by_a_planner_that_was_started_again(flat) -> None:
-    give(flat, "go to the kitchen")
+def start_planner_again(flat) -> None:
+    """Start it again while the executor carries out the first subtask."""
     flat.desk.carried_out = ["c1/o1.s1"]
     flat.desk.executor_is("executing")
     flat.desk.start()
+
+
+def test_a_mission_is_cancelled_by_a_planner_that_was_started_again(flat) -> None:
+    give(flat, "go to the kitchen")
+    start_planner_again(flat)
     flat.desk.plans()
     assert flat.desk.plans_for(mission_act={"cancel": "c1"}) == [
         {"command_id": "c1/o1.s1-cancel", "cancel": True, "of": "c1/o1.s1"}
@@ -324,9 +329,7 @@ def test_a_mission_is_cancelled_by_a_planner_that_was_started_again(flat) -> Non
 
 def test_what_no_executor_carries_out_after_both_were_started_again_is_begun_again(flat) -> None:
     give(flat, "go to the kitchen")
-    flat.desk.carried_out = ["c1/o1.s1"]
-    flat.desk.executor_is("executing")
-    flat.desk.start()
+    start_planner_again(flat)
     flat.desk.plans()
     flat.executor_is("idle")
     flat.pass_s(5.0)
@@ -373,9 +376,7 @@ def test_the_end_of_a_cycle_before_ends_nothing_now(flat) -> None:
     flat.ends("c1/o1.s1")
     flat.pass_s(30.0)
     assert flat.given() == ["c1/o1.s1", "c1/o1.s1"]
-    flat.desk.carried_out = ["c1/o1.s1"]
-    flat.desk.executor_is("executing")
-    flat.desk.start()  # it reads all that was told before
+    start_planner_again(flat)  # it reads all that was told before
     assert flat.desk.missions()[0]["subtasks"]["o1.s1"]["state"] == "executing"
 
 
