@@ -8,13 +8,9 @@ from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock
-from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.cycle import ServoCycle
-from drivers.dynamixel.fault_policy import FaultPolicy
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
-from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import BusState
 from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.tables.layout import BlockLayout
 from drivers.dynamixel.tables.registers import Registers
@@ -27,6 +23,10 @@ from drivers.dynamixel.watchdog import (
 )
 from drivers.dynamixel.wire.link import PacketLink
 from drivers.errors import DriverError
+from drivers.servo.counters import BusCounters
+from drivers.servo.fault_policy import FaultPolicy
+from drivers.servo.journal import BusJournal
+from drivers.servo.state import BusState
 
 
 class DynamixelBus:

@@ -9,18 +9,18 @@ from drivers.dynamixel.goals import GoalWriter
 from drivers.dynamixel.group import ServoRead
 from drivers.dynamixel.handshake import ServoSetup
 from drivers.dynamixel.health import HealthPoll
-from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.reader import StateReader
-from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import BusState
 from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.tables.layout import DIRECT
 from drivers.dynamixel.tables.registers import Registers
 from drivers.dynamixel.tables.settings import bring_back
 from drivers.dynamixel.watchdog import WatchdogEvent, WatchdogGuard, WatchdogState
-from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import LinkLost
+from drivers.servo.journal import BusJournal
+from drivers.servo.patience import ReplyPatience
+from drivers.servo.roster import Roster
+from drivers.servo.state import BusState
 
 _GAP_WARNING_RATIO: Final = 0.8
 _MOST_NOTICES: Final = 64

@@ -1,22 +1,12 @@
-"""Name what goes wrong on a servo bus, beneath the driver errors.
+"""Name what only a Dynamixel says, beneath the errors of all servo buses.
 
-DriverError
-├── NoReply
-│   └── ServoSilent          a servo, or several, did not answer
-├── ProtocolError
-│   └── CorruptReply         an answer came, its CRC or length was wrong
-├── WrongDevice
-│   ├── WrongServo           model, firmware or a persistent setting is not what the robot file says
-│   └── SlowAdapter          the adapter holds back what it receives
-├── DeviceFault
-│   ├── ServoFault           the servo reports a hardware error
-│   └── WatchdogTripped      the bus was silent too long; goals are refused until it is cleared
-└── Rejected                 the servo understood and refused
-    ├── RejectedResult, RejectedInstruction, RejectedCrc
-    ├── RejectedRange        data range: also every goal while the Bus Watchdog is tripped
-    ├── RejectedLength, RejectedLimit
-    ├── RejectedAccess       read-only, undefined, or EEPROM while torque is on
-    └── NotKept              written to many at once, and a servo still holds another value
+DeviceFault
+└── WatchdogTripped      the bus was silent too long; goals are refused until it is cleared
+Rejected
+├── RejectedResult, RejectedInstruction, RejectedCrc
+├── RejectedRange        data range: also every goal while the Bus Watchdog is tripped
+├── RejectedLength, RejectedLimit
+└── RejectedAccess       read-only, undefined, or EEPROM while torque is on
 """
 
 from collections.abc import Mapping
@@ -24,35 +14,12 @@ from types import MappingProxyType
 from typing import Final
 
 from drivers.dynamixel.wire.codec import StatusError
-from drivers.errors import DeviceFault, DriverError, NoReply, ProtocolError, WrongDevice
-
-
-class ServoSilent(NoReply):
-    """Say which servos did not answer."""
-
-
-class CorruptReply(ProtocolError):
-    """Say that an answer came that cannot be trusted."""
-
-
-class WrongServo(WrongDevice):
-    """Say in what a servo differs from the robot file."""
-
-
-class SlowAdapter(WrongDevice):
-    """Say that the adapter holds back received bytes, and how to stop that."""
-
-
-class ServoFault(DeviceFault):
-    """Say which hardware error a servo reports."""
+from drivers.errors import DeviceFault
+from drivers.servo.errors import Rejected
 
 
 class WatchdogTripped(DeviceFault):
     """Say that servos stopped by themselves because the bus was silent."""
-
-
-class Rejected(DriverError):
-    """Say that a servo refused an instruction."""
 
 
 class RejectedResult(Rejected):
@@ -81,10 +48,6 @@ class RejectedLimit(Rejected):
 
 class RejectedAccess(Rejected):
     """Say that the register is read-only, undefined, or locked while torque is on."""
-
-
-class NotKept(Rejected):
-    """Say which servos hold another value than was written to many at once."""
 
 
 REJECTIONS: Final[Mapping[int, tuple[type[Rejected], str]]] = MappingProxyType(

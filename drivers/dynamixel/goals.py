@@ -19,8 +19,9 @@ from drivers.dynamixel.wire.codec import (
     crc16,
     encode_instruction,
 )
-from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
+from drivers.dynamixel.wire.link import PacketLink
 from drivers.errors import DriverError, LinkLost
+from drivers.servo.patience import ReplyPatience
 
 _GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
 _GOAL_POSITION_HEAD: Final = b"\x74\x00\x04\x00"  # address 116, 4 bytes

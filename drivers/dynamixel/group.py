@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import BusState
 from drivers.dynamixel.tables.control_table import VOLTAGE_UNIT_V
 from drivers.dynamixel.tables.layout import CLIMATE, MOTION, STATUS, Block
 from drivers.dynamixel.wire.block import BlockRead, decode
 from drivers.dynamixel.wire.codec import ALERT
 from drivers.dynamixel.wire.sync_read import Entry
+from drivers.servo.state import BusState
 
 _ROWS: Final = MOTION + CLIMATE
 """What `BusState.readings` holds, row by row."""

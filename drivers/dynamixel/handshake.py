@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import (
     MODELS_BY_NUMBER,
@@ -16,6 +15,7 @@ from drivers.dynamixel.tables.registers import Registers, decode
 from drivers.dynamixel.tables.settings import IMAGE_BYTES, differences, write_differences, write_map
 from drivers.dynamixel.wire.baud_search import where_they_answer
 from drivers.errors import NoReply
+from drivers.servo.errors import ServoSilent, SlowAdapter, WrongServo
 
 _EXTENDED_RANGE = (-1_048_575, 1_048_575)
 _ECHO_MARGIN_S = 0.02

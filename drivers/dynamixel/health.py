@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import BusState
 from drivers.dynamixel.tables.control_table import VOLTAGE_UNIT_V
 from drivers.dynamixel.tables.registers import Registers, decode
-from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import DriverError, LinkLost, NoReply, ProtocolError
+from drivers.servo.patience import ReplyPatience
+from drivers.servo.roster import Roster
+from drivers.servo.state import BusState
 
 _STATUS_START: Final = 64  # torque_enable .. bus_watchdog
 _STATUS_BYTES: Final = 35

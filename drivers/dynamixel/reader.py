@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.group import Group, News, ServoRead
-from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.roster import Roster
-from drivers.dynamixel.state import BusState
 from drivers.dynamixel.wire.completion import complete
 from drivers.dynamixel.wire.link import PacketLink
+from drivers.servo.journal import BusJournal
+from drivers.servo.roster import Roster
+from drivers.servo.state import BusState
 
 _NEVER_NS: Final = -1
 

@@ -8,13 +8,14 @@ read or write, being a broadcast, feeds the Bus Watchdog of every servo meanwhil
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from drivers.dynamixel.errors import NotKept, ServoFault, ServoSilent, WatchdogTripped
+from drivers.dynamixel.errors import WatchdogTripped
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import hardware_error_text
 from drivers.dynamixel.tables.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.tables.registers import Registers, decode
-from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import DriverError, LinkLost
+from drivers.servo.errors import NotKept, ServoFault, ServoSilent
+from drivers.servo.patience import ReplyPatience
+from drivers.servo.state import hardware_error_text
 
 _ATTEMPTS: Final = 3
 _URGENT: Final = ReplyPatience(margin_s=0.005, attempts=2)

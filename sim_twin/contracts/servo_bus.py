@@ -5,9 +5,10 @@ from typing import ClassVar, Final, Protocol
 import numpy as np
 import pytest
 
-from drivers.dynamixel import BusState, DynamixelBus
+from drivers.dynamixel import DynamixelBus
 from drivers.dynamixel.errors import RejectedRange
 from drivers.errors import DeviceMissing, LinkLost
+from drivers.servo.state import BusState
 from sim_twin.contracts.bench import Bench, PluggedBench
 
 TICK_S: Final = 0.01

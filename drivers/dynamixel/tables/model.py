@@ -5,7 +5,7 @@ Source: ROBOTIS e-manual, pages of the X series (control table and specification
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from math import pi
 from types import MappingProxyType
 from typing import Final, Literal
@@ -33,16 +33,6 @@ class OperatingMode(IntEnum):
     EXTENDED_POSITION = 4
     CURRENT_BASED_POSITION = 5
     PWM = 16
-
-
-class HardwareError(IntFlag):
-    """Name the bits of hardware_error_status (70) and of shutdown (63)."""
-
-    INPUT_VOLTAGE = 1 << 0
-    OVERHEATING = 1 << 2
-    ENCODER = 1 << 3
-    ELECTRICAL_SHOCK = 1 << 4
-    OVERLOAD = 1 << 5
 
 
 class StatusReturnLevel(IntEnum):

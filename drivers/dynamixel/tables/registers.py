@@ -6,8 +6,9 @@ from typing import Final
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import Register
 from drivers.dynamixel.wire.codec import Instruction
-from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
+from drivers.dynamixel.wire.link import PacketLink
 from drivers.dynamixel.wire.sync_read import SyncRead
+from drivers.servo.patience import ReplyPatience
 
 SETUP: Final = ReplyPatience(margin_s=0.02, attempts=3)
 """For what is asked before or after motion, when a retry costs nothing."""

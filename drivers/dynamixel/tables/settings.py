@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
-from drivers.dynamixel.errors import NotKept
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import StatusReturnLevel
 from drivers.dynamixel.tables.layout import Block
 from drivers.dynamixel.tables.registers import SETUP, Registers, decode
-from drivers.dynamixel.wire.link import ReplyPatience
+from drivers.servo.errors import NotKept
+from drivers.servo.patience import ReplyPatience
 
 IMAGE_BYTES = 71  # model number .. hardware error status
 

@@ -6,8 +6,6 @@ from typing import Final
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.counters import BusCounters
-from drivers.dynamixel.errors import ServoSilent, WrongServo
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import MODELS_BY_NUMBER, ServoDatasheet
 from drivers.dynamixel.tables.registers import Registers
@@ -18,8 +16,11 @@ from drivers.dynamixel.wire.codec import (
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
+from drivers.dynamixel.wire.link import PacketLink
 from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
+from drivers.servo.counters import BusCounters
+from drivers.servo.errors import ServoSilent, WrongServo
+from drivers.servo.patience import ReplyPatience
 
 PING_ANSWER_BYTES: Final = 3
 ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.dynamixel.errors import CorruptReply, ServoSilent
 from drivers.dynamixel.tools.bench_link import (
     ONE_TRY,
     PING_ANSWER_BYTES,
@@ -17,9 +16,10 @@ from drivers.dynamixel.tools.bench_link import (
     FoundServo,
 )
 from drivers.dynamixel.wire.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
-from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.errors import NoReply, ProtocolError
+from drivers.servo.errors import CorruptReply, ServoSilent
+from drivers.servo.patience import ReplyPatience
 
 ALL_IDS: Final = range(MAX_SERVO_ID + 1)
 _SLOT_S: Final = 0.003

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.dynamixel.fault_policy import describe_bits
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import CENTRE_PULSE, PULSE_RAD, VOLTAGE_UNIT_V
 from drivers.dynamixel.tables.registers import decode
 from drivers.dynamixel.tools.bench_link import THREE_TRIES, BenchLink
+from drivers.servo.fault_policy import describe_bits
 
 _STATUS: Final = (64, 7)  # torque_enable .. hardware_error_status
 _SENSED: Final = (124, 23)  # present_pwm .. present_temperature

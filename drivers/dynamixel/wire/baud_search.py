@@ -6,8 +6,8 @@ from typing import Final
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.dynamixel.tables.registers import Registers
-from drivers.dynamixel.wire.link import ReplyPatience
 from drivers.errors import NoReply, ProtocolError
+from drivers.servo.patience import ReplyPatience
 
 _ONCE: Final = ReplyPatience(margin_s=0.02, attempts=1)
 

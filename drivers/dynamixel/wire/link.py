@@ -1,10 +1,10 @@
 """Carry out single transactions on a servo bus: send, wait a bounded time, match the answer."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.errors import REJECTIONS, CorruptReply, Rejected, ServoSilent
+from drivers.dynamixel.errors import REJECTIONS
+from drivers.dynamixel.wire.chained import ChainedWire
 from drivers.dynamixel.wire.codec import (
     ALERT,
     BROADCAST_ID,
@@ -14,20 +14,13 @@ from drivers.dynamixel.wire.codec import (
     encode_instruction,
 )
 from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES, Entry, ReplyCollector, SyncRead
-from drivers.dynamixel.wire.wire import Wire
+from drivers.servo.errors import CorruptReply, Rejected, ServoSilent
+from drivers.servo.patience import ReplyPatience
 
 PING_REPLY_BYTES: Final = STATUS_OVERHEAD_BYTES + 3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplyPatience:
-    """Say how long beyond the wire time to wait for an answer, and how often to ask."""
-
-    margin_s: float
-    attempts: int
-
-
-class PacketLink(Wire):
+class PacketLink(ChainedWire):
     """Ask questions on the wire and tell their answers from what else is heard."""
 
     def detect_echo(self, servo_id: int, margin_s: float) -> None:

@@ -6,7 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.tables.model import VOLTAGE_UNIT_V, HardwareError, ServoDatasheet
+from drivers.dynamixel.tables.model import VOLTAGE_UNIT_V, ServoDatasheet
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.profile import Floats
 from sim_twin.servos.firmware.thermal import Thermals

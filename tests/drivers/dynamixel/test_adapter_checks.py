@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
 from drivers.dynamixel.wire.codec import Instruction
+from drivers.servo.errors import ServoSilent, SlowAdapter, WrongServo
 from sim_twin.servos import EmulatedServoSpec
 
 MakeBench = Callable[..., Any]

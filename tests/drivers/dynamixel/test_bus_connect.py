@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from drivers.dynamixel import DynamixelBus, OperatingMode, ServoSpec, WatchdogState
-from drivers.dynamixel.errors import ServoSilent, WrongServo
 from drivers.errors import DriverError, NoReply, WrongDevice
+from drivers.servo.errors import ServoSilent, WrongServo
 from sim_twin.servos import EmulatedServoSpec
 
 MakeBench = Callable[..., Any]

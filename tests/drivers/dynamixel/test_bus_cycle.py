@@ -8,9 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec
+from drivers.dynamixel import BlockLayout, ServoSpec
 from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import LinkLost
+from drivers.servo.hardware_error import HardwareError
 
 MakeBench = Callable[..., Any]
 FAST_OR_NOT = pytest.mark.parametrize("fast_sync", [True, False])

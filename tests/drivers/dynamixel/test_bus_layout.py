@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel import BlockLayout, HardwareError, ServoSpec, WatchdogState
-from drivers.dynamixel.errors import WrongServo
+from drivers.dynamixel import BlockLayout, ServoSpec, WatchdogState
 from drivers.dynamixel.tables.layout import DIRECT, block_of
 from drivers.dynamixel.tables.model import IndirectBank
 from drivers.dynamixel.tables.models import MODELS
 from drivers.dynamixel.wire.codec import Instruction, encode_instruction
+from drivers.servo.errors import WrongServo
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
 
 MakeBench = Callable[..., Any]

@@ -6,18 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel import HardwareError, WatchdogState
-from drivers.dynamixel.errors import (
-    NotKept,
-    RejectedAccess,
-    RejectedLimit,
-    RejectedRange,
-    ServoFault,
-    ServoSilent,
-    WatchdogTripped,
-)
+from drivers.dynamixel import WatchdogState
+from drivers.dynamixel.errors import RejectedAccess, RejectedLimit, RejectedRange, WatchdogTripped
 from drivers.dynamixel.wire.codec import Instruction
 from drivers.errors import LinkLost
+from drivers.servo.errors import NotKept, ServoFault, ServoSilent
+from drivers.servo.hardware_error import HardwareError
 
 MakeBench = Callable[..., Any]
 

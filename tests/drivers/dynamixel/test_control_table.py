@@ -6,10 +6,10 @@ from drivers.dynamixel.tables.control_table import (
     BAUD_RATES,
     MODELS,
     MODELS_BY_NUMBER,
-    HardwareError,
     OperatingMode,
     ServoDatasheet,
 )
+from drivers.servo.hardware_error import HardwareError
 
 ALL_MODELS = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 

@@ -1,7 +1,8 @@
 import pytest
 
-from drivers.dynamixel import DynamixelBus, HardwareError
-from drivers.dynamixel.fault_policy import FaultAction, FaultPolicy
+from drivers.dynamixel import DynamixelBus
+from drivers.servo.fault_policy import FaultAction, FaultPolicy
+from drivers.servo.hardware_error import HardwareError
 
 
 def test_telemetry_has_counters_latency_and_budget(bench):

@@ -4,10 +4,11 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel import BlockLayout, DynamixelBus, ServoSpec
-from drivers.dynamixel.counters import BusCounters
-from drivers.dynamixel.errors import ServoSilent
 from drivers.dynamixel.wire.codec import Instruction
-from drivers.dynamixel.wire.link import PacketLink, ReplyPatience
+from drivers.dynamixel.wire.link import PacketLink
+from drivers.servo.counters import BusCounters
+from drivers.servo.errors import ServoSilent
+from drivers.servo.patience import ReplyPatience
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.dynamixel import BlockLayout
-from drivers.dynamixel.roster import SUSPEND_AFTER, Roster
+from drivers.servo.roster import SUSPEND_AFTER, Roster
 
 
 def test_a_servo_is_suspended_after_misses_in_a_row() -> None:

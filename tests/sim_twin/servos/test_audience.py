@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.tables.control_table import BAUD_RATES, HardwareError
+from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.dynamixel.wire.codec import (
     ALERT,
     BROADCAST_ID,
@@ -15,6 +15,7 @@ from drivers.dynamixel.wire.codec import (
     StatusError,
     encode_instruction,
 )
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.servos import EmulatedServoSpec, ServoBank
 
 THREE = ("XM430-W350", "XL430-W250", "XM540-W270")

@@ -1,8 +1,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from drivers.dynamixel.tables.control_table import HardwareError
 from drivers.dynamixel.wire.codec import ALERT, Instruction, StatusError
+from drivers.servo.hardware_error import HardwareError
 
 
 def stall(bench: Any, seconds: float) -> None:

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel.tables.control_table import HardwareError, OperatingMode
+from drivers.dynamixel.tables.control_table import OperatingMode
 from drivers.dynamixel.tables.models import MODELS
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.servos.firmware.thermal import (
     WINDING_SHARE,
     WINDING_TIME_CONSTANT_S,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.dynamixel import BusState
+from drivers.servo.state import BusState
 from vla_deploy.control.output.joint_steps import JointSteps
 
 

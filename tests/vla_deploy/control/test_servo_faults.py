@@ -3,8 +3,9 @@ from collections.abc import Callable
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import DynamixelBus, HardwareError, ServoSpec
-from drivers.dynamixel.fault_policy import DEFAULT_RULES, FaultAction, FaultRule
+from drivers.dynamixel import DynamixelBus, ServoSpec
+from drivers.servo.fault_policy import DEFAULT_RULES, FaultAction, FaultRule
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos

@@ -3,7 +3,7 @@
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import BusState
+from drivers.servo.state import BusState
 from vla_deploy.control.motion.axes import Flags, Floats, all_of
 
 

@@ -9,14 +9,15 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel import DynamixelBus, HardwareError
-from drivers.dynamixel.fault_policy import (
+from drivers.dynamixel import DynamixelBus
+from drivers.servo.fault_policy import (
     DEFAULT_RULES,
     FaultAction,
     FaultDecision,
     FaultPolicy,
     FaultRule,
 )
+from drivers.servo.hardware_error import HardwareError
 
 _TOLD: Final = 3
 RULES: Final[Mapping[HardwareError, FaultRule]] = MappingProxyType(

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel import BusState, DynamixelBus, ServoSpec
+from drivers.dynamixel import DynamixelBus, ServoSpec
 from drivers.error_budget import BudgetState
 from drivers.errors import DriverError, LinkLost, NoReply
 from drivers.opener import DeviceOpener
+from drivers.servo.state import BusState
 from platforms import Profile
 from vla_deploy.control.motion.axes import Axes, Floats
 from vla_deploy.control.output.servo_faults import ServoFaults

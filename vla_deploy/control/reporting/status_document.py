@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivers.dynamixel import BusState
+from drivers.servo.state import BusState
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc.payloads.motion import JointReadings, VerdictFields
 from vla_deploy.safety import Cause, Verdict

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from drivers.dynamixel import BusState
+from drivers.servo.state import BusState
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.control.motion.motions import MotionResult
 from vla_deploy.control.output.wheels import Wheels

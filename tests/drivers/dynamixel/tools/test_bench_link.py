@@ -1,8 +1,9 @@
 import pytest
 
-from drivers.dynamixel.errors import RejectedAccess, ServoSilent, WrongServo
+from drivers.dynamixel.errors import RejectedAccess
 from drivers.dynamixel.tools import scan_speed
 from drivers.dynamixel.tools.bench_link import FoundServo, Keep
+from drivers.servo.errors import ServoSilent, WrongServo
 from sim_twin.servos import EmulatedServoSpec
 
 

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from drivers.dynamixel.tables.control_table import HardwareError
 from drivers.dynamixel.tools import FoundServo, SpeedReport
 from drivers.recording.recording import RecordKind, read_recording
 from drivers.serial_port import SerialPort
+from drivers.servo.hardware_error import HardwareError
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos, serve
 from vla_deploy.cli.devices import servo_bus, servo_scan

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.errors import ServoSilent
 from drivers.dynamixel.tables.control_table import PULSE_RAD
 from drivers.dynamixel.tools import BenchLink
+from drivers.servo.errors import ServoSilent
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos

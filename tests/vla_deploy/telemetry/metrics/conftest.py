@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.counters import BusCounters
 from drivers.latency import LatencyHistogram
+from drivers.servo.counters import BusCounters
 from platforms.probes import Reading
 from vla_deploy.control.reporting.tick_periods import TickPeriods
 from vla_deploy.ipc import SharedSpace

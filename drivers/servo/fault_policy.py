@@ -10,7 +10,7 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel.tables.control_table import HardwareError
+from drivers.servo.hardware_error import HardwareError
 
 
 class FaultAction(IntEnum):
@@ -54,6 +54,10 @@ DEFAULT_RULES: Final[Mapping[HardwareError, FaultRule]] = MappingProxyType(
         HardwareError.OVERLOAD: FaultRule(
             action=FaultAction.REBOOT_ONCE,
             reason="a collision or a short overload is over once the torque is off",
+        ),
+        HardwareError.OVERCURRENT: FaultRule(
+            action=FaultAction.LIMP,
+            reason="the motor draws more than it may: something blocks it, or it is shorted",
         ),
     }
 )

@@ -6,11 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from drivers.dynamixel.fault_policy import FaultDecision, FaultPolicy
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.state import BusState
 from drivers.error_budget import BusBudget
 from drivers.latency import LatencyHistogram
+from drivers.servo.fault_policy import FaultDecision, FaultPolicy
+from drivers.servo.member import BusServo
+from drivers.servo.state import BusState
 
 _MOST_TIMES: Final = 4096
 _MOST_DECISIONS: Final = 32
@@ -21,7 +21,7 @@ class BusJournal:
 
     def __init__(
         self,
-        servos: Sequence[ServoSpec],
+        servos: Sequence[BusServo],
         state: BusState,
         policy: FaultPolicy,
     ) -> None:
