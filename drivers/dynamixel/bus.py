@@ -1,7 +1,7 @@
 """Drive all servos of one Dynamixel bus: one block read and one sync write per cycle."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,8 @@ class DynamixelBus:
     transport and a new bus, and connect; torque stays off or on as the servos left it.
     """
 
+    has_watchdog: Final = True
+
     def __init__(
         self,
         transport: ByteTransport,
@@ -47,12 +49,14 @@ class DynamixelBus:
         fast_sync: bool | None = None,
         layout: BlockLayout = BlockLayout.AUTO,
         watchdog_s: float = 0.1,
+        hold_gains: Mapping[str, int] | None = None,
         reply_margin_s: float = 0.002,
         health_every_cycles: int = 5,
         fault_policy: FaultPolicy | None = None,
     ) -> None:
         """Take over the transport; nothing is sent yet.
 
+        `hold_gains` are registers that each servo gets before its torque: a reboot forgets them.
         A `fault_policy` that outlives the bus remembers its reboots when the bus is opened anew.
         `fast_sync` None uses the fast sync read for those servos whose model and firmware have it.
 
@@ -68,6 +72,7 @@ class DynamixelBus:
         self._by_id = {servo.id: index for index, servo in enumerate(servos)}
         self._watchdog_s = watchdog_s
         self._watchdog_units = watchdog_units(watchdog_s)
+        self._hold_gains = dict(hold_gains or {})
         self._fast_sync = fast_sync
         self._layout = layout
         self._margin_s = reply_margin_s
@@ -163,7 +168,7 @@ class DynamixelBus:
         """
         return self._connected().goals.sent
 
-    def write_goal_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
+    def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit servos (by id) to a ratio of full PWM; return those that did not take it.
 
         Only a changed limit goes on the wire.
@@ -184,10 +189,13 @@ class DynamixelBus:
             WatchdogTripped: clear the watchdog first.
             ServoFault: a servo reports a hardware error.
             ServoSilent: a servo does not answer.
-            NotKept: a servo refuses a step.
+            Rejected: a servo refuses a gain, or (NotKept) a step.
             LinkLost: the adapter is gone.
         """
         chosen = self._chosen(ids)
+        for index in chosen:
+            for name, gain in self._hold_gains.items():
+                self._registers.write(self.servos[index], name, gain)
         enable_torque(self._registers, [self.servos[n] for n in chosen], self._watchdog_units)
         for index in chosen:
             self.state.torque_on[index] = True

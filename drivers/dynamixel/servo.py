@@ -1,4 +1,4 @@
-"""Declare one servo of a robot and its conversion between joint and pulses."""
+"""Declare one Dynamixel of a robot."""
 
 from dataclasses import dataclass
 
@@ -10,41 +10,21 @@ from drivers.dynamixel.tables.control_table import (
     ServoDatasheet,
 )
 from drivers.dynamixel.wire.codec import MAX_SERVO_ID
+from drivers.servo.joint_servo import JointServo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ServoSpec:
-    """Describe a servo as the robot file declares it.
+class ServoSpec(JointServo):
+    """Describe a Dynamixel as the robot file declares it; 4096 pulses are a turn."""
 
-        joint value = sign * (pulse - 2048) * 2 pi / 4096 * travel_per_rad + offset_rad
-
-    `travel_per_rad` is 1 for a revolute joint; for a finger on a rack it is metres per radian,
-    and then `offset_rad` and all values of this joint are in metres.
-    """
-
-    id: int
-    model_name: str
-    joint: str
-    sign: int = 1
-    offset_rad: float = 0.0
-    travel_per_rad: float = 1.0
     operating_mode: OperatingMode = OperatingMode.POSITION
-
-    def __post_init__(self) -> None:
-        faults = [text for wrong, text in self._checks() if wrong]
-        if faults:
-            raise ValueError(f"servo {self.id} ({self.joint}): " + "; ".join(faults))
 
     def _checks(self) -> list[tuple[bool, str]]:
         known = self.model_name in MODELS
         return [
             (not 0 <= self.id <= MAX_SERVO_ID, f"id must be 0..{MAX_SERVO_ID}, got {self.id}"),
             (not known, f"model must be one of {sorted(MODELS)}, got {self.model_name!r}"),
-            (self.sign not in (-1, 1), f"sign must be -1 or 1, got {self.sign}"),
-            (
-                self.travel_per_rad <= 0,
-                f"travel_per_rad must be positive, got {self.travel_per_rad}",
-            ),
+            *JointServo._checks(self),
             (
                 known and self.operating_mode not in self.model.operating_modes,
                 f"{self.model_name} has no operating mode {self.operating_mode.name}",
@@ -57,17 +37,11 @@ class ServoSpec:
         return MODELS[self.model_name]
 
     @property
-    def joint_per_pulse(self) -> float:
-        """Return the joint's signed travel per pulse."""
-        return self.sign * PULSE_RAD * self.travel_per_rad
+    def pulse_rad(self) -> float:
+        """Return the angle of one pulse."""
+        return PULSE_RAD
 
-    def to_joint(self, pulse: float) -> float:
-        """Return the joint value at a pulse count."""
-        return (pulse - CENTRE_PULSE) * self.joint_per_pulse + self.offset_rad
-
-    def to_pulse(self, joint: float) -> int:
-        """Return the nearest pulse count to a joint value."""
-        return round((joint - self.offset_rad) / self.joint_per_pulse) + CENTRE_PULSE
-
-    def __str__(self) -> str:
-        return f"servo {self.id} ({self.joint}, {self.model_name})"
+    @property
+    def centre_pulse(self) -> int:
+        """Return the pulse at which the horn is drawn in the datasheet."""
+        return CENTRE_PULSE

@@ -9,7 +9,7 @@ import numpy as np
 from drivers.error_budget import BusBudget
 from drivers.latency import LatencyHistogram
 from drivers.servo.fault_policy import FaultDecision, FaultPolicy
-from drivers.servo.member import BusServo
+from drivers.servo.joint_servo import JointServo
 from drivers.servo.state import BusState
 
 _MOST_TIMES: Final = 4096
@@ -21,7 +21,7 @@ class BusJournal:
 
     def __init__(
         self,
-        servos: Sequence[BusServo],
+        servos: Sequence[JointServo],
         state: BusState,
         policy: FaultPolicy,
     ) -> None:

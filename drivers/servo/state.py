@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.servo.hardware_error import HardwareError
-from drivers.servo.member import BusServo
+from drivers.servo.joint_servo import JointServo
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -80,7 +80,7 @@ class BusState:
                 getattr(copied, field.name)[:] = value
         return copied
 
-    def faults(self, servos: Sequence[BusServo]) -> list[str]:
+    def faults(self, servos: Sequence[JointServo]) -> list[str]:
         """Return a line for each servo that reports a hardware error."""
         return [
             f"{servo}: {hardware_error_text(int(bits))}"

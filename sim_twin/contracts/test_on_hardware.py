@@ -9,7 +9,7 @@ import pytest
 
 from drivers import registry
 from drivers.clock import Clock
-from drivers.dynamixel import DynamixelBus
+from drivers.dynamixel import DynamixelBus, ServoSpec
 from drivers.wheel_drives.bus import DriveBus
 from sim_twin.contracts.bench import HardwareBench
 from sim_twin.contracts.camera import RgbdCameraContract
@@ -35,7 +35,7 @@ class _ServoBench:
             bus = DynamixelBus(
                 line,
                 clock,
-                servo_specs(robot),
+                [servo for servo in servo_specs(robot) if isinstance(servo, ServoSpec)],
                 baud=robot.servo_bus.baud,
                 watchdog_s=profile.bus_watchdog_s,
             )

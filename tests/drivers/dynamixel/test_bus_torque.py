@@ -167,22 +167,22 @@ def test_a_pwm_limit_goes_on_the_wire_only_when_it_changes(bench: Any) -> None:
     bench.bus.enable_torque()
     bench.wire.sent.clear()
     for _ in range(5):
-        assert bench.bus.write_goal_pwm({4: 0.4}) == {}
+        assert bench.bus.limit_effort({4: 0.4}) == {}
     assert bench.wire.count(Instruction.WRITE) == 1
     assert bench.bank.register(4, "goal_pwm") == 354
-    bench.bus.write_goal_pwm({4: 1.0})
+    bench.bus.limit_effort({4: 1.0})
     assert bench.bank.register(4, "goal_pwm") == 885
     with pytest.raises(ValueError, match=r"within 0\.\.1"):
-        bench.bus.write_goal_pwm({4: 1.2})
+        bench.bus.limit_effort({4: 1.2})
     with pytest.raises(ValueError, match="no servo 9"):
-        bench.bus.write_goal_pwm({9: 0.2})
+        bench.bus.limit_effort({9: 0.2})
 
 
 def test_a_pwm_limit_that_was_not_accepted_is_reported_and_sent_again(bench: Any) -> None:
     bench.bank.silence(4)
-    assert list(bench.bus.write_goal_pwm({4: 0.4})) == [4]
+    assert list(bench.bus.limit_effort({4: 0.4})) == [4]
     bench.bank.silence(4, silent=False)
-    assert bench.bus.write_goal_pwm({4: 0.4}) == {}
+    assert bench.bus.limit_effort({4: 0.4}) == {}
     assert bench.bank.register(4, "goal_pwm") == 354
 
 

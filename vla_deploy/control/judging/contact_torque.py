@@ -10,7 +10,7 @@ now and then would show a torque that is not there.
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.tables.models import MODELS
+from drivers.servo.family import family_of
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
@@ -27,7 +27,8 @@ class ContactTorque:
         self._model = model
         servos = robot.servo_bus.servos
         self.senses = np.array(
-            [MODELS[servo.model].current_unit_a is not None for servo in servos], dtype=np.bool_
+            [family_of(servo.model).facts(servo.model).senses_current for servo in servos],
+            dtype=np.bool_,
         )
         # Torque in the joint's own unit: a pinion turns torque into force.
         self._stall = np.array([robot.stall_effort(servo.joint) for servo in servos])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from drivers.dynamixel.tables.models import MODELS
+from drivers.servo.family import family_of
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.robots import RobotDescription
@@ -20,7 +20,6 @@ _WHEEL_ERROR_OF_COMMAND = 0.5
 # A servo shuts down by itself at its own limits: we stop before it lets go.
 _TEMPERATURE_MARGIN_C = 5.0
 _VOLTAGE_MARGIN_V = 0.3
-_VOLTAGE_UNIT_V = 0.1
 _EFFORT_RATIO = 0.9
 _STANDSTILL_SHARE = 0.1
 _STANDSTILL_WHEEL_M_S = 0.01
@@ -39,8 +38,8 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
     beyond that. A sense that nothing in the robot file is judged by may be silent.
     """
     margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
-    lowest_v = _registers(robot, "min_voltage_limit") * _VOLTAGE_UNIT_V
-    highest_v = _registers(robot, "max_voltage_limit") * _VOLTAGE_UNIT_V
+    facts = [family_of(servo.model).facts(servo.model) for servo in robot.servo_bus.servos]
+    lowest_v, highest_v = np.array([each.voltage_limits_v for each in facts]).T
     tip_over = robot.protection.tip_over
     return SafetyLimits(
         joint_names=robot.joint_names,
@@ -60,7 +59,8 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         base_command_age_s=BY_NAME["base_command"].deadline_s,
         supervisor_age_s=BY_NAME["process_table"].deadline_s,
         effort_ratio=np.full(len(robot.joint_names), _EFFORT_RATIO),
-        temperature_c=_registers(robot, "temperature_limit") - _TEMPERATURE_MARGIN_C,
+        temperature_c=np.array([each.temperature_limit_c for each in facts])
+        - _TEMPERATURE_MARGIN_C,
         voltage_min_v=lowest_v + _VOLTAGE_MARGIN_V,
         voltage_max_v=highest_v - _VOLTAGE_MARGIN_V,
         standstill_velocity=_STANDSTILL_SHARE * robot.velocity_max,
@@ -84,11 +84,6 @@ def _looks_by_depth(robot: RobotDescription) -> bool:
     return any(ZoneSource.DEPTH in zone.sources for zone in robot.protection.zones)
 
 
-def _registers(robot: RobotDescription, name: str) -> Floats:
-    """Return the factory value of one register of every servo, in the register's unit."""
-    return np.array([_factory_value(servo.model, name) for servo in robot.servo_bus.servos])
-
-
 def _following_error(robot: RobotDescription) -> Floats:
     grippers = robot.gripper_joints
     return np.array(
@@ -104,9 +99,3 @@ def contact_torque(robot: RobotDescription) -> Floats:
     contact = robot.protection.contact
     declared = {} if contact is None else contact.torque_nm
     return np.array([declared.get(name, np.inf) for name in robot.joint_names])
-
-
-def _factory_value(model: str, name: str) -> float:
-    value = MODELS[model].registers[name].initial
-    assert value is not None
-    return float(value)

@@ -8,33 +8,28 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.dynamixel.tables.control_table import PULSE_RAD, PWM_FULL
+from drivers.servo.family import family_of
 from vla_deploy.control.motion.axes import Floats
-from vla_deploy.control.output.servos import GAINS
 from vla_deploy.robots import RobotDescription
 
-# e-manual: duty in PWM units is the error in pulses times P / 128.
-FULL_DUTY_ERROR_RAD = PWM_FULL * 128.0 / GAINS["position_p_gain"] * PULSE_RAD
 _MAX_OFFSET_RAD = 0.2
 
 
 def stiffness(robot: RobotDescription) -> Floats:
     """Return each joint's holding torque per unit of position error (N m/rad, or N/m)."""
-    return np.array(
-        [
-            robot.servo_models[servo.model].stall_torque_nm
-            / FULL_DUTY_ERROR_RAD
-            / servo.travel_per_rad**2
-            for servo in robot.servo_bus.servos
-        ]
-    )
+    stall = [robot.stall_effort(servo.joint) for servo in robot.servo_bus.servos]
+    return np.array(stall) / full_duty_error(robot)
 
 
 def full_duty_error(robot: RobotDescription) -> Floats:
     """Return the error at which each joint's motor gives all it has (rad, or m of a finger)."""
-    travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
-    error: Floats = FULL_DUTY_ERROR_RAD * np.abs(travel)
-    return error
+    return np.array(
+        [
+            family_of(servo.model).facts(servo.model).full_duty_error_rad
+            * abs(servo.travel_per_rad)
+            for servo in robot.servo_bus.servos
+        ]
+    )
 
 
 class GravityOffset:

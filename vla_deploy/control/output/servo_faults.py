@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from drivers.dynamixel import DynamixelBus
+from drivers.servo.bus import ServoBusDriver
 from drivers.servo.fault_policy import (
     DEFAULT_RULES,
     FaultAction,
@@ -43,7 +43,7 @@ class ServoFaults:
         """Return the newest decisions in words, the latest last."""
         return list(self._newest)
 
-    def carry_out(self, bus: DynamixelBus) -> None:
+    def carry_out(self, bus: ServoBusDriver) -> None:
         """Do what was decided since the last call.
 
         Raises:
@@ -55,16 +55,16 @@ class ServoFaults:
                 act(bus, decision)
 
 
-def _limp(bus: DynamixelBus, decision: FaultDecision) -> None:
+def _limp(bus: ServoBusDriver, decision: FaultDecision) -> None:
     for error in bus.disable_torque([decision.servo_id]).values():
         raise error
 
 
-def _reboot(bus: DynamixelBus, decision: FaultDecision) -> None:
+def _reboot(bus: ServoBusDriver, decision: FaultDecision) -> None:
     bus.reboot(decision.servo_id)
 
 
-_ACTS: Final[Mapping[FaultAction, Callable[[DynamixelBus, FaultDecision], None]]] = (
-    MappingProxyType({FaultAction.LIMP: _limp, FaultAction.REBOOT_ONCE: _reboot})
+_ACTS: Final[Mapping[FaultAction, Callable[[ServoBusDriver, FaultDecision], None]]] = MappingProxyType(
+    {FaultAction.LIMP: _limp, FaultAction.REBOOT_ONCE: _reboot}
 )
 """Nothing more is to be done for the others: safety stops the robot by the same error bits."""

@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel import DynamixelBus, ServoSpec
 from drivers.error_budget import BudgetState
 from drivers.errors import DriverError, LinkLost, NoReply
 from drivers.opener import DeviceOpener
+from drivers.servo.bus import ServoBusDriver
+from drivers.servo.family import ServoFamily, family_of
+from drivers.servo.joint_servo import JointServo
 from drivers.servo.state import BusState
 from platforms import Profile
 from vla_deploy.control.motion.axes import Axes, Floats
@@ -20,17 +22,22 @@ from vla_deploy.robots import RobotDescription
 REOPEN_NS = NS_PER_S
 _FIRST_READS = 10
 
-# Written whenever a servo is powered, since a reboot forgets them. P is what the gravity offset
-# reckons with (control/gravity.py). With the factory's 800 and no D a loaded elbow rings for half a
-# second after a stop; with these it stands in half of that, and trails its setpoint half as far.
-GAINS = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
+
+def bus_family(robot: RobotDescription) -> ServoFamily:
+    """Return the family of a robot's servos, which is one for a bus.
+
+    Raises:
+        UnknownModel: no family has the model.
+    """
+    return family_of(robot.servo_bus.servos[0].model)
 
 
-def servo_specs(robot: RobotDescription) -> list[ServoSpec]:
+def servo_specs(robot: RobotDescription) -> list[JointServo]:
     """Return what the bus driver must know of each servo of a robot."""
+    family = bus_family(robot)
     return [
-        ServoSpec(
-            id=servo.id,
+        family.servo(
+            servo_id=servo.id,
             model_name=servo.model,
             joint=servo.joint,
             sign=servo.sign,
@@ -55,9 +62,11 @@ class ServoLine:
         self._clock = clock
         self._baud = robot.servo_bus.baud
         self._watchdog_s = profile.bus_watchdog_s
+        self._family = bus_family(robot)
         self._specs = servo_specs(robot)
         self._ids = [spec.id for spec in self._specs]
-        self._bus: DynamixelBus | None = None
+        self._bus: ServoBusDriver | None = None
+        self._has_watchdog = True
         self._next_open_ns = 0
         self.state = BusState.of(len(self._specs))
 
@@ -70,7 +79,7 @@ class ServoLine:
             DriverError: the line is missing or busy, or a servo is silent or not as declared.
         """
         transport = self._devices.serial(self.name)
-        bus = DynamixelBus(
+        bus = self._family.bus(
             transport,
             self._clock,
             self._specs,
@@ -85,6 +94,7 @@ class ServoLine:
             bus.close()
             raise
         self._bus = bus
+        self._has_watchdog = bus.has_watchdog
         self.lost = False
 
     def try_reopen(self) -> bool:
@@ -127,8 +137,9 @@ class ServoLine:
 
     @property
     def unguarded(self) -> Axes:
-        """Return the servos that hold no torque under an armed watchdog."""
-        return np.flatnonzero(~self.state.torque_on | (self.state.watchdog <= 0))
+        """Return the servos that hold no torque under an armed watchdog, where they have one."""
+        unarmed = (self.state.watchdog <= 0) & self._has_watchdog
+        return np.flatnonzero(~self.state.torque_on | unarmed)
 
     @property
     def faulted_but_holding(self) -> list[str]:
@@ -176,7 +187,7 @@ class ServoLine:
     def limit_effort(self, ratios: dict[int, float]) -> bool:
         """Bound the duty of some servos, given by their place in the joint order."""
         by_id = {self._ids[servo]: ratio for servo, ratio in ratios.items()}
-        return self._attempt(lambda bus: _raise_first(bus.write_goal_pwm(by_id)))
+        return self._attempt(lambda bus: _raise_first(bus.limit_effort(by_id)))
 
     def close(self) -> None:
         """Release the line; the servos keep what they do until their watchdog stops them."""
@@ -184,21 +195,19 @@ class ServoLine:
         if bus is not None:
             bus.close()
 
-    def _energise(self, bus: DynamixelBus, servo_id: int) -> None:
-        for register, gain in GAINS.items():
-            bus.write_register(servo_id, register, gain)
+    def _energise(self, bus: ServoBusDriver, servo_id: int) -> None:
         bus.enable_torque([servo_id])
 
-    def _disable(self, bus: DynamixelBus, servos: Axes) -> None:
+    def _disable(self, bus: ServoBusDriver, servos: Axes) -> None:
         if len(servos) > 0:
             _raise_first(bus.disable_torque([self._ids[servo] for servo in servos]))
 
-    def _reboot_faulted(self, bus: DynamixelBus) -> None:
+    def _reboot_faulted(self, bus: ServoBusDriver) -> None:
         self.faults.policy.acknowledge()
         for servo in np.flatnonzero(self.state.error):
             bus.reboot(self._ids[servo])
 
-    def _attempt(self, act: Callable[[DynamixelBus], None]) -> bool:
+    def _attempt(self, act: Callable[[ServoBusDriver], None]) -> bool:
         if self._bus is None or self.lost:
             self.failure = f"{self.name}: the servo bus is lost"
             return False
@@ -218,7 +227,7 @@ class ServoLine:
         self.close()
 
 
-def _first_state(bus: DynamixelBus) -> BusState:
+def _first_state(bus: ServoBusDriver) -> BusState:
     """Read until every servo has told its position once."""
     for _ in range(_FIRST_READS):
         state = bus.read_state()

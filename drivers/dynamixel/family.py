@@ -1,0 +1,116 @@
+"""Offer Dynamixel X servos to those who do not care which family a servo is of."""
+
+from collections.abc import Collection, Sequence
+from typing import Final, cast
+
+from drivers.base import ByteTransport
+from drivers.clock import Clock
+from drivers.dynamixel.bus import DynamixelBus
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.tables.control_table import (
+    BAUD_RATES,
+    MODELS,
+    PULSE_RAD,
+    PWM_FULL,
+    VOLTAGE_UNIT_V,
+)
+from drivers.servo.family import ServoFacts
+from drivers.servo.fault_policy import FaultPolicy
+from drivers.servo.joint_servo import JointServo
+
+HOLD_GAINS: Final = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
+"""Written whenever a servo is powered, since a reboot forgets them.
+
+P is what the gravity offset reckons with. With the factory's 800 and no D a loaded elbow rings for
+half a second after a stop; with these it stands in half of that, and trails its setpoint half as
+far.
+"""
+FULL_DUTY_ERROR_RAD: Final = PWM_FULL * 128.0 / HOLD_GAINS["position_p_gain"] * PULSE_RAD
+"""e-manual: duty in PWM units is the error in pulses times P / 128."""
+
+
+class DynamixelFamily:
+    """Make Dynamixel servos and buses."""
+
+    name: Final = "dynamixel"
+
+    @property
+    def models(self) -> Collection[str]:
+        """Return the names of the models."""
+        return MODELS
+
+    @property
+    def baud_rates(self) -> Collection[int]:
+        """Return the speeds that a servo can be set to, in bits per second."""
+        return BAUD_RATES.values()
+
+    def facts(self, model: str) -> ServoFacts:
+        """Return what control must know of a model; limits are the factory's."""
+        sheet = MODELS[model]
+
+        def initial(name: str) -> int:
+            value = sheet.registers[name].initial
+            assert value is not None, f"{model}: {name} has no factory value"
+            return value
+
+        return ServoFacts(
+            senses_current=sheet.current_unit_a is not None,
+            full_duty_error_rad=FULL_DUTY_ERROR_RAD,
+            temperature_limit_c=float(initial("temperature_limit")),
+            voltage_limits_v=(
+                initial("min_voltage_limit") * VOLTAGE_UNIT_V,
+                initial("max_voltage_limit") * VOLTAGE_UNIT_V,
+            ),
+        )
+
+    def servo(
+        self,
+        *,
+        servo_id: int,
+        model_name: str,
+        joint: str,
+        sign: int,
+        offset_rad: float,
+        travel_per_rad: float,
+    ) -> ServoSpec:
+        """Declare a servo.
+
+        Raises:
+            ValueError: a value is out of its range.
+        """
+        return ServoSpec(
+            id=servo_id,
+            model_name=model_name,
+            joint=joint,
+            sign=sign,
+            offset_rad=offset_rad,
+            travel_per_rad=travel_per_rad,
+        )
+
+    def bus(
+        self,
+        transport: ByteTransport,
+        clock: Clock,
+        servos: Sequence[JointServo],
+        *,
+        baud: int,
+        watchdog_s: float,
+        fault_policy: FaultPolicy,
+    ) -> DynamixelBus:
+        """Make a bus whose servos hold with `HOLD_GAINS`; nothing is sent yet.
+
+        Raises:
+            ValueError: an id or joint twice, or the watchdog time is out of range.
+        """
+        return DynamixelBus(
+            transport,
+            clock,
+            cast("Sequence[ServoSpec]", servos),
+            baud=baud,
+            watchdog_s=watchdog_s,
+            hold_gains=HOLD_GAINS,
+            fault_policy=fault_policy,
+        )
+
+
+FAMILY: Final = DynamixelFamily()

@@ -1,0 +1,197 @@
+"""Run what a connected bus does in every cycle, and bring servos back that were away."""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from drivers.errors import DriverError, LinkLost, NoReply, ProtocolError
+from drivers.feetech.block import BLOCK_BYTES, FeetechBlock
+from drivers.feetech.goals import FeetechGoals
+from drivers.feetech.link import FeetechLink
+from drivers.feetech.servo import FeetechServo
+from drivers.feetech.settings import (
+    EEPROM_BYTES,
+    FeetechSetup,
+    write_kept_settings,
+    write_run_settings,
+)
+from drivers.feetech.table import hardware_errors
+from drivers.servo.journal import BusJournal
+from drivers.servo.patience import ReplyPatience
+from drivers.servo.roster import Roster
+from drivers.servo.state import BusState
+
+_NEVER_NS: Final = -1
+_MOST_NOTICES: Final = 64
+_PROBE_EVERY_TURNS: Final = 5
+
+
+class FeetechCycle:
+    """Read all servos, look after those that need it, and write goals.
+
+    `notices` tell what was written to servos and which have come back, the newest last.
+    """
+
+    def __init__(
+        self,
+        link: FeetechLink,
+        servos: Sequence[FeetechServo],
+        setups: Sequence[FeetechSetup],
+        state: BusState,
+        journal: BusJournal,
+        *,
+        margin_s: float,
+        health_every_cycles: int,
+    ) -> None:
+        """Work on servos that were set up as `setups` says."""
+        self._link = link
+        self._servos = servos
+        self._offsets = [setup.homing_offset for setup in setups]
+        self._state = state
+        self._journal = journal
+        self._margin_s = margin_s
+        self._patience = ReplyPatience(margin_s=margin_s, attempts=1)
+        self._roster = Roster(len(servos))
+        self._stamps_ns: NDArray[np.int64] = np.full(len(servos), _NEVER_NS, dtype=np.int64)
+        self._every_cycles = health_every_cycles
+        self._count = self._turn = 0
+        self._urgent: deque[int] = deque()
+        self.goals = FeetechGoals(link, servos, setups, margin_s=margin_s)
+        self.notices: deque[str] = deque(maxlen=_MOST_NOTICES)
+        for servo, setup in zip(servos, setups, strict=True):
+            self.notices += [f"{servo}: set {text}" for text in setup.written]
+        self._block = self._new_block()
+
+    def read(self) -> None:
+        """Read the block of all servos, and at most one servo's torque switch.
+
+        Raises:
+            LinkLost: the adapter is gone; all values go on growing old with each call.
+        """
+        try:
+            self._read_block()
+        except LinkLost:
+            self._note_silence()
+            raise
+        self._look_after()
+
+    def suspend(self, index: int) -> None:
+        """Take a servo out of the block read; it rejoins when it answers again."""
+        self._roster.suspend(index)
+        self._block = self._new_block()
+
+    def ask_torque(self, index: int) -> None:
+        """Read in one of the next cycles whether a servo has torque."""
+        if index not in self._urgent:
+            self._urgent.append(index)
+
+    def _new_block(self) -> FeetechBlock:
+        return FeetechBlock(self._roster.polled, self._servos, self._offsets, self._state)
+
+    def _read_block(self) -> None:
+        link, block = self._link, self._block
+        if block.in_one:
+            reply, deadline_ns = link.exchange(block.request, block.reply_bytes, self._margin_s)
+            if not block.take(reply):
+                packets = link.collect(block.ids, BLOCK_BYTES, reply, deadline_ns)
+                block.take_packets(packets)
+        else:
+            block.take_packets(block.read_singly(link, self._margin_s))
+        self._finish()
+
+    def _finish(self) -> None:
+        state, block, counters = self._state, self._block, self._link.counters
+        state.stamp_ns = self._link.now_ns()
+        counters.cycles += 1
+        self._journal.answer_times_ns.append(state.stamp_ns - self._link.last_sent_ns)
+        answered = list(block.answered)
+        self._note_errors(answered)
+        state.valid[:] = False
+        state.valid[answered] = True
+        self._stamps_ns[answered] = state.stamp_ns
+        self._update_ages()
+        if len(answered) == len(self._servos):
+            self._roster.note_complete()
+            return
+        self._journal.note_gaps()
+        if len(answered) == len(block.members):
+            self._roster.note_complete()
+            return
+        counters.partial_cycles += 1
+        missing = [index for index in block.members if index not in answered]
+        if answered and (dropped := self._roster.note_missing(missing)):
+            counters.suspensions += len(dropped)
+            self._block = self._new_block()
+
+    def _note_errors(self, answered: Sequence[int]) -> None:
+        """Translate the error bytes; what they take away is read from the servo itself."""
+        state = self._state
+        before = state.error[answered].copy()
+        state.error[answered] = [hardware_errors(code) for code in self._block.errors.tolist()]
+        state.alert[answered] = state.error[answered] != 0
+        for place in np.flatnonzero(before != state.error[answered]).tolist():
+            self.ask_torque(answered[place])
+        self._journal.note_errors()
+
+    def _note_silence(self) -> None:
+        self._state.valid[:] = False
+        self._state.stamp_ns = self._link.now_ns()
+        self._update_ages()
+
+    def _update_ages(self) -> None:
+        age_s = (self._state.stamp_ns - self._stamps_ns) / NS_PER_S
+        self._state.age_s[:] = np.where(self._stamps_ns == _NEVER_NS, np.inf, age_s)
+
+    # --- one transaction beside the block ------------------------------------------------------
+
+    def _look_after(self) -> None:
+        if self._urgent:
+            self._read_torque(self._urgent.popleft())
+            return
+        self._count += 1
+        if self._count % self._every_cycles:
+            return
+        self._turn += 1
+        away, polled = self._roster.suspended, self._roster.polled
+        if away and (len(away) > len(polled) or self._turn % _PROBE_EVERY_TURNS == 0):
+            self._probe(away[self._turn % len(away)])
+            return
+        self._read_torque(polled[self._turn % len(polled)])
+
+    def _read_torque(self, index: int) -> None:
+        try:
+            value = self._link.read(self._servos[index], "torque_enable", self._patience)
+        except (NoReply, ProtocolError):  # counted by the link; the next turn asks again
+            return
+        self._state.torque_on[index] = value == 1
+
+    def _probe(self, index: int) -> None:
+        """Ask a servo that was away, and set it up again if it answers."""
+        servo = self._servos[index]
+        try:
+            images = self._link.read_spans([servo], 0, EEPROM_BYTES, self._patience)
+            if servo.id not in images:
+                return
+            told = self._bring_back(servo, images[servo.id].params)
+        except LinkLost:
+            raise
+        except DriverError:  # counted by the link; the next probe begins anew
+            return
+        self._state.torque_on[index] = not told
+        self._roster.resume(index)
+        self._block = self._new_block()
+        self.goals.forget_limit(servo.id)
+        self._link.counters.returns += 1
+        self.notices.append("; ".join([f"{servo}: answers again", *told]))
+
+    def _bring_back(self, servo: FeetechServo, image: bytes) -> list[str]:
+        """Return what was written: nothing to one that has kept its torque, and so its memory."""
+        if self._link.read(servo, "torque_enable", self._patience):
+            return []
+        told = list(write_kept_settings(self._link, servo, image))
+        write_run_settings(self._link, servo)
+        return ["torque is off until it is armed anew", *told]

@@ -1,0 +1,129 @@
+"""Write goals for all servos, converted from the joint side and clamped to the servo's range."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import DriverError, LinkLost
+from drivers.feetech.codec import (
+    FEETECH_BROADCAST_ID,
+    FEETECH_HEADER,
+    FeetechInstruction,
+    encode_packet,
+)
+from drivers.feetech.link import FeetechLink
+from drivers.feetech.servo import FeetechServo
+from drivers.feetech.settings import FeetechSetup
+from drivers.feetech.table import LOAD_FULL
+from drivers.servo.patience import ReplyPatience
+
+_FIRST_RECORD = len(FEETECH_HEADER) + 5  # id, length, instruction, address, size
+_RECORD_BYTES = 3
+_SIGN = 0x8000
+
+Floats = NDArray[np.float64]
+
+
+class FeetechGoals:
+    """Write goal positions in one sync write, and torque limits when they change."""
+
+    def __init__(
+        self,
+        link: FeetechLink,
+        servos: Sequence[FeetechServo],
+        setups: Sequence[FeetechSetup],
+        *,
+        margin_s: float,
+    ) -> None:
+        self._link = link
+        self._servos = {servo.id: servo for servo in servos}
+        self._joints = [servo.joint for servo in servos]
+        self._patience = ReplyPatience(margin_s=margin_s, attempts=2)
+        self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
+        offsets = [setup.homing_offset for setup in setups]
+        self._at_zero = np.array(
+            [servo.to_joint(offset) for servo, offset in zip(servos, offsets, strict=True)]
+        )
+        self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
+        self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
+        self._big = np.array([servo.datasheet.byte_order == "big" for servo in servos])
+        self._pulses = np.zeros(len(servos))
+        self._limits = {
+            servo.id: setup.torque_limit for servo, setup in zip(servos, setups, strict=True)
+        }
+        self._sent_limits: dict[int, int] = {}
+        register = servos[0].datasheet.registers["goal_position"]
+        params = bytes((register.address, register.size))
+        for servo in servos:
+            params += bytes((servo.id, 0, 0))
+        frame = encode_packet(FEETECH_BROADCAST_ID, FeetechInstruction.SYNC_WRITE, params)
+        self._frame = np.frombuffer(bytearray(frame), np.uint8)
+        self._records = self._frame[_FIRST_RECORD:-1].reshape(len(servos), _RECORD_BYTES)
+
+    @property
+    def sent(self) -> Floats:
+        """Return the goals sent last, on the joint side."""
+        joint: Floats = self._pulses * self._per_pulse + self._at_zero
+        return joint
+
+    def write(self, position_rad: Floats) -> None:
+        """Send a goal to every servo.
+
+        Raises:
+            ValueError: a goal is not finite, or there is not one per servo.
+            LinkLost: the adapter is gone.
+        """
+        if position_rad.shape != self._pulses.shape or not np.isfinite(position_rad).all():
+            self._refuse(position_rad)
+        pulses = np.rint((position_rad - self._at_zero) / self._per_pulse)
+        np.clip(pulses, self._minimum, self._maximum, out=self._pulses)
+        words = np.abs(self._pulses).astype(np.uint16)
+        words |= np.where(self._pulses < 0, _SIGN, 0).astype(np.uint16)
+        low, high = words & 0xFF, words >> 8
+        self._records[:, 1] = np.where(self._big, high, low)
+        self._records[:, 2] = np.where(self._big, low, high)
+        frame = self._frame
+        frame[-1] = ~int(frame[len(FEETECH_HEADER) : -1].sum(dtype=np.uint32)) & 0xFF
+        self._link.send(frame.tobytes())
+
+    def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
+        """Limit the duty of servos by id, where it changed; return those that did not take it.
+
+        Raises:
+            ValueError: a ratio is not within 0..1, an id is unknown, or a servo has no limit.
+            LinkLost: the adapter is gone.
+        """
+        failures: dict[int, DriverError] = {}
+        for servo_id, ratio in ratios.items():
+            value = self._limit_value(servo_id, ratio)
+            if self._sent_limits.get(servo_id) == value:
+                continue
+            try:
+                self._link.write(self._servos[servo_id], "torque_limit", value, self._patience)
+                self._sent_limits[servo_id] = value
+            except LinkLost:
+                raise
+            except DriverError as error:
+                failures[servo_id] = error
+        return failures
+
+    def forget_limit(self, servo_id: int) -> None:
+        """Write the torque limit anew the next time: the servo has lost it."""
+        self._sent_limits.pop(servo_id, None)
+
+    def _limit_value(self, servo_id: int, ratio: float) -> int:
+        if servo_id not in self._servos:
+            raise ValueError(f"no servo {servo_id} on this bus; it has {sorted(self._servos)}")
+        if not 0.0 <= ratio <= 1.0:
+            raise ValueError(
+                f"{self._servos[servo_id]}: effort ratio must be within 0..1, got {ratio}"
+            )
+        return min(round(ratio * LOAD_FULL), self._limits[servo_id])
+
+    def _refuse(self, position_rad: Floats) -> None:
+        if position_rad.shape != self._pulses.shape:
+            raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
+        finite = np.isfinite(position_rad)
+        bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
+        raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")

@@ -1,0 +1,44 @@
+"""Declare one FEETECH servo of a robot."""
+
+from dataclasses import dataclass
+
+from drivers.feetech.codec import FEETECH_MAX_ID
+from drivers.feetech.table import FEETECH_MODELS, FeetechDatasheet
+from drivers.servo.joint_servo import JointServo
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeetechServo(JointServo):
+    """Describe a FEETECH servo as the robot file declares it.
+
+    Pulses are those of the encoder: what the servo's homing offset takes off is added again, so
+    that a servo calibrated by other software keeps its offset and needs none in the robot file.
+    """
+
+    def _checks(self) -> list[tuple[bool, str]]:
+        return [
+            (
+                not 0 <= self.id <= FEETECH_MAX_ID,
+                f"id must be 0..{FEETECH_MAX_ID}, got {self.id}",
+            ),
+            (
+                self.model_name not in FEETECH_MODELS,
+                f"model must be one of {sorted(FEETECH_MODELS)}, got {self.model_name!r}",
+            ),
+            *JointServo._checks(self),
+        ]
+
+    @property
+    def datasheet(self) -> FeetechDatasheet:
+        """Return the control table and figures of the servo's model."""
+        return FEETECH_MODELS[self.model_name]
+
+    @property
+    def pulse_rad(self) -> float:
+        """Return the angle of one step."""
+        return self.datasheet.step_rad
+
+    @property
+    def centre_pulse(self) -> int:
+        """Return the step from which a joint's offset counts."""
+        return self.datasheet.centre_step

@@ -1,0 +1,111 @@
+"""Find the driver of a servo by its model's name; a family loads when it is asked for."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Final, Protocol
+
+from drivers.base import ByteTransport
+from drivers.clock import Clock
+from drivers.errors import UnknownModel
+from drivers.servo.bus import ServoBusDriver
+from drivers.servo.fault_policy import FaultPolicy
+from drivers.servo.joint_servo import JointServo
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoFacts:
+    """Hold what control must know of a servo model."""
+
+    senses_current: bool
+    """Its effort is the motor's current, and not the duty that is put on it."""
+    full_duty_error_rad: float
+    """The position error of the shaft at which the motor gives all it has, by our gains."""
+    temperature_limit_c: float
+    voltage_limits_v: tuple[float, float]
+
+
+class ServoFamily(Protocol):
+    """Make servos and buses of one family."""
+
+    @property
+    def name(self) -> str:
+        """Return the family's name."""
+        ...
+
+    @property
+    def models(self) -> Collection[str]:
+        """Return the names of the models."""
+        ...
+
+    @property
+    def baud_rates(self) -> Collection[int]:
+        """Return the speeds that a servo can be set to, in bits per second."""
+        ...
+
+    def facts(self, model: str) -> ServoFacts:
+        """Return what control must know of a model."""
+        ...
+
+    def servo(
+        self,
+        *,
+        servo_id: int,
+        model_name: str,
+        joint: str,
+        sign: int,
+        offset_rad: float,
+        travel_per_rad: float,
+    ) -> JointServo:
+        """Declare a servo.
+
+        Raises:
+            ValueError: a value is out of its range.
+        """
+        ...
+
+    def bus(
+        self,
+        transport: ByteTransport,
+        clock: Clock,
+        servos: Sequence[JointServo],
+        *,
+        baud: int,
+        watchdog_s: float,
+        fault_policy: FaultPolicy,
+    ) -> ServoBusDriver:
+        """Make a bus of servos that this family has declared; nothing is sent yet.
+
+        Raises:
+            ValueError: an id or joint twice, or the watchdog time is out of range.
+        """
+        ...
+
+
+FAMILIES: Final = ("dynamixel", "feetech")
+
+
+def servo_family(name: str) -> ServoFamily:
+    """Return a family by its name.
+
+    Raises:
+        UnknownModel: there is none of this name.
+    """
+    if name not in FAMILIES:
+        raise UnknownModel(f"servo family: expected one of {', '.join(FAMILIES)}; got {name!r}")
+    family: ServoFamily = import_module(f"drivers.{name}.family").FAMILY
+    return family
+
+
+def family_of(model: str) -> ServoFamily:
+    """Return the family of a servo model.
+
+    Raises:
+        UnknownModel: no family has the model; the message lists those there are.
+    """
+    families = [servo_family(name) for name in FAMILIES]
+    for family in families:
+        if model in family.models:
+            return family
+    known = "; ".join(f"{family.name}: {', '.join(sorted(family.models))}" for family in families)
+    raise UnknownModel(f"servo model {model!r} is not known; there are: {known}")
