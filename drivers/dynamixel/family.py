@@ -14,6 +14,7 @@ from drivers.dynamixel.tables.control_table import (
     PWM_FULL,
     VOLTAGE_UNIT_V,
 )
+from drivers.dynamixel.tools.bench import DynamixelBench
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
@@ -111,6 +112,10 @@ class DynamixelFamily:
             hold_gains=HOLD_GAINS,
             fault_policy=fault_policy,
         )
+
+    def bench(self, transport: ByteTransport, clock: Clock, baud: int) -> DynamixelBench:
+        """Take over a transport, to work on single servos without a robot file."""
+        return DynamixelBench(transport, clock, baud)
 
 
 FAMILY: Final = DynamixelFamily()

@@ -8,6 +8,7 @@ from drivers.clock import Clock
 from drivers.feetech.bus import HOLD_GAINS, FeetechBus
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS
+from drivers.feetech.tools.bench import FeetechBench
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
@@ -93,6 +94,10 @@ class FeetechFamily:
             baud=baud,
             fault_policy=fault_policy,
         )
+
+    def bench(self, transport: ByteTransport, clock: Clock, baud: int) -> FeetechBench:
+        """Take over a transport, to work on single servos without a robot file."""
+        return FeetechBench(transport, clock, baud)
 
 
 FAMILY: Final = FeetechFamily()

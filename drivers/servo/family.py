@@ -11,6 +11,7 @@ from drivers.errors import UnknownModel
 from drivers.servo.bus import ServoBusDriver
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import ServoBench
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +80,10 @@ class ServoFamily(Protocol):
         Raises:
             ValueError: an id or joint twice, or the watchdog time is out of range.
         """
+        ...
+
+    def bench(self, transport: ByteTransport, clock: Clock, baud: int) -> ServoBench:
+        """Take over a transport, to work on single servos without a robot file."""
         ...
 
 

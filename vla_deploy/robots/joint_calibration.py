@@ -5,12 +5,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tools import BenchLink
-from drivers.dynamixel.tools.bench_link import ONE_TRY
-from drivers.dynamixel.tools.calibration_guide import GuidedJoint
-from drivers.dynamixel.tools.travel import JointRange, ServoMounting
 from drivers.errors import NoReply
+from drivers.servo.family import family_of
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import ONE_TRY, ServoBench
+from drivers.servo.tools.calibration_guide import GuidedJoint
+from drivers.servo.tools.travel import JointRange, ServoMounting
 from vla_deploy.robots.calibration.calibration import (
     JointCalibration,
     read_calibration,
@@ -30,7 +30,14 @@ def guided_joints(robot: RobotDescription, names: Sequence[str]) -> list[GuidedJ
         low, high = ranges[name] or limits
         joints.append(
             GuidedJoint(
-                servo=ServoSpec(id=servo.id, model_name=servo.model, joint=name),
+                servo=family_of(servo.model).servo(
+                    servo_id=servo.id,
+                    model_name=servo.model,
+                    joint=name,
+                    sign=1,
+                    offset_rad=0.0,
+                    travel_per_rad=1.0,
+                ),
                 range=JointRange(
                     joint=name,
                     low=low,
@@ -46,8 +53,8 @@ def guided_joints(robot: RobotDescription, names: Sequence[str]) -> list[GuidedJ
 
 
 def answering_servos(
-    robot: RobotDescription, link: BenchLink, names: Sequence[str]
-) -> list[ServoSpec]:
+    robot: RobotDescription, link: ServoBench, names: Sequence[str]
+) -> list[JointServo]:
     """Return the robot's servos that answer; those of the named joints must.
 
     Raises:

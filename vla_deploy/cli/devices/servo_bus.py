@@ -9,19 +9,23 @@ from pathlib import Path
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock, MonotonicClock
-from drivers.dynamixel.tables.control_table import BAUD_RATES
-from drivers.dynamixel.tools import BenchLink
-from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.errors import DeviceMissing
 from drivers.recording.recorder import RecordingTransport, WireRecorder
 from drivers.serial_port import SerialPort
+from drivers.servo.family import FAMILIES, ServoFamily, family_of, servo_family
+from drivers.servo.tools.bench import ServoBench
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.robots import RobotDescription, load_robot
 
-SPEEDS = tuple(sorted(rate for rate in BAUD_RATES.values() if rate != 4_500_000))
+_NO_TTY_SPEEDS = (4_500_000, 250_000, 128_000)
+SPEEDS = tuple(
+    sorted(
+        {rate for name in FAMILIES for rate in servo_family(name).baud_rates} - set(_NO_TTY_SPEEDS)
+    )
+)
 """The speeds of servos that a tty offers too."""
+HIGHEST_ID = 253
 DEFAULT_BAUD = 1_000_000
-FACTORY_BAUD = 57_600
 SERIAL_NAMES = ("ttyUSB*", "ttyACM*", "ttyTHS*")
 
 
@@ -31,6 +35,7 @@ class ServoBusPort:
 
     port: Path
     baud: int
+    family: ServoFamily = field(default_factory=lambda: servo_family(FAMILIES[0]))
     baud_given: bool = True
     robot: RobotDescription | None = None
     record: Path | None = None
@@ -42,7 +47,7 @@ class ServoBusPort:
         return str(self.port.resolve()).startswith("/dev/pts/")
 
     @contextmanager
-    def open(self, baud: int | None = None) -> Iterator[BenchLink]:
+    def open(self, baud: int | None = None) -> Iterator[ServoBench]:
         """Open the bus for a `with` block.
 
         Raises:
@@ -56,7 +61,7 @@ class ServoBusPort:
             raise DeviceMissing(f"{error}; choose one by --port: {_ports_here()}") from error
         if self.record is not None:
             transport = RecordingTransport(transport, self._recorder(self.record, baud))
-        link = BenchLink(transport, self.clock, baud)
+        link = self.family.bench(transport, self.clock, baud)
         try:
             link.detect_echo()
             yield link
@@ -68,6 +73,11 @@ class ServoBusPort:
         if baud != self.baud:
             file = file.with_name(f"{file.stem}-{baud}{file.suffix}")
         return WireRecorder(file, self.clock, note=f"{self.port} at {baud} baud")
+
+    @property
+    def speeds(self) -> tuple[int, ...]:
+        """Return the speeds of the family that a tty offers too."""
+        return tuple(speed for speed in SPEEDS if speed in self.family.baud_rates)
 
     @property
     def declared(self) -> dict[int, tuple[str, str]]:
@@ -110,6 +120,9 @@ def add_bus_arguments(command: argparse.ArgumentParser) -> None:
         help=f"speed in bit/s: {', '.join(map(str, SPEEDS))} "
         f"(default: the robot's, or {DEFAULT_BAUD} with --port)",
     )
+    command.add_argument(
+        "--family", choices=FAMILIES, help="of the servos (default: the robot's, or dynamixel)"
+    )
     command.add_argument("--record", type=Path, metavar="FILE", help="record the wire to this file")
     command.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -123,9 +136,13 @@ def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
     is_port_alone = arguments.port is not None and arguments.robot is None
     robot = None if is_port_alone else load_robot(arguments.robot or "butler")
     bus = None if robot is None else robot.servo_bus
+    family = servo_family(arguments.family or FAMILIES[0])
+    if bus is not None and arguments.family is None:
+        family = family_of(bus.servos[0].model)
     return ServoBusPort(
         port=arguments.port or Path(bus.path if bus else ""),
         baud=arguments.baud or (bus.baud if bus else DEFAULT_BAUD),
+        family=family,
         baud_given=arguments.baud is not None,
         robot=robot,
         record=arguments.record,
@@ -138,8 +155,8 @@ def servo_id(text: str) -> int:
     Raises:
         argparse.ArgumentTypeError: it is no id that a servo can have.
     """
-    if not text.isdecimal() or int(text) > MAX_SERVO_ID:
-        raise argparse.ArgumentTypeError(f"expected an id in 0..{MAX_SERVO_ID}, got {text!r}")
+    if not text.isdecimal() or int(text) > HIGHEST_ID:
+        raise argparse.ArgumentTypeError(f"expected an id in 0..{HIGHEST_ID}, got {text!r}")
     return int(text)
 
 

@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tables.control_table import PULSES_PER_REV
-from drivers.dynamixel.tools import BenchLink
-from drivers.dynamixel.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
-from drivers.dynamixel.tools.travel import ServoMounting, TravelRefused
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import ServoBench
+from drivers.servo.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
+from drivers.servo.tools.travel import PULSES_PER_REV, ServoMounting, TravelRefused
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
     ServoBusPort,
@@ -85,7 +84,7 @@ def calibrate(
     arguments: argparse.Namespace,
     bus: ServoBusPort,
     robot: RobotDescription,
-    link: BenchLink,
+    link: ServoBench,
     person: Person,
 ) -> int:
     """Do the work of `run` on an open bus.
@@ -102,9 +101,7 @@ def calibrate(
     watched = answering_servos(robot, link, names)
     _release(arguments, link, watched)
     record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
-    guide = CalibrationGuide(
-        link.registers, watched, person, bus.clock, accept_sign=arguments.accept_sign
-    )
+    guide = CalibrationGuide(link, watched, person, bus.clock, accept_sign=arguments.accept_sign)
     failures = []
     if pose:
         stands = guide.as_it_stands({joint: pose[joint.name] for joint in joints})
@@ -156,10 +153,10 @@ def _store(
     person.tell(f"written to {record.file}")
 
 
-def _warn_of_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Person) -> None:
+def _warn_of_turns(link: ServoBench, joints: Sequence[GuidedJoint], person: Person) -> None:
     """Warn of servos that were turned by hand beyond the range in which they take goals."""
     for joint in joints:
-        position = link.read(joint.servo, "present_position")
+        position = link.positions([joint.servo]).get(joint.servo.id, 0)
         if not 0 <= position < PULSES_PER_REV:
             person.tell(
                 f"{joint.servo} counts {position} pulses, beyond one turn; restart it before the "
@@ -167,14 +164,14 @@ def _warn_of_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Perso
             )
 
 
-def _release(arguments: argparse.Namespace, link: BenchLink, servos: Sequence[ServoSpec]) -> None:
-    powered = [servo for servo in servos if link.read(servo, "torque_enable")]
+def _release(arguments: argparse.Namespace, link: ServoBench, servos: Sequence[JointServo]) -> None:
+    powered = [servo for servo in servos if link.torque_is_on(servo)]
     if not powered:
         return
     joints = ", ".join(servo.joint for servo in powered)
     confirm(arguments, f"The torque of {joints} goes off: hold what would fall.")
     for servo in powered:
-        link.write(servo, "torque_enable", 0)
+        link.release(servo)
 
 
 def _read_pose(robot: RobotDescription, text: str) -> dict[str, float]:

@@ -4,15 +4,12 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tables.control_table import BAUD_RATES
-from drivers.dynamixel.tools import BenchLink
-from drivers.dynamixel.tools.bench_link import Keep
-from drivers.dynamixel.tools.scan import is_clash, is_taken
 from drivers.errors import DriverError, NoReply, ProtocolError
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import Keep, ServoBench
+from drivers.servo.tools.scan import is_taken
 from vla_deploy.cli.commands import Run, add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
-    FACTORY_BAUD,
     SPEEDS,
     ServoBusPort,
     add_bus_arguments,
@@ -22,9 +19,6 @@ from vla_deploy.cli.devices.servo_bus import (
     servo_id,
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
-
-BAUD_CODES = {rate: code for code, rate in BAUD_RATES.items()}
-KEEP = {"id": Keep.ID, "id-and-baud": Keep.ID_AND_BAUD, "nothing": Keep.NOTHING}
 
 
 def register(commands: Any) -> None:
@@ -51,7 +45,8 @@ def register(commands: Any) -> None:
         run_factory_reset,
     )
     reset.add_argument("id", type=servo_id)
-    reset.add_argument("--keep", choices=KEEP, default="id", help="what stays (default: id)")
+    kept = [one.value for one in Keep]
+    reset.add_argument("--keep", choices=kept, default="id", help="what stays (default: id)")
 
 
 def _add(commands: Any, name: str, summary: str, example: str, run: Run) -> argparse.ArgumentParser:
@@ -78,25 +73,25 @@ def run_set_id(arguments: argparse.Namespace) -> int:
             raise UsageError(f"{bus.port}: id {new} is taken; see: vla-deploy servo scan")
         torque = _torque_question(link, [servo])
         confirm(arguments, f"{servo} gets the id {new}.{torque}")
-        link.write(servo, "torque_enable", 0)
-        link.write(servo, "id", new)
-        moved = link.servo(new, bus.joint(new))
-        if link.read(moved, "id") != new or is_taken(link, old):
+        link.release(servo)
+        link.set_id(servo, new)
+        link.servo(new, bus.joint(new))
+        if is_taken(link, old):
             raise CommandFailed(f"{servo}: did not take the id {new}; see: vla-deploy servo scan")
     document = {"id": new, "old_id": old}
     return emit(arguments, document, f"{servo} has the id {new} now", indent=None)
 
 
-def _require_alone(link: BenchLink, bus: ServoBusPort, one: int) -> None:
-    if is_clash(link, one):
+def _require_alone(link: ServoBench, bus: ServoBusPort, one: int) -> None:
+    if link.is_clash(one):
         raise UsageError(
             f"{bus.port}: more than one servo has the id {one}, both would change; connect one of "
             "them alone"
         )
 
 
-def _torque_question(link: BenchLink, servos: Sequence[ServoSpec]) -> str:
-    powered = [servo for servo in servos if link.read(servo, "torque_enable")]
+def _torque_question(link: ServoBench, servos: Sequence[JointServo]) -> str:
+    powered = [servo for servo in servos if link.torque_is_on(servo)]
     if not powered:
         return ""
     names = ", ".join(map(str, powered))
@@ -114,14 +109,14 @@ def run_set_baud(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         servos = [link.servo(one, bus.joint(one)) for one in arguments.ids]
         for servo in servos:
-            _require_speed(servo, new)
+            _require_speed(link, servo, new)
             _require_alone(link, bus, servo.id)
         names = ", ".join(map(str, servos))
         torque = _torque_question(link, servos)
         confirm(arguments, f"{names}: {bus.baud} baud becomes {new} baud.{torque}")
         for servo in servos:
-            link.write(servo, "torque_enable", 0)
-            link.write(servo, "baud_rate", BAUD_CODES[new])
+            link.release(servo)
+            link.set_baud(servo, new)
     with bus.open(new) as link:
         for servo in servos:
             _require_new_speed(link, bus, servo, new)
@@ -129,23 +124,23 @@ def run_set_baud(arguments: argparse.Namespace) -> int:
     return emit(arguments, document, f"{names}: {new} baud", indent=None)
 
 
-def _require_speed(servo: ServoSpec, baud: int) -> None:
-    fastest = servo.model.registers["baud_rate"].maximum
-    if fastest is not None and BAUD_CODES[baud] > fastest:
-        raise UsageError(f"{servo}: at most {BAUD_RATES[fastest]} baud, got {baud}")
+def _require_speed(link: ServoBench, servo: JointServo, baud: int) -> None:
+    bauds = link.bauds(servo)
+    if baud not in bauds:
+        raise UsageError(f"{servo}: speeds are {', '.join(map(str, sorted(bauds)))}, got {baud}")
 
 
-def _require_new_speed(link: BenchLink, bus: ServoBusPort, servo: ServoSpec, baud: int) -> None:
+def _require_new_speed(link: ServoBench, bus: ServoBusPort, servo: JointServo, baud: int) -> None:
     try:
-        got = link.read(servo, "baud_rate")
+        got = link.present_baud(servo)
     except (NoReply, ProtocolError) as error:
         raise CommandFailed(
             f"{servo} took {baud} baud, but does not answer at it; the adapter may be too slow. "
             f"Find it: vla-deploy servo scan --port {bus.port}; go back: vla-deploy servo "
             f"set-baud {bus.baud} {servo.id} --port {bus.port} --baud {baud}"
         ) from error
-    if got != BAUD_CODES[baud]:
-        raise CommandFailed(f"{servo}: baud_rate is {got}, expected {BAUD_CODES[baud]}")
+    if got != baud:
+        raise CommandFailed(f"{servo}: says {got} baud, expected {baud}")
 
 
 def run_reboot(arguments: argparse.Namespace) -> int:
@@ -160,9 +155,9 @@ def run_reboot(arguments: argparse.Namespace) -> int:
         torque = _torque_question(link, [servo])
         if torque:
             confirm(arguments, f"{servo} restarts.{torque}")
-        before = link.read(servo, "hardware_error_status")
+        before = link.hardware_error(servo)
         link.reboot(servo)
-        after = link.read(servo, "hardware_error_status")
+        after = link.hardware_error(servo)
     document = {"id": servo.id, "hardware_error_before": before, "hardware_error": after}
     text = f"{servo} is back, torque off; hardware error {before} before, {after} now"
     return emit(arguments, document, text, indent=None)
@@ -176,9 +171,9 @@ def run_factory_reset(arguments: argparse.Namespace) -> int:
         CommandFailed: it does not come back; the message says where to look.
         DriverError: the servo is silent or refuses.
     """
-    bus, keep = bus_of(arguments), KEEP[arguments.keep]
+    bus, keep = bus_of(arguments), Keep(arguments.keep)
     new_id = 1 if keep is Keep.NOTHING else arguments.id
-    new_baud = bus.baud if keep is Keep.ID_AND_BAUD else FACTORY_BAUD
+    new_baud = bus.baud if keep is Keep.ID_AND_BAUD else None
     with bus.open() as link:
         servo = link.servo(arguments.id, bus.joint(arguments.id))
         _require_alone(link, bus, servo.id)
@@ -186,8 +181,9 @@ def run_factory_reset(arguments: argparse.Namespace) -> int:
             raise UsageError(f"{servo} would get the id {new_id}, which is taken; use --keep id")
         torque = _torque_question(link, [servo])
         confirm(arguments, f"{servo} forgets all settings but {arguments.keep}.{torque}")
-        link.write(servo, "torque_enable", 0)
+        link.release(servo)
         link.factory_reset(servo, keep)
+        new_baud = new_baud or link.factory_baud
     try:
         with bus.open(new_baud) as link:
             link.await_boot(new_id)

@@ -8,9 +8,9 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tools import BenchLink, scan_speed
-from drivers.dynamixel.tools.servo_readings import ServoReading, read_servos
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import ServoBench, ServoReading
+from drivers.servo.tools.scan import scan_speed
 from vla_deploy.cli.commands import add_command, number_within, whole_number
 from vla_deploy.cli.devices.servo_bus import ServoBusPort, add_bus_arguments, bus_of, servo_id
 from vla_deploy.cli.errors import CommandFailed
@@ -58,14 +58,14 @@ def run(arguments: argparse.Namespace) -> int:
         sample, due_ns = 0, bus.clock.now_ns()
         while not arguments.count or sample < arguments.count:
             sample += 1
-            _show(arguments.json, servos, link, read_servos(link, servos, bus.joints))
+            _show(arguments.json, servos, link, link.read_servos(servos, bus.joints))
             due_ns += period_ns
             if sample != arguments.count:
                 bus.clock.sleep_until(due_ns)
     return 0
 
 
-def _servos(ids: Sequence[int], link: BenchLink, bus: ServoBusPort) -> list[ServoSpec]:
+def _servos(ids: Sequence[int], link: ServoBench, bus: ServoBusPort) -> list[JointServo]:
     chosen = ids or sorted(bus.joints) or [one.servo_id for one in scan_speed(link).servos]
     if not chosen:
         raise CommandFailed(
@@ -75,7 +75,7 @@ def _servos(ids: Sequence[int], link: BenchLink, bus: ServoBusPort) -> list[Serv
 
 
 def _show(
-    as_json: bool, servos: Sequence[ServoSpec], link: BenchLink, readings: Sequence[ServoReading]
+    as_json: bool, servos: Sequence[JointServo], link: ServoBench, readings: Sequence[ServoReading]
 ) -> None:
     counters = {name: getattr(link.counters, name) for name in COUNTERS}
     answered = {reading.id for reading in readings}

@@ -7,12 +7,11 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.tools import BenchLink, FoundServo, SpeedReport, scan_speed
-from drivers.dynamixel.tools.scan import ServoScan
 from drivers.errors import NoReply
+from drivers.servo.tools.bench import FoundServo, ServoBench
+from drivers.servo.tools.scan import ServoScan, SpeedReport, scan_speed
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
-    SPEEDS,
     ProgressLine,
     ServoBusPort,
     add_bus_arguments,
@@ -82,7 +81,7 @@ def run_scan(arguments: argparse.Namespace) -> int:
 def _speeds(bus: ServoBusPort) -> Sequence[int]:
     if bus.baud_given:
         return (bus.baud,)
-    return (bus.baud, *(speed for speed in SPEEDS if speed != bus.baud))
+    return (bus.baud, *(speed for speed in bus.speeds if speed != bus.baud))
 
 
 def _scan_document(bus: ServoBusPort, scan: ServoScan) -> dict[str, Any]:
@@ -97,8 +96,10 @@ def _scan_document(bus: ServoBusPort, scan: ServoScan) -> dict[str, Any]:
         "clashes": [
             {"baud": report.baud, "id": one} for report in reports for one in report.clashes
         ],
-        "protocol_1": [
-            {"baud": report.baud, "id": one} for report in reports for one in report.protocol_1_ids
+        "other_family": [
+            {"baud": report.baud, "id": one}
+            for report in reports
+            for one in report.other_family_ids
         ],
         "noise_bytes": {report.baud: report.noise_bytes for report in reports},
         "missing": scan.missing,
@@ -166,7 +167,7 @@ def _ping_line(bus: ServoBusPort, row: Mapping[str, Any]) -> str:
     )
 
 
-def _pinged(link: BenchLink, bus: ServoBusPort, one: int) -> dict[str, Any]:
+def _pinged(link: ServoBench, bus: ServoBusPort, one: int) -> dict[str, Any]:
     start_ns = bus.clock.now_ns()
     servo = link.ping(one)
     taken_s = (bus.clock.now_ns() - start_ns) / NS_PER_S
@@ -184,15 +185,13 @@ def run_info(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         found = link.ping(arguments.id)
         servo = link.servo(arguments.id)
-        registers = {
-            name: {**asdict(register), "value": link.read(servo, name)}
-            for name, register in servo.model.registers.items()
-        }
+        registers = link.registers(servo)
     lines = [f"{bus.label(arguments.id)}: {found.model_name}, firmware {found.firmware}"]
-    for name, row in registers.items():
-        kind = "EEPROM" if row["eeprom"] else "RAM"
-        default = "" if row["initial"] is None else f"  factory {row['initial']}"
-        changed = " *" if row["initial"] not in (None, row["value"]) and row["eeprom"] else ""
-        value = f"{name:<24}{row['value']:>10}"
-        lines.append(f"{row['address']:>5}  {value}  {kind:<6}{default}{changed}")
-    return emit(arguments, {**_row(bus, found), "registers": registers}, "\n".join(lines))
+    for one in registers:
+        kind = "EEPROM" if one.eeprom else "RAM"
+        default = "" if one.initial is None else f"  factory {one.initial}"
+        changed = " *" if one.initial not in (None, one.value) and one.eeprom else ""
+        value = f"{one.name:<24}{one.value:>10}"
+        lines.append(f"{one.address:>5}  {value}  {kind:<6}{default}{changed}")
+    document = {one.name: asdict(one) for one in registers}
+    return emit(arguments, {**_row(bus, found), "registers": document}, "\n".join(lines))

@@ -64,7 +64,8 @@ def _reboot(bus: ServoBusDriver, decision: FaultDecision) -> None:
     bus.reboot(decision.servo_id)
 
 
-_ACTS: Final[Mapping[FaultAction, Callable[[ServoBusDriver, FaultDecision], None]]] = MappingProxyType(
+_Act = Callable[[ServoBusDriver, FaultDecision], None]
+_ACTS: Final[Mapping[FaultAction, _Act]] = MappingProxyType(
     {FaultAction.LIMP: _limp, FaultAction.REBOOT_ONCE: _reboot}
 )
 """Nothing more is to be done for the others: safety stops the robot by the same error bits."""

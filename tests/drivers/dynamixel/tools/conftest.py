@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.tools import BenchLink
+from drivers.dynamixel.tools.bench import DynamixelBench
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
@@ -59,8 +59,8 @@ class Wire:
     def step(self, now_ns: int) -> None:
         pass
 
-    def open(self, baud: int = 1_000_000) -> BenchLink:
-        return BenchLink(MemoryLine(self, self), self, baud)
+    def open(self, baud: int = 1_000_000) -> DynamixelBench:
+        return DynamixelBench(MemoryLine(self, self), self, baud)
 
 
 def specs(*ids: int, model: str = "XM430-W350") -> list[EmulatedServoSpec]:

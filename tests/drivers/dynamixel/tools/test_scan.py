@@ -1,7 +1,7 @@
 import pytest
 
-from drivers.dynamixel.tools import scan_speed
 from drivers.dynamixel.wire.codec import Instruction, encode_instruction
+from drivers.servo.tools.scan import scan_speed
 
 PING_ALL = encode_instruction(254, Instruction.PING)
 
@@ -77,7 +77,7 @@ def test_a_servo_of_protocol_1_is_recognised(make_wire, ids):
                 wire.extra += b"\xff\xff" + frame + bytes([~sum(frame) & 0xFF])
 
     wire.receive = answer
-    assert scan_speed(wire.open()).protocol_1_ids == ids
+    assert scan_speed(wire.open()).other_family_ids == ids
 
 
 def test_progress_is_reported_for_every_request(make_wire, make_specs):

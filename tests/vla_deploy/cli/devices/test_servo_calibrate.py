@@ -13,7 +13,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.tables.control_table import PULSE_RAD
-from drivers.dynamixel.tools import BenchLink
+from drivers.dynamixel.tools.bench import DynamixelBench
 from drivers.servo.errors import ServoSilent
 from sim_twin.ports.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec
@@ -69,8 +69,8 @@ class Butler:
         angle = (value - offset) / (sign * servo.travel_per_rad)
         self.bench.rotors.position_rad[self.rows[joint]] = angle
 
-    def link(self) -> BenchLink:
-        return BenchLink(self.line, self, self.robot.servo_bus.baud)
+    def link(self) -> DynamixelBench:
+        return DynamixelBench(self.line, self, self.robot.servo_bus.baud)
 
 
 class Hand:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.tables.registers import Registers
-from drivers.dynamixel.tools.bench_link import THREE_TRIES
-from drivers.dynamixel.tools.travel import (
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.tools.bench import ServoBench
+from drivers.servo.tools.travel import (
     JointRange,
     ServoMounting,
     TravelLog,
@@ -39,7 +38,7 @@ class Person(Protocol):
 class GuidedJoint:
     """Describe a joint before its calibration; its limits are those of the robot file."""
 
-    servo: ServoSpec
+    servo: JointServo
     range: JointRange
     limits: tuple[float, float]
     present: ServoMounting
@@ -55,14 +54,14 @@ class CalibrationGuide:
 
     def __init__(
         self,
-        registers: Registers,
-        watched: Sequence[ServoSpec],
+        bench: ServoBench,
+        watched: Sequence[JointServo],
         person: Person,
         clock: Clock,
         *,
         accept_sign: bool = False,
     ) -> None:
-        self._registers = registers
+        self._bench = bench
         self._watched = watched
         self._joints = {servo.id: servo.joint for servo in watched}
         self._person = person
@@ -132,7 +131,7 @@ class CalibrationGuide:
         return samples
 
     def _positions(self) -> dict[int, int]:
-        return self._registers.read_many("present_position", self._watched, THREE_TRIES)
+        return self._bench.positions(self._watched)
 
 
 def _of(samples: Sequence[Mapping[int, int]], servo_id: int) -> list[int]:

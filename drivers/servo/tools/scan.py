@@ -1,4 +1,4 @@
-"""Find what answers on a bus at one speed: servos, ids that clash, another protocol, noise.
+"""Find what answers on a bus at one speed: servos, ids that clash, another family, noise.
 
 All servos are asked at once first. Where that gives damaged answers, each id is asked by itself:
 of two servos with one id neither is understood.
@@ -6,29 +6,11 @@ of two servos with one id neither is understood.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
-from drivers.dynamixel.tools.bench_link import (
-    ONE_TRY,
-    PING_ANSWER_BYTES,
-    THREE_TRIES,
-    BenchLink,
-    FoundServo,
-)
-from drivers.dynamixel.wire.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
-from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.errors import NoReply, ProtocolError
 from drivers.servo.errors import CorruptReply, ServoSilent
 from drivers.servo.patience import ReplyPatience
-
-ALL_IDS: Final = range(MAX_SERVO_ID + 1)
-_SLOT_S: Final = 0.003
-"""The longest that each servo's turn to answer a broadcast ping takes, its bytes left out."""
-_PROBES: Final = 3
-_PROBED_ADDRESS: Final = 120  # realtime_tick .. present_temperature: two servos never agree on it
-_PROBED_BYTES: Final = 27
-_PROTOCOL_1_PING: Final = b"\xff\xff\xfe\x02\x01\xfe"
-_PROTOCOL_1_STATUS_BYTES: Final = 6
+from drivers.servo.tools.bench import ONE_TRY, THREE_TRIES, FoundServo, ServoBench
 
 Progress = Callable[[str], None]
 
@@ -41,8 +23,8 @@ class SpeedReport:
     servos: tuple[FoundServo, ...] = ()
     clashes: tuple[int, ...] = ()
     """Ids that more than one servo has; the cable may be at fault where it spoils every answer."""
-    protocol_1_ids: tuple[int, ...] = ()
-    """Ids that answer in Protocol 1.0 (AX, MX, and other makes), which is not spoken here."""
+    other_family_ids: tuple[int, ...] = ()
+    """Ids that answer in the language of another family."""
     noise_bytes: int = 0
     """Received bytes that made no packet, as from servos at another speed."""
 
@@ -100,11 +82,11 @@ class ServoScan:
 
     def _nothing_found(self) -> str:
         for report in self.reports:
-            if report.protocol_1_ids:
-                ids = ", ".join(map(str, report.protocol_1_ids))
+            if report.other_family_ids:
+                ids = ", ".join(map(str, report.other_family_ids))
                 return (
-                    f"{self.port} at {report.baud} baud: id {ids} answers in Protocol 1.0, only "
-                    "2.0 is spoken here; set the servo's protocol_type to 2, if it has one"
+                    f"{self.port} at {report.baud} baud: id {ids} answers in another protocol: a "
+                    "servo of another make (try --family), or one whose protocol_type is not 2"
                 )
         for report in self.reports:
             if report.noise_bytes:
@@ -117,7 +99,7 @@ class ServoScan:
 
 
 def scan_speed(
-    link: BenchLink, ids: Sequence[int] | None = None, progress: Progress = lambda text: None
+    link: ServoBench, ids: Sequence[int] | None = None, progress: Progress = lambda text: None
 ) -> SpeedReport:
     """Return what answers at the link's speed: of all ids, or of the given ones.
 
@@ -127,37 +109,21 @@ def scan_speed(
     noise_bytes, doubtful = 0, True
     if ids is None:
         progress(f"{link.baud} baud: all ids at once")
-        servos, noise_bytes = _ask_everyone(link)
+        servos, noise_bytes = link.ask_everyone()
         doubtful = noise_bytes > 0 or len({one.servo_id for one in servos}) < len(servos)
-        ids = ALL_IDS if doubtful else sorted(one.servo_id for one in servos)
+        ids = link.all_ids if doubtful else sorted(one.servo_id for one in servos)
     patience = ONE_TRY if doubtful else THREE_TRIES
     found, clashes = _ask_each(link, ids, patience, progress)
     return SpeedReport(
         baud=link.baud,
         servos=tuple(found),
         clashes=tuple(clashes),
-        protocol_1_ids=() if found or clashes else _ask_protocol_1(link),
+        other_family_ids=() if found or clashes else tuple(link.other_family_ids()),
         noise_bytes=0 if found or clashes else noise_bytes,
     )
 
 
-def is_clash(link: BenchLink, servo_id: int) -> bool:
-    """Return whether more than one servo answers to an id, by what two can never agree on.
-
-    One clean answer is enough for a no, so that neither noise nor a late answer looks like a clash.
-
-    Raises:
-        LinkLost: the adapter is gone.
-    """
-    params = _PROBED_ADDRESS.to_bytes(2, "little") + _PROBED_BYTES.to_bytes(2, "little")
-    for _ in range(_PROBES):
-        packets, junk_bytes = link.listen(servo_id, Instruction.READ, params, _PROBED_BYTES)
-        if len(packets) < 2 and not junk_bytes:
-            return False
-    return True
-
-
-def is_taken(link: BenchLink, servo_id: int) -> bool:
+def is_taken(link: ServoBench, servo_id: int) -> bool:
     """Return whether anything answers to an id; a damaged answer counts.
 
     Raises:
@@ -172,18 +138,8 @@ def is_taken(link: BenchLink, servo_id: int) -> bool:
     return True
 
 
-def _ask_everyone(link: BenchLink) -> tuple[list[FoundServo], int]:
-    packets, noise_bytes = link.listen_raw(
-        encode_instruction(BROADCAST_ID, Instruction.PING),
-        len(ALL_IDS) * (PING_ANSWER_BYTES + STATUS_OVERHEAD_BYTES),
-        len(ALL_IDS) * _SLOT_S,
-    )
-    answers = [packet for packet in packets if len(packet.params) == PING_ANSWER_BYTES]
-    return [FoundServo.of(packet) for packet in answers], noise_bytes
-
-
 def _ask_each(
-    link: BenchLink, ids: Iterable[int], patience: ReplyPatience, progress: Progress
+    link: ServoBench, ids: Iterable[int], patience: ReplyPatience, progress: Progress
 ) -> tuple[list[FoundServo], list[int]]:
     found, clashes = [], []
     for servo_id in ids:
@@ -194,18 +150,8 @@ def _ask_each(
             continue
         except CorruptReply:  # something answers; what it is shows next
             servo = None
-        if is_clash(link, servo_id):
+        if link.is_clash(servo_id):
             clashes.append(servo_id)
         else:
             found.append(servo or link.ping(servo_id))
     return found, clashes
-
-
-def _ask_protocol_1(link: BenchLink) -> tuple[int, ...]:
-    data, _ = link.link.exchange(_PROTOCOL_1_PING, 4 * _PROTOCOL_1_STATUS_BYTES, ONE_TRY.margin_s)
-    frames = [
-        data[at : at + _PROTOCOL_1_STATUS_BYTES]
-        for at in range(len(data) - _PROTOCOL_1_STATUS_BYTES + 1)
-        if data.startswith(b"\xff\xff", at)
-    ]
-    return tuple(frame[2] for frame in frames if frame[3] == 2 and sum(frame[2:]) & 0xFF == 0xFF)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.dynamixel.tables.control_table import CENTRE_PULSE, PULSE_RAD
-from drivers.dynamixel.tools.travel import (
+from drivers.servo.tools.travel import (
     JointRange,
     ServoMounting,
     TravelLog,

@@ -11,8 +11,10 @@ from math import degrees, pi
 from statistics import median_low
 from typing import Final
 
-from drivers.dynamixel.tables.control_table import CENTRE_PULSE, PULSE_RAD, PULSES_PER_REV
-
+PULSES_PER_REV: Final = 4096
+"""Of every servo that can be calibrated so: Dynamixel X, FEETECH STS and SMS."""
+CENTRE_PULSE: Final = 2048
+PULSE_RAD: Final = 2 * pi / PULSES_PER_REV
 STILL_PULSES: Final = 6
 """Spread of a held joint: half a degree."""
 MOVED_PULSES: Final = 40

@@ -1,9 +1,10 @@
 import pytest
 
 from drivers.dynamixel.errors import RejectedAccess
-from drivers.dynamixel.tools import scan_speed
-from drivers.dynamixel.tools.bench_link import FoundServo, Keep
+from drivers.dynamixel.wire.codec import Instruction
 from drivers.servo.errors import ServoSilent, WrongServo
+from drivers.servo.tools.bench import FoundServo, Keep
+from drivers.servo.tools.scan import scan_speed
 from sim_twin.servos import EmulatedServoSpec
 
 
@@ -27,8 +28,7 @@ def test_a_silent_id_is_an_error_that_names_id_and_speed(wire):
 
 
 def test_a_model_that_is_not_registered_is_refused_with_those_that_are(wire):
-    found = FoundServo(servo_id=2, model_number=4321, firmware=1)
-    assert (found.model, found.model_name) == (None, "unknown model 4321")
+    found = FoundServo(servo_id=2, model_number=4321, model_name="unknown model 4321", firmware="1")
     link = wire.open()
     link.ping = lambda servo_id: found
     with pytest.raises(WrongServo, match=r"servo 2: unknown model 4321; .*XL430-W250"):
@@ -47,8 +47,7 @@ def test_a_reboot_waits_until_the_servo_is_back(wire):
 
 def test_a_servo_that_does_not_come_back_is_an_error(wire):
     link = wire.open()
-    servo = link.servo(2)
-    link.registers.reboot(servo)
+    link.link.broadcast(Instruction.REBOOT, b"")
     wire.banks[0].bank.silence(2)
     with pytest.raises(ServoSilent, match="ping servo 2"):
         link.await_boot(2)

@@ -1,0 +1,181 @@
+"""Declare how single servos of any family are worked on at the bench, without a robot file."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final, Protocol
+
+from drivers.servo.counters import BusCounters
+from drivers.servo.joint_servo import JointServo
+from drivers.servo.patience import ReplyPatience
+
+ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)
+THREE_TRIES: Final = ReplyPatience(margin_s=0.02, attempts=3)
+
+
+class Keep(Enum):
+    """Name what a factory reset leaves as it is."""
+
+    NOTHING = "nothing"
+    ID = "id"
+    ID_AND_BAUD = "id-and-baud"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundServo:
+    """Hold what a servo says of itself; `model_name` is its number in words where it is unknown.
+
+    Where one number stands for several motors, `model_name` is what they have in common.
+    """
+
+    servo_id: int
+    model_number: int
+    model_name: str
+    firmware: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoReading:
+    """Hold what one servo sensed; angles are of the servo, 0 at its centre."""
+
+    id: int
+    joint: str
+    model: str
+    position_rad: float
+    velocity_rad_s: float
+    effort: float
+    effort_unit: str
+    voltage_v: float
+    temperature_c: int
+    torque_on: bool
+    errors: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegisterValue:
+    """Hold a register and what it holds; `initial` is the factory's, None where there is none."""
+
+    name: str
+    address: int
+    size: int
+    access: str
+    eeprom: bool
+    initial: int | None
+    value: int
+
+
+class ServoBench(Protocol):
+    """Own the transport of a bus whose servos are not known beforehand.
+
+    Every method may raise LinkLost, and those that ask one servo ServoSilent and CorruptReply.
+    """
+
+    @property
+    def baud(self) -> int:
+        """Return the speed of the line."""
+        ...
+
+    @property
+    def counters(self) -> BusCounters:
+        """Return what is counted on the wire."""
+        ...
+
+    @property
+    def all_ids(self) -> Sequence[int]:
+        """Return the ids that a servo can have."""
+        ...
+
+    @property
+    def factory_baud(self) -> int:
+        """Return the speed of a new servo."""
+        ...
+
+    def close(self) -> None:
+        """Release the transport; closing twice is allowed."""
+        ...
+
+    def detect_echo(self) -> None:
+        """Find out whether the adapter hears what it sends; then its echo is left out."""
+        ...
+
+    def ping(self, servo_id: int, patience: ReplyPatience = THREE_TRIES) -> FoundServo:
+        """Return what a servo says of itself."""
+        ...
+
+    def servo(self, servo_id: int, joint: str = "") -> JointServo:
+        """Ask a servo for its model and return its description; `joint` is only for messages.
+
+        Raises:
+            WrongServo: the model is not known, and so its registers are not.
+        """
+        ...
+
+    def ask_everyone(self) -> tuple[list[FoundServo], int]:
+        """Return what answers when all are asked at once, and how many bytes were no answer."""
+        ...
+
+    def is_clash(self, servo_id: int) -> bool:
+        """Return whether more than one servo answers to an id."""
+        ...
+
+    def other_family_ids(self) -> Sequence[int]:
+        """Return ids that answer in the language of another family."""
+        ...
+
+    def torque_is_on(self, servo: JointServo) -> bool:
+        """Return whether a servo has torque."""
+        ...
+
+    def release(self, servo: JointServo) -> None:
+        """Take a servo's torque away."""
+        ...
+
+    def set_id(self, servo: JointServo, new_id: int) -> None:
+        """Give a servo without torque another id, for good."""
+        ...
+
+    def bauds(self, servo: JointServo) -> Collection[int]:
+        """Return the speeds that a servo can be set to."""
+        ...
+
+    def set_baud(self, servo: JointServo, baud: int) -> None:
+        """Give a servo without torque another speed, for good; it answers at that from now on."""
+        ...
+
+    def present_baud(self, servo: JointServo) -> int:
+        """Return the speed that a servo says it is set to."""
+        ...
+
+    def hardware_error(self, servo: JointServo) -> int:
+        """Return what a servo reports, as bits of `HardwareError`."""
+        ...
+
+    def reboot(self, servo: JointServo) -> None:
+        """Restart a servo and wait until it answers again."""
+        ...
+
+    def factory_reset(self, servo: JointServo, keep: Keep) -> None:
+        """Give a servo without torque its factory settings.
+
+        Raises:
+            ValueError: servos of this family cannot keep that.
+        """
+        ...
+
+    def await_boot(self, servo_id: int) -> FoundServo:
+        """Ping until a restarted servo answers."""
+        ...
+
+    def registers(self, servo: JointServo) -> Sequence[RegisterValue]:
+        """Return every register of a servo, by address."""
+        ...
+
+    def positions(self, servos: Sequence[JointServo]) -> dict[int, int]:
+        """Return the pulses of the encoders of the servos that answer, by id."""
+        ...
+
+    def read_servos(
+        self, servos: Sequence[JointServo], joints: Mapping[int, str]
+    ) -> list[ServoReading]:
+        """Return the readings of the servos that answer; `joints` names joints by servo id."""
+        ...
