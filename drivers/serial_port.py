@@ -20,6 +20,7 @@ _SPEEDS: Final = {
     115_200: termios.B115200,
     230_400: termios.B230400,
     460_800: termios.B460800,
+    500_000: termios.B500000,
     921_600: termios.B921600,
     1_000_000: termios.B1000000,
     2_000_000: termios.B2000000,

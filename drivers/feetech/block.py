@@ -55,9 +55,7 @@ class FeetechBlock:
         step = np.array([servo.joint_per_pulse for servo in chosen])
         sign = np.array([float(servo.sign) for servo in chosen])
         self._units = np.stack([step, step, sign / LOAD_FULL])
-        self._zeros = np.array(
-            [servo.to_joint(offset) for servo, offset in zip(chosen, offsets, strict=True)]
-        )
+        self._zeros = np.array([servos[index].to_joint(offsets[index]) for index in members])
         self.answered: Sequence[int] = ()
         self.errors: Bytes = np.zeros(count, np.uint8)
 

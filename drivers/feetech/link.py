@@ -30,18 +30,22 @@ class FeetechLink(Wire):
     """
 
     def detect_echo(self, servo_id: int, margin_s: float) -> None:
-        """Find out by a ping whether the adapter hears what it sends, and go on accordingly.
+        """Find out by a request whether the adapter hears what it sends, and go on accordingly.
+
+        A ping would not do: the answer of a servo whose supply is out of its limits is the same
+        bytes as the question.
 
         Raises:
             LinkLost: the adapter is gone.
         """
-        frame = encode_packet(servo_id, FeetechInstruction.PING)
-        deadline_ns = self.ask(frame, len(frame) + OVERHEAD_BYTES, round(margin_s * NS_PER_S))
+        frame = encode_packet(servo_id, FeetechInstruction.READ, b"\x03\x02")
+        reply_bytes = OVERHEAD_BYTES + 2
+        margin_ns = round(margin_s * NS_PER_S)
+        deadline_ns = self.ask(frame, len(frame) + reply_bytes, margin_ns)
         heard = self.receive_all(len(frame), deadline_ns)
         self.echoes = heard == frame
-        rest = OVERHEAD_BYTES if self.echoes else OVERHEAD_BYTES - len(heard)
-        if heard and rest > 0:
-            self.receive_all(rest, deadline_ns)
+        if self.echoes:
+            self.receive_all(reply_bytes, deadline_ns)
 
     def exchange(self, frame: bytes, reply_bytes: int, margin_s: float) -> tuple[bytes, int]:
         """Send a request; return what came of the expected bytes, and the deadline used.
@@ -74,7 +78,7 @@ class FeetechLink(Wire):
             self.counters.retries += bool(attempt)
             parser = FeetechParser()
             packet = self._ask_once(frame, servo.id, answer_bytes, patience.margin_s, parser)
-            damaged += parser.check_errors
+            damaged += bool(parser.discarded_bytes)
             self.counters.crc_errors += parser.check_errors
             if packet is not None:
                 return packet

@@ -175,7 +175,9 @@ _STS: Final = (
 _SCS: Final = tuple(
     replace(each, byte_order="big")
     for each in (
-        *_COMMON,
+        *(one for one in _COMMON if one.name not in ("goal_time", "max_position_limit")),
+        _eeprom("max_position_limit", 11, 2, 1023),
+        FeetechRegister(name="goal_time", address=44, size=2),
         _eeprom("protective_torque", 37, initial=20),
         _eeprom("protection_time", 38, initial=200),
         _eeprom("overload_torque", 39, initial=80),
@@ -222,13 +224,17 @@ def _by_name(rows: tuple[FeetechRegister, ...]) -> Mapping[str, FeetechRegister]
 
 
 _STS_REGISTERS: Final = _by_name(_STS)
+_STS_REGISTERS_7_V: Final = _by_name(
+    tuple(replace(each, initial=80) if each.name == "max_voltage_limit" else each for each in _STS)
+)
 _RPM: Final = 2 * pi / 60
 
 
 def _sts3215(
     name: str, *, stall: tuple[float, float], rpm: float, volts: float, gear: float
 ) -> FeetechDatasheet:
-    low, high = (4.0, 8.4) if volts < 9 else (4.0, 14.0)
+    is_7_v = volts < 9.0
+    low, high = (4.0, 8.4) if is_7_v else (4.0, 14.0)
     return FeetechDatasheet(
         name=name,
         number=777,
@@ -238,7 +244,7 @@ def _sts3215(
         voltage_v=volts,
         voltage_range_v=(low, high),
         gear_ratio=gear,
-        registers=_STS_REGISTERS,
+        registers=_STS_REGISTERS_7_V if is_7_v else _STS_REGISTERS,
     )
 
 

@@ -8,42 +8,89 @@ import argparse
 import gc
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.dynamixel.tables.control_table import BAUD_RATES, MODELS
 from drivers.dynamixel.wire.codec import MAX_SERVO_ID
+from drivers.feetech.codec import FEETECH_MAX_ID
+from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS
 from sim_twin.priority import claim_priority
 from sim_twin.servos.protocol.timing import WireTiming
-from sim_twin.servos.server import FreeServos, make_specs, serve
-
-_EXAMPLE = (
-    "example: python -m sim_twin.servos --link /tmp/servos --baud 1000000 --return-delay-us 0"
+from sim_twin.servos.server import (
+    FreeBank,
+    FreeFeetechServos,
+    FreeServos,
+    make_feetech_specs,
+    make_specs,
+    serve,
 )
+
+_EXAMPLE = """examples:
+  python -m sim_twin.servos --link /tmp/servos --baud 1000000 --return-delay-us 0
+  python -m sim_twin.servos --family feetech --servos 6 --models STS3215-C018 --link /tmp/servos"""
 _MAX_RETURN_DELAY_US = 508
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Family:
+    """Hold what one family of servos has to choose from; `voltages_v` are its models'."""
+
+    voltages_v: Mapping[str, float]
+    usual_model: str
+    baud_rates: Mapping[int, int]
+    max_id: int
+    build: Callable[[int, Sequence[str], Mapping[str, int], float, WireTiming | None], FreeBank]
+
+
+_FAMILIES: Final[Mapping[str, _Family]] = {
+    "dynamixel": _Family(
+        voltages_v={name: sheet.voltage_v for name, sheet in MODELS.items()},
+        usual_model="XM430-W350",
+        baud_rates=BAUD_RATES,
+        max_id=MAX_SERVO_ID,
+        build=lambda count, models, eeprom, supply_v, timing: FreeServos(
+            make_specs(count, models, eeprom), supply_v=supply_v, timing=timing
+        ),
+    ),
+    "feetech": _Family(
+        voltages_v={name: sheet.voltage_v for name, sheet in FEETECH_MODELS.items()},
+        usual_model="STS3215-C018",
+        baud_rates=FEETECH_BAUD_RATES,
+        max_id=FEETECH_MAX_ID,
+        build=lambda count, models, eeprom, supply_v, timing: FreeFeetechServos(
+            make_feetech_specs(count, models, eeprom), supply_v=supply_v, timing=timing
+        ),
+    ),
+}
+
+
+def _models_line(family: str) -> str:
+    return f"  {family}: {', '.join(sorted(_FAMILIES[family].voltages_v))}"
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m sim_twin.servos",
         description=__doc__,
-        epilog=_EXAMPLE,
+        epilog="\n".join((_EXAMPLE, "models:", *map(_models_line, _FAMILIES))),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--link", type=Path, required=True, help="path of the link to the terminal")
+    parser.add_argument("--family", choices=_FAMILIES, default="dynamixel")
     parser.add_argument("--servos", type=int, default=16, help="how many, with ids from 1")
     parser.add_argument(
         "--models",
         nargs="+",
-        choices=sorted(MODELS),
-        default=["XM430-W350"],
+        metavar="MODEL",
         help="in turn; the first one's voltage supplies all",
     )
     parser.add_argument("--seconds", type=float, help="stop after this time; else run until killed")
-    parser.add_argument(
-        "--baud", type=int, choices=sorted(BAUD_RATES.values()), help="let bytes take their time"
-    )
+    rates = {rate for family in _FAMILIES.values() for rate in family.baud_rates.values()}
+    parser.add_argument("--baud", type=int, choices=sorted(rates), help="let bytes take their time")
     parser.add_argument("--return-delay-us", type=int, help="of every servo; as delivered: 500")
     parser.add_argument(
         "--latency-timer-ms", type=float, default=0.0, help="of the USB adapter; as delivered: 16"
@@ -51,13 +98,22 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--jitter-us", type=float, default=0.0, help="longest additional delay")
     parser.add_argument("--seed", type=int, default=0, help="of the jitter")
     options = parser.parse_args(arguments)
+    options.models = options.models or [_FAMILIES[options.family].usual_model]
     _check(parser, options)
     return options
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    if not 1 <= options.servos <= MAX_SERVO_ID:
-        parser.error(f"--servos: expected 1..{MAX_SERVO_ID}, got {options.servos}")
+    family = _FAMILIES[options.family]
+    if not 1 <= options.servos <= family.max_id:
+        parser.error(f"--servos: expected 1..{family.max_id}, got {options.servos}")
+    for model in options.models:
+        if model not in family.voltages_v:
+            expected = ", ".join(sorted(family.voltages_v))
+            parser.error(f"--models: {options.family} has {expected}; got {model}")
+    if options.baud is not None and options.baud not in family.baud_rates.values():
+        expected = ", ".join(map(str, sorted(family.baud_rates.values())))
+        parser.error(f"--baud: {options.family} has {expected}; got {options.baud}")
     if not 0 <= (options.return_delay_us or 0) <= _MAX_RETURN_DELAY_US:
         parser.error(
             f"--return-delay-us: expected 0..{_MAX_RETURN_DELAY_US}, got {options.return_delay_us}"
@@ -70,24 +126,24 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
             parser.error(f"{flag}: only a paced bus has it; give --baud too")
 
 
-def _build(options: argparse.Namespace) -> FreeServos:
+def _build(options: argparse.Namespace) -> FreeBank:
+    family = _FAMILIES[options.family]
     eeprom = {}
     if options.return_delay_us is not None:
         eeprom["return_delay_time"] = options.return_delay_us // 2
     timing = None
     if options.baud is not None:
-        eeprom["baud_rate"] = {rate: value for value, rate in BAUD_RATES.items()}[options.baud]
+        eeprom["baud_rate"] = {rate: value for value, rate in family.baud_rates.items()}[
+            options.baud
+        ]
         timing = WireTiming(
             baud=options.baud,
             latency_timer_s=options.latency_timer_ms / 1e3,
             jitter_s=options.jitter_us / 1e6,
             seed=options.seed,
         )
-    return FreeServos(
-        make_specs(options.servos, options.models, eeprom),
-        supply_v=MODELS[options.models[0]].voltage_v,
-        timing=timing,
-    )
+    supply_v = family.voltages_v[options.models[0]]
+    return family.build(options.servos, options.models, eeprom, supply_v, timing)
 
 
 def main(arguments: Sequence[str]) -> int:

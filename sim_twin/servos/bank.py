@@ -1,27 +1,22 @@
-"""Emulate all servos on one bus, as a device behind a line."""
+"""Emulate all Dynamixel servos on one bus, as a device behind a line."""
 
 from collections.abc import Sequence
-from typing import Final
 
+from drivers.dynamixel.wire.codec import Packet
 from sim_twin.servos.firmware.coupling import Coupling
 from sim_twin.servos.firmware.firmware import Firmware
-from sim_twin.servos.firmware.profile import Floats
-from sim_twin.servos.protocol.instructions import InstructionParser
+from sim_twin.servos.protocol.instructions import BrokenPacket, InstructionParser
 from sim_twin.servos.protocol.protocol import BusProtocol
-from sim_twin.servos.protocol.timing import ReplyQueue, WireTiming
-from sim_twin.servos.protocol.wire_faults import ReplySpoiler
-from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
-
-_PACKET_GAP_NS: Final = 1_500_000
-"""A pause within an instruction packet after which a servo looks for a new header."""
+from sim_twin.servos.protocol.timing import WireTiming
+from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions, check_ids
+from sim_twin.servos.wire_bank import WireBank
 
 
-class ServoBank:
-    """Be the servos of one bus: bytes on the line on one side, shafts on the other.
+class ServoBank(WireBank[Packet | BrokenPacket]):
+    """Be the Dynamixel servos of one bus. Without `coupling` the joints are the shafts.
 
-    `advance` is called once per physics step. `step` only takes over the time, for a bus whose
-    shafts nobody moves and for times between two physics steps. With `timing` bytes take their time
-    on the wire; without it a reply is there at once. Without `coupling` the joints are the shafts.
+    A bus watchdog that has run out trips when time is taken over, and a fast read ends where a
+    servo says nothing.
 
     Raises:
         ValueError: there are no servos, or two of them share an id.
@@ -34,174 +29,7 @@ class ServoBank:
         timing: WireTiming | None = None,
         coupling: Coupling | None = None,
     ) -> None:
-        ids = [servo.id for servo in servos]
-        if not ids or len(set(ids)) < len(ids):
-            raise ValueError(f"servo ids: expected one or more, all different, got {ids}")
+        check_ids([servo.id for servo in servos])
         options = options or FirmwareOptions()
-        self._firmware = Firmware(servos, options, coupling)
-        self._protocol = BusProtocol(self._firmware, options)
-        self._audience = self._protocol.audience
-        self._faults = self._protocol.speaker.faults
-        self._parser = InstructionParser()
-        self._queue = ReplyQueue(timing)
-        self._echo = False
-        self._now_ns = 0
-        self._received_ns = 0
-
-    @property
-    def paced(self) -> bool:
-        """Return whether bytes take time on this bus."""
-        return self._queue.paced
-
-    @property
-    def supply_w(self) -> float:
-        """Return the power that the motors draw, as of the firmware's last look."""
-        return self._firmware.supply_w
-
-    def receive(self, data: bytes) -> None:
-        """Take bytes that the host has put on the bus."""
-        now_ns = self._now_ns
-        if self._parser.pending_bytes and now_ns - self._received_ns > _PACKET_GAP_NS:
-            self._parser.reset()
-        self._received_ns = now_ns
-        self._queue.hear(data, now_ns, echo=self._echo)
-        for packet in self._parser.feed(data):
-            self._queue.say(self._protocol.execute(packet), now_ns)
-
-    def transmit(self) -> bytes:
-        """Return and forget the replies that have arrived at the host."""
-        return self._queue.ready(self._now_ns)
-
-    def next_due_ns(self) -> int | None:
-        """Return when the next bytes arrive at the host; None when nothing is under way."""
-        return self._queue.next_due_ns()
-
-    def step(self, now_ns: int) -> None:
-        """Take over the time; a bus watchdog that has run out trips."""
-        if now_ns > self._now_ns:
-            self._now_ns = now_ns
-            self._firmware.set_time(now_ns)
-
-    def set_host_baud(self, baud: int | None) -> None:
-        """Take over the rate at which the host talks; a servo set to another one hears nothing.
-
-        With None, which is so at first, every servo understands the host.
-        """
-        if baud == self._audience.host_baud:
-            return
-        self._audience.host_baud = baud
-        self._audience.tune()
-        if baud is not None:
-            self._queue.set_baud(baud)
-
-    def advance(
-        self,
-        now_ns: int,
-        joint_motion: Floats,
-        joint_effort: Floats,
-        supply_v: float = 12.0,
-    ) -> Floats:
-        """Return what the joints do; return each motor's duty, -1..1, until the next call.
-
-        Arrays are in the order of the servos; a shaft at 0 rad is at 2048 pulses. `joint_motion`
-        has a row of positions and one of speeds. They, duty and effort, which is the motor's torque
-        in N m, are the joint's, and by default that is the shaft. Duty is zero without torque. A
-        supply below `FirmwareOptions.brownout_v` switches the servos off.
-        """
-        if now_ns > self._now_ns:
-            self._now_ns = now_ns
-        return self._firmware.advance(now_ns, joint_motion, joint_effort, supply_v)
-
-    def couple_anew(self) -> None:
-        """Take over a change of the coupling that was given."""
-        self._firmware.couple_anew()
-
-    def register(self, servo_id: int, name: str) -> int:
-        """Return a register's present value without using the bus."""
-        table = self._firmware.registers.tables[self._row(servo_id)]
-        item = table.model.registers[name]
-        self._firmware.refresh(item.address, item.size)
-        return table.get(name)
-
-    # Faults. Each lasts until it is taken back, but for `corrupt_next` and `set_alert`. A fast read
-    # ends where a servo says nothing.
-
-    def silence(self, servo_id: int, *, silent: bool = True) -> None:
-        """Cut a servo off the bus, as a broken cable does; its motor goes on."""
-        self._mark(self._audience.cut_off, servo_id, on=silent)
-
-    def set_wrong_baud(self, servo_id: int, on: bool = True) -> None:
-        """Let a servo talk at another rate than the host: it neither understands nor answers."""
-        self._mark(self._audience.mistuned, servo_id, on=on)
-
-    def corrupt_next(self, servo_id: int) -> None:
-        """Spoil the CRC of this servo's next reply."""
-        self._faults.corrupted.add(self._row(servo_id))
-
-    def set_alert(self, servo_id: int, bits: int) -> None:
-        """Raise hardware error bits, with what Shutdown makes of them."""
-        self._firmware.raise_errors(self._row(servo_id), bits)
-
-    def heat(self, servo_id: int, celsius: float) -> None:
-        """Bring a servo to a temperature; it cools from there."""
-        self._firmware.heat(self._row(servo_id), celsius)
-
-    def overload(self, servo_id: int, on: bool = True) -> None:
-        """Let a servo count as overloaded whatever it carries, or no longer."""
-        self._firmware.force_overload(self._row(servo_id), on=on)
-
-    def garble(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
-        """Damage one byte of every reply of this servo."""
-        self._spoil(servo_id, ReplySpoiler.GARBLE, on=on, seed=seed)
-
-    def truncate(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
-        """Lose the end of every reply of this servo."""
-        self._spoil(servo_id, ReplySpoiler.TRUNCATE, on=on, seed=seed)
-
-    def duplicate(self, servo_id: int, on: bool = True) -> None:
-        """Let this servo say everything twice."""
-        self._spoil(servo_id, ReplySpoiler.DUPLICATE, on=on)
-
-    def set_clash(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
-        """Let a second servo answer to this id at the same time: all of it becomes garbage."""
-        self._spoil(servo_id, ReplySpoiler.CLASH, on=on, seed=seed)
-
-    def stick(self, servo_id: int, on: bool = True) -> None:
-        """Let this servo show for ever what it senses now, realtime tick included."""
-        if on:
-            self._protocol.speaker.freeze(self._row(servo_id))
-        else:
-            self._faults.frozen.pop(self._row(servo_id), None)
-
-    def answer_as(self, servo_id: int, other_id: int | None) -> None:
-        """Let this servo put another id into its replies; None ends it."""
-        self._faults.set_alias(self._row(servo_id), other_id)
-
-    def delay(self, servo_id: int, seconds: float) -> None:
-        """Let every reply of this servo come later by this time; 0 ends it."""
-        self._faults.set_delay(self._row(servo_id), seconds)
-
-    def drop_ratio(self, servo_id: int, ratio: float, seed: int = 0) -> None:
-        """Lose this share of the servo's replies; 0 ends it."""
-        self._faults.set_loss(self._row(servo_id), ratio, seed)
-
-    def set_echo(self, on: bool = True) -> None:
-        """Let the adapter hear its own bytes, as a half-duplex one without a switch does."""
-        self._echo = on
-
-    def noise(self, on: bool = True, seed: int = 0) -> None:
-        """Put a few random bytes before every reply."""
-        self._faults.set_noise(on=on, seed=seed)
-
-    def _spoil(self, servo_id: int, spoiler: ReplySpoiler, *, on: bool, seed: int = 0) -> None:
-        self._faults.set_spoiler(self._row(servo_id), spoiler, on=on, seed=seed)
-
-    def _mark(self, rows: set[int], servo_id: int, *, on: bool) -> None:
-        (rows.add if on else rows.discard)(self._row(servo_id))
-        self._audience.tune()
-
-    def _row(self, servo_id: int) -> int:
-        rows = self._audience.rows
-        if servo_id not in rows:
-            raise KeyError(f"no servo has the id {servo_id}; there are {sorted(rows)}")
-        return rows[servo_id]
+        firmware = Firmware(servos, options, coupling)
+        super().__init__(firmware, BusProtocol(firmware, options), InstructionParser(), timing)

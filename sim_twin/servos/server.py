@@ -2,23 +2,27 @@
 
 On a paced bus a reply leaves at the microsecond at which its last bit would have arrived: the loop
 sleeps until shortly before and then watches the clock, and shafts are turned while nothing is due.
-A paced bus also hears at which speed the host talks; see `ServoBank.set_host_baud`.
+A paced bus also hears at which speed the host talks; see `WireBank.set_host_baud`.
 """
 
 import select
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import cycle, islice
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel.tables.control_table import MODELS
+from drivers.feetech.table import FeetechDatasheet
 from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
+from sim_twin.servos.feetech import EmulatedFeetechSpec, FeetechBank, FeetechOptions
 from sim_twin.servos.firmware.rotor import FreeRotors
 from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.wire_bank import WireBank
 
 STEP_S: Final = 0.002
 _STEP_NS: Final = round(STEP_S * NS_PER_S)
@@ -28,25 +32,20 @@ _STEP_COST_NS: Final = 300_000
 """A step does not begin this shortly before a reply is due."""
 _ANSWER_NS: Final = 500_000
 """A host that has its reply may send at once; a step would make the bytes seem to come late."""
+_INERTIA_S2: Final = 0.0035
+"""Inertia in kg m^2 per N m of stall torque: 0.01 for an STS3215."""
 _WATCH_NS: Final = 150_000
 """Sleep may end this late, so the rest of the time before a reply is spent watching the clock."""
 
 
-@dataclass(slots=True)
-class FreeServos:
+class FreeBank:
     """Turn a bank's shafts on their own, in steps of `STEP_S`, as time goes on."""
 
-    specs: Sequence[EmulatedServoSpec]
-    options: FirmwareOptions = field(default_factory=FirmwareOptions)
-    supply_v: float = 12.0
-    timing: WireTiming | None = None
-    bank: ServoBank = field(init=False)
-    rotors: FreeRotors = field(init=False)
-    now_ns: int = 0
-
-    def __post_init__(self) -> None:
-        self.bank = ServoBank(self.specs, self.options, self.timing)
-        self.rotors = FreeRotors([MODELS[spec.model_name] for spec in self.specs])
+    def __init__(self, bank: WireBank[Any], rotors: FreeRotors, supply_v: float) -> None:
+        self.bank = bank
+        self.rotors = rotors
+        self.supply_v = supply_v
+        self.now_ns = 0
 
     def advance_to(self, now_ns: int) -> None:
         """Make the steps that are due; after a long pause, skip the time that was missed."""
@@ -62,10 +61,43 @@ class FreeServos:
         rotors.advance(duty, STEP_S)
 
 
+class FreeServos(FreeBank):
+    """Be Dynamixel servos whose shafts turn on their own."""
+
+    def __init__(
+        self,
+        specs: Sequence[EmulatedServoSpec],
+        options: FirmwareOptions | None = None,
+        supply_v: float = 12.0,
+        timing: WireTiming | None = None,
+    ) -> None:
+        models = [MODELS[spec.model_name] for spec in specs]
+        super().__init__(ServoBank(specs, options, timing), FreeRotors(models), supply_v)
+
+
+class FreeFeetechServos(FreeBank):
+    """Be FEETECH servos whose shafts turn on their own."""
+
+    def __init__(
+        self,
+        specs: Sequence[EmulatedFeetechSpec],
+        options: FeetechOptions | None = None,
+        supply_v: float = 12.0,
+        timing: WireTiming | None = None,
+    ) -> None:
+        bank = FeetechBank(specs, options, timing)
+        super().__init__(bank, free_feetech_rotors([spec.datasheet for spec in specs]), supply_v)
+
+
+def free_feetech_rotors(models: Sequence[FeetechDatasheet]) -> FreeRotors:
+    """Return shafts that each of these motors can turn: the weaker, the lighter."""
+    return FreeRotors(models, np.array([model.stall_torque_nm for model in models]) * _INERTIA_S2)
+
+
 def make_specs(
     count: int, model_names: Sequence[str], eeprom: Mapping[str, int] | None = None
 ) -> list[EmulatedServoSpec]:
-    """Return servos with ids from 1 whose models take turns."""
+    """Return Dynamixel servos with ids from 1 whose models take turns."""
     names = islice(cycle(model_names), count)
     return [
         EmulatedServoSpec(id=row + 1, model_name=name, eeprom=eeprom or {})
@@ -73,9 +105,18 @@ def make_specs(
     ]
 
 
-def serve(
-    servos: FreeServos, link_path: Path, clock: Clock, should_stop: Callable[[], bool]
-) -> None:
+def make_feetech_specs(
+    count: int, model_names: Sequence[str], eeprom: Mapping[str, int] | None = None
+) -> list[EmulatedFeetechSpec]:
+    """Return FEETECH servos with ids from 1 whose models take turns."""
+    names = islice(cycle(model_names), count)
+    return [
+        EmulatedFeetechSpec(id=row + 1, model_name=name, eeprom=eeprom or {})
+        for row, name in enumerate(names)
+    ]
+
+
+def serve(servos: FreeBank, link_path: Path, clock: Clock, should_stop: Callable[[], bool]) -> None:
     """Answer on `link_path` until `should_stop()`, asleep between bytes and steps."""
     servos.advance_to(clock.now_ns())
     bank = servos.bank
@@ -90,7 +131,7 @@ def serve(
         line.close()
 
 
-def _turn(servos: FreeServos, line: PtyLine, clock: Clock) -> None:
+def _turn(servos: FreeBank, line: PtyLine, clock: Clock) -> None:
     """Do what is due, then wait for bytes or for what is due next."""
     now_ns, due_ns = clock.now_ns(), servos.bank.next_due_ns()
     behind = now_ns - servos.now_ns > _MAX_STEPS_WAITING * _STEP_NS

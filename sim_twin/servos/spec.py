@@ -1,9 +1,57 @@
 """Describe one emulated servo and how the undocumented corners of its firmware behave."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from drivers.dynamixel.tables.control_table import MODELS
+
+
+class _Item(Protocol):
+    @property
+    def eeprom(self) -> bool: ...
+    @property
+    def minimum(self) -> int | None: ...
+    @property
+    def maximum(self) -> int | None: ...
+
+
+class _Sheet(Protocol):
+    @property
+    def registers(self) -> Mapping[str, _Item]: ...
+
+
+def check_ids(ids: Sequence[int]) -> None:
+    """Check that a bus has servos, each with an id of its own.
+
+    Raises:
+        ValueError: there are none, or two of them share an id.
+    """
+    if not ids or len(set(ids)) < len(ids):
+        raise ValueError(f"servo ids: expected one or more, all different, got {ids}")
+
+
+def check_factory_values(
+    servo_id: int, model_name: str, models: Mapping[str, _Sheet], eeprom: Mapping[str, int]
+) -> None:
+    """Check that a servo's model exists and that its EEPROM can hold these values.
+
+    Raises:
+        ValueError: the model or a register is unknown, a register is not in the EEPROM, or its
+            value is out of range.
+    """
+    if model_name not in models:
+        expected = ", ".join(models)
+        raise ValueError(f"servo {servo_id}: model: expected one of {expected}; got {model_name}")
+    registers = models[model_name].registers
+    where = f"servo {servo_id} ({model_name}): eeprom"
+    wrong = [name for name in eeprom if name not in registers or not registers[name].eeprom]
+    if wrong:
+        raise ValueError(f"{where}: not in its EEPROM: {wrong}")
+    for name, value in eeprom.items():
+        low, high = registers[name].minimum, registers[name].maximum
+        if low is not None and high is not None and not low <= value <= high:
+            raise ValueError(f"{where}: {name}: expected {low}..{high}, got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,24 +69,7 @@ class EmulatedServoSpec:
     firmware_version: int = 48
 
     def __post_init__(self) -> None:
-        if self.model_name not in MODELS:
-            expected = ", ".join(MODELS)
-            raise ValueError(
-                f"servo {self.id}: model: expected one of {expected}; got {self.model_name}"
-            )
-        registers = MODELS[self.model_name].registers
-        wrong = [n for n in self.eeprom if n not in registers or not registers[n].eeprom]
-        if wrong:
-            raise ValueError(
-                f"servo {self.id} ({self.model_name}): eeprom: not in its EEPROM: {wrong}"
-            )
-        for name, value in self.eeprom.items():
-            low, high = registers[name].minimum, registers[name].maximum
-            if low is not None and high is not None and not low <= value <= high:
-                raise ValueError(
-                    f"servo {self.id} ({self.model_name}): eeprom: {name}: expected {low}..{high}, "
-                    f"got {value}"
-                )
+        check_factory_values(self.id, self.model_name, MODELS, self.eeprom)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

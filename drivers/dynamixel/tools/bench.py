@@ -72,6 +72,7 @@ class DynamixelBench:
 
     all_ids: Final = range(MAX_SERVO_ID + 1)
     factory_baud: Final = 57_600
+    keeps: Final = tuple(Keep)
 
     def __init__(self, transport: ByteTransport, clock: Clock, baud: int) -> None:
         self.counters = BusCounters()

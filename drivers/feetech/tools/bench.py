@@ -1,6 +1,7 @@
 """Talk to whatever FEETECH servos are on a bus: their ids and models are asked for."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from drivers.base import ByteTransport
@@ -50,6 +51,15 @@ _PROTOCOL_2_PING: Final = _PROTOCOL_2_HEAD + b"\xfe\x03\x00\x01\x31\x42"
 _BAUD_CODES: Final = {rate: code for code, rate in FEETECH_BAUD_RATES.items()}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _FoundFeetech(FeetechServo):
+    """Name only what the number tells, not the motor and gear that the robot file knows."""
+
+    def __str__(self) -> str:
+        name = _common_name(_names(self.datasheet.number))
+        return f"servo {self.id} ({self.joint}, {name})"
+
+
 class FeetechBench:
     """Own the transport of a bus whose servos are not known beforehand.
 
@@ -59,6 +69,7 @@ class FeetechBench:
 
     all_ids: Final = range(FEETECH_MAX_ID + 1)
     factory_baud: Final = 1_000_000
+    keeps: Final = (Keep.ID,)
 
     def __init__(self, transport: ByteTransport, clock: Clock, baud: int) -> None:
         self.counters = BusCounters()
@@ -116,7 +127,7 @@ class FeetechBench:
                 f"servo {servo_id}: {found.model_name}; its registers are not known, only those of "
                 f"{', '.join(sorted(FEETECH_MODELS))}"
             )
-        return FeetechServo(id=servo_id, model_name=names[0], joint=joint or "bench")
+        return _FoundFeetech(id=servo_id, model_name=names[0], joint=joint or "bench")
 
     def ask_everyone(self) -> tuple[list[FoundServo], int]:
         """Return what answers when all are asked at once, and how many bytes were no answer.
@@ -191,8 +202,7 @@ class FeetechBench:
         """
         self.link.write(_spec(servo), "lock", 0)
         self.link.write(_spec(servo), "id", new_id)
-        moved = FeetechServo(id=new_id, model_name=servo.model_name, joint=servo.joint)
-        self.link.write(moved, "lock", 1)
+        self.link.write(replace(_spec(servo), id=new_id), "lock", 1)
 
     def bauds(self, servo: JointServo) -> Collection[int]:
         """Return the speeds that a servo can be set to."""
@@ -243,14 +253,12 @@ class FeetechBench:
         self.await_boot(servo.id)
 
     def factory_reset(self, servo: JointServo, keep: Keep) -> None:
-        """Give the registers their factory values; the id stays.
+        """Give the registers their factory values; the id stays, and nothing else.
 
         Raises:
-            ValueError: something else than the id is to be kept.
             LinkLost: the adapter is gone.
         """
-        if keep is not Keep.ID:
-            raise ValueError(f"{servo}: it keeps its id and nothing else; use --keep id")
+        del keep
         self.link.send(encode_packet(servo.id, FeetechInstruction.RESTORE))
 
     def await_boot(self, servo_id: int) -> FoundServo:

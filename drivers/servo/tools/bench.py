@@ -90,6 +90,11 @@ class ServoBench(Protocol):
         """Return the speed of a new servo."""
         ...
 
+    @property
+    def keeps(self) -> Collection[Keep]:
+        """Return what a factory reset can leave as it is."""
+        ...
+
     def close(self) -> None:
         """Release the transport; closing twice is allowed."""
         ...
@@ -155,11 +160,7 @@ class ServoBench(Protocol):
         ...
 
     def factory_reset(self, servo: JointServo, keep: Keep) -> None:
-        """Give a servo without torque its factory settings.
-
-        Raises:
-            ValueError: servos of this family cannot keep that.
-        """
+        """Give a servo without torque its factory settings; `keep` is one of `keeps`."""
         ...
 
     def await_boot(self, servo_id: int) -> FoundServo:

@@ -133,6 +133,13 @@ class Firmware:
         self._feedback.now_ns = self.now_ns
         self._feedback.refresh(address, length)
 
+    def present(self, row: int, name: str) -> int:
+        """Return a register's value, up to date."""
+        table = self.registers.tables[row]
+        item = table.model.registers[name]
+        self.refresh(item.address, item.size)
+        return table.get(name)
+
     def store(self, row: int, writes: Sequence[tuple[Register, int]]) -> None:
         """Carry out a host's write that was checked, with all that follows from it."""
         table = self.registers.tables[row]

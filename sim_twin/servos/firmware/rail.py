@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.dynamixel.tables.model import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
+from sim_twin.servos.firmware.rotor import MotorFigures
 
 
 class Rail:
@@ -16,7 +16,7 @@ class Rail:
     raise the voltage.
     """
 
-    def __init__(self, models: Sequence[ServoDatasheet], resistance_ohm: float) -> None:
+    def __init__(self, models: Sequence[MotorFigures], resistance_ohm: float) -> None:
         self._resistance_ohm = resistance_ohm
         stall_a = np.array([model.stall_current_a for model in models])
         self.supply_w = 0.0

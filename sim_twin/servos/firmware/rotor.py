@@ -1,11 +1,40 @@
 """Turn free shafts by their motors' duty, where no physics engine does it."""
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from drivers.dynamixel.tables.control_table import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
+
+
+class MotorFigures(Protocol):
+    """Declare what a datasheet of any family says of its motor, at `voltage_v`."""
+
+    @property
+    def name(self) -> str:
+        """Return the model's name."""
+        ...
+
+    @property
+    def stall_torque_nm(self) -> float:
+        """Return the torque at standstill with full duty."""
+        ...
+
+    @property
+    def stall_current_a(self) -> float:
+        """Return the current at standstill with full duty."""
+        ...
+
+    @property
+    def no_load_speed_rad_s(self) -> float:
+        """Return the speed with full duty and no load."""
+        ...
+
+    @property
+    def voltage_v(self) -> float:
+        """Return the nominal voltage."""
+        ...
 
 
 class FreeRotors:
@@ -14,7 +43,9 @@ class FreeRotors:
     torque = stall * duty - stall / no_load * velocity
     """
 
-    def __init__(self, models: Sequence[ServoDatasheet], inertia_kg_m2: float = 0.01) -> None:
+    def __init__(
+        self, models: Sequence[MotorFigures], inertia_kg_m2: Floats | float = 0.01
+    ) -> None:
         self._stall_nm = np.array([model.stall_torque_nm for model in models])
         self._damping = self._stall_nm / np.array([model.no_load_speed_rad_s for model in models])
         self._inertia_kg_m2 = inertia_kg_m2

@@ -19,8 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from drivers.dynamixel.tables.model import ServoDatasheet
 from sim_twin.servos.firmware.profile import Floats
+from sim_twin.servos.firmware.rotor import MotorFigures
 
 SPECIFIC_HEAT_J_G_K: Final = 0.8
 WINDING_SHARE: Final = 0.1
@@ -69,16 +69,21 @@ BODIES: Final[Mapping[str, ThermalBody]] = MappingProxyType(
 """Bodies by the model's name up to its gear ratio."""
 
 
-def body_of(model: ServoDatasheet) -> ThermalBody:
-    """Return a model's body."""
+def body_of(model: MotorFigures) -> ThermalBody:
+    """Return the body of a Dynamixel model."""
     return BODIES[model.name.partition("-")[0]]
 
 
 class Thermals:
-    """Follow the temperatures of all motors of a bus."""
+    """Follow the temperatures of all motors of a bus; without `bodies` of Dynamixel models."""
 
-    def __init__(self, models: Sequence[ServoDatasheet], ambient_c: float) -> None:
-        bodies = [body_of(model) for model in models]
+    def __init__(
+        self,
+        models: Sequence[MotorFigures],
+        ambient_c: float,
+        bodies: Sequence[ThermalBody] = (),
+    ) -> None:
+        bodies = bodies or [body_of(model) for model in models]
         capacity_j_k = np.array([body.heat_capacity_j_k for body in bodies])
         self._ambient_c = ambient_c
         self._stall_w = np.array([model.voltage_v * model.stall_current_a for model in models])

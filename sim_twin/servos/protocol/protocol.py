@@ -20,6 +20,7 @@ from sim_twin.servos.protocol.params import GROUP_WRITES, READ_REQUESTS, address
 from sim_twin.servos.protocol.registers import AccessRefused
 from sim_twin.servos.protocol.speaker import ServoSpeaker
 from sim_twin.servos.protocol.timing import Reply
+from sim_twin.servos.protocol.wire_faults import WireFaults
 from sim_twin.servos.spec import FirmwareOptions
 
 _PING: Final = struct.Struct("<HB")
@@ -57,6 +58,15 @@ class BusProtocol:
             Instruction.CLEAR: self._clear,
             Instruction.CONTROL_TABLE_BACKUP: self._back_up,
         }
+
+    @property
+    def faults(self) -> WireFaults:
+        """Return what spoils replies."""
+        return self.speaker.faults
+
+    def freeze(self, row: int) -> None:
+        """Let a servo show for ever what it senses now."""
+        self.speaker.freeze(row)
 
     def execute(self, packet: Packet | BrokenPacket) -> list[Reply]:
         """Return what the servos answer to a packet."""

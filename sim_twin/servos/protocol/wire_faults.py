@@ -29,7 +29,7 @@ def _clash(reply: bytes, random: Random) -> bytes:
 
 
 def _garble(reply: bytes, random: Random) -> bytes:
-    """Change one byte, which no 16-bit check sum misses."""
+    """Change one byte, which no check sum misses."""
     spoiled = bytearray(reply)
     spoiled[random.randrange(len(reply))] ^= random.randrange(1, 256)
     return bytes(spoiled)
@@ -54,7 +54,8 @@ _SPOILERS: Final[dict[ReplySpoiler, Callable[[bytes, Random], bytes]]] = {
 class WireFaults:
     """Hold the faults of every servo, by its row, and carry them out on its replies."""
 
-    def __init__(self) -> None:
+    def __init__(self, max_servo_id: int = MAX_SERVO_ID) -> None:
+        self._max_servo_id = max_servo_id
         self.corrupted: set[int] = set()
         self.aliases: dict[int, int] = {}
         self.frozen: dict[int, bytes] = {}
@@ -128,8 +129,9 @@ class WireFaults:
         Raises:
             ValueError: no servo can have the id.
         """
-        if servo_id is not None and not 0 <= servo_id <= MAX_SERVO_ID:
-            raise ValueError(f"id in replies: expected 0..{MAX_SERVO_ID}, got {servo_id}")
+        if servo_id is not None and not 0 <= servo_id <= self._max_servo_id:
+            expected = f"0..{self._max_servo_id}"
+            raise ValueError(f"id in replies: expected {expected}, got {servo_id}")
         self.aliases.pop(row, None)
         if servo_id is not None:
             self.aliases[row] = servo_id

@@ -177,6 +177,9 @@ def run_factory_reset(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         servo = link.servo(arguments.id, bus.joint(arguments.id))
         _require_alone(link, bus, servo.id)
+        if keep not in link.keeps:
+            can = " or ".join(one.value for one in link.keeps)
+            raise UsageError(f"{servo}: a reset can keep {can}, not {arguments.keep}")
         if new_id != servo.id and is_taken(link, new_id):
             raise UsageError(f"{servo} would get the id {new_id}, which is taken; use --keep id")
         torque = _torque_question(link, [servo])

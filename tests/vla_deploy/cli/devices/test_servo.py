@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from drivers.servo.hardware_error import HardwareError
 from drivers.servo.tools.bench import FoundServo
 from drivers.servo.tools.scan import SpeedReport
 from sim_twin.servos import EmulatedServoSpec
-from sim_twin.servos.server import FreeServos, serve
+from sim_twin.servos.feetech import EmulatedFeetechSpec
+from sim_twin.servos.server import FreeBank, FreeFeetechServos, FreeServos, serve
 from vla_deploy.cli.devices import servo_bus, servo_scan
 from vla_deploy.cli.devices.servo_bus import SPEEDS
 from vla_deploy.robots.calibration.calibration import read_calibration
@@ -28,9 +29,9 @@ CLOCK = MonotonicClock()
 class Bus:
     """Servos behind a pseudo-terminal, served by a thread."""
 
-    def __init__(self, link: Path, servos: Sequence[EmulatedServoSpec]) -> None:
+    def __init__(self, link: Path, free: FreeBank) -> None:
         self.port = str(link)
-        self.free = FreeServos(servos)
+        self.free = free
         self.bank = self.free.bank
         self._stop = threading.Event()
         self._thread = threading.Thread(
@@ -58,8 +59,15 @@ def make_bus(tmp_path: Path) -> Iterator[Callable[..., Bus]]:
 
     def make(*ids: int, model: str = "XM430-W350", **eeprom: int) -> Bus:
         servos = [EmulatedServoSpec(id=one, model_name=model, eeprom=eeprom) for one in ids]
-        buses.append(Bus(tmp_path / f"bus{len(buses)}", servos))
+        return serve_bus(FreeServos(servos))
+
+    def serve_bus(free: FreeBank) -> Bus:
+        buses.append(Bus(tmp_path / f"bus{len(buses)}", free))
         return buses[-1]
+
+    make.feetech = lambda *ids: serve_bus(
+        FreeFeetechServos([EmulatedFeetechSpec(id=one, model_name="STS3215-C018") for one in ids])
+    )
 
     yield make
     for bus in buses:
@@ -382,3 +390,24 @@ def test_calibration_ends_in_one_line_when_the_input_does(make_bus, servo, tmp_p
         said = servo(bus, "calibrate", *words)
     assert said.code == 1
     assert said.err == "vla-deploy: the input ended; what was written before stays\n"
+
+
+def test_feetech_servos_are_found_read_and_changed_like_the_others(make_bus, servo):
+    bus = make_bus.feetech(1, 2)
+    fails(servo(bus, "scan", "--baud", 1_000_000), "another protocol: a servo of another make")
+    feetech = ("--family", "feetech")
+    said = servo(bus, "scan", *feetech, "--json")
+    assert [(row["id"], row["model"]) for row in said.document["servos"]] == [
+        (1, "STS3215"),
+        (2, "STS3215"),
+    ]
+    assert servo(bus, "set-id", 2, 6, "--yes", *feetech).code == 0
+    assert servo(bus, "set-baud", 500_000, 6, "--yes", *feetech).code == 0
+    assert "servo 6: STS3215, firmware 3.10" in servo(bus, "ping", 6, *feetech).out
+    registers = servo(bus, "info", 6, *feetech, "--json").document["registers"]
+    assert (registers["id"]["value"], registers["baud_rate"]["value"]) == (6, 1)
+    assert registers["lock"]["value"] == 1
+    assert servo(bus, "monitor", 6, "--count", 1, *feetech, "--json").document["silent"] == []
+    said = servo(bus, "factory-reset", 6, "--keep", "nothing", "--yes", *feetech)
+    fails(said, "a reset can keep id, not nothing")
+    fails(servo(bus, "set-baud", 3_000_000, 6, "--yes", *feetech), "speeds are 115200, 128000")
