@@ -5,29 +5,27 @@ a goal to every servo; what each client does for it is told in `bus_clients`. Th
 terminal served by another process. Without pacing, client and servos have a core each where there
 are two, and rounds of the clients take turns, so that a busy machine hits all of them; medians are
 compared, plain sync read with plain, fast with fast. With pacing, every byte takes its time:
-`bus_paced`.
+`bus_paced`. `--family feetech` does the same with six FEETECH servos: `bus_feetech`.
 """
 
 import statistics
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.bus_clients import CLIENTS, SERVOS, BusClient
+from benchmarks.bus_feetech import PEERS as FEETECH_PEERS
+from benchmarks.bus_feetech import measure_feetech
 from benchmarks.bus_paced import measure_paced
+from benchmarks.bus_rounds import BusRound, run_whole_round
 from benchmarks.command import parser, show
 from benchmarks.core import own_core
-from benchmarks.emulated_bus import READ_BYTES, WRITE_BYTES, emulated_bus, wire_s
-from drivers.clock import NS_PER_S
+from benchmarks.emulated_bus import READ_BYTES, SERVER, WRITE_BYTES, emulated_bus, wire_s
 
 _BAUD: Final = 1_000_000
-_WARM_UP_CYCLES: Final = 20
-_MOST_ATTEMPTS: Final = 3
 _RATIOS: Final = {
     "cpu_ratio_vs_dynamixel_sdk": ("ours", "dynamixel_sdk"),
     "cpu_ratio_vs_rustypot": ("ours", "rustypot"),
@@ -35,45 +33,6 @@ _RATIOS: Final = {
     "cpu_ratio_vs_rustypot_fast": ("ours_fast", "rustypot_fast"),
 }
 _PEERS: Final = ("dynamixel_sdk", "rustypot")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BusRound:
-    """Hold what one client did in one round."""
-
-    cycles: int
-    cpu_us_per_cycle: float
-    cycles_per_s: float
-
-
-def _run_round(client: BusClient, link: Path, seconds: float) -> BusRound:
-    with client.open(link, _BAUD, client.fast) as cycle:
-        for _ in range(_WARM_UP_CYCLES):
-            cycle()
-        cycles = 0
-        cpu_ns = time.process_time_ns()
-        start_ns = time.monotonic_ns()
-        end_ns = start_ns + round(seconds * NS_PER_S)
-        while time.monotonic_ns() < end_ns:
-            cycle()
-            cycles += 1
-        cpu_ns = time.process_time_ns() - cpu_ns
-        wall_ns = time.monotonic_ns() - start_ns
-    return BusRound(
-        cycles=cycles,
-        cpu_us_per_cycle=cpu_ns / 1e3 / cycles,
-        cycles_per_s=cycles * NS_PER_S / wall_ns,
-    )
-
-
-def _run_whole_round(client: BusClient, link: Path, seconds: float) -> BusRound:
-    """Run a round, anew where a client lost a cycle to a busy machine."""
-    for _ in range(_MOST_ATTEMPTS - 1):
-        try:
-            return _run_round(client, link, seconds)
-        except RuntimeError as error:
-            print(f"bench bus: a round begins anew: {error}", file=sys.stderr)
-    return _run_round(client, link, seconds)
 
 
 def measure(rounds: int, seconds: float) -> dict[str, Any]:
@@ -84,10 +43,10 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
     """
     results: dict[str, list[BusRound]] = {client.name: [] for client in CLIENTS}
     with tempfile.TemporaryDirectory() as folder:
-        with emulated_bus(Path(folder)) as link, own_core():
+        with emulated_bus(Path(folder), SERVER) as link, own_core():
             for _ in range(rounds):
                 for client in CLIENTS:
-                    results[client.name].append(_run_whole_round(client, link, seconds))
+                    results[client.name].append(run_whole_round(client, link, _BAUD, seconds))
         return _report(results) | measure_paced(Path(folder), rounds, seconds)
 
 
@@ -133,8 +92,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser("bus", __doc__)
     arguments.add_argument("--rounds", type=int, default=5, help="interleaved rounds per client")
     arguments.add_argument("--seconds", type=float, default=0.8, help="length of one round")
+    arguments.add_argument("--family", choices=("dynamixel", "feetech"), default="dynamixel")
     options = arguments.parse_args(argv)
-    missing = [name for name in _PEERS if find_spec(name) is None]
+    is_feetech = options.family == "feetech"
+    peers = FEETECH_PEERS if is_feetech else _PEERS
+    missing = [name for name in peers if find_spec(name) is None]
     if missing:
         print(
             f"bench bus: missing: {', '.join(missing)}; pip install 'vla-deploy[dev]'",
@@ -142,7 +104,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         return 2
     try:
-        report = measure(options.rounds, options.seconds)
+        run = measure_feetech if is_feetech else measure
+        report = run(options.rounds, options.seconds)
     except RuntimeError as error:
         print(f"bench bus: {error}", file=sys.stderr)
         return 1

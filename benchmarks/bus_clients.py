@@ -23,7 +23,7 @@ from drivers.serial_port import SerialPort
 
 SERVOS: Final = 16
 MODEL: Final = "XM430-W350"
-_REPLY_MARGIN_S: Final = 0.1  # the emulator shares the machine; this is no measure of it
+REPLY_MARGIN_S: Final = 0.1  # the emulator shares the machine; this is no measure of it
 _NO_HEALTH_POLL: Final = 1_000_000  # the peers do not do it
 _BLOCK: Final = (126, 10)
 _GOAL: Final = (116, 4)
@@ -51,7 +51,7 @@ def ours(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
         baud=baud,
         fast_sync=fast,
         layout=BlockLayout.DIRECT,
-        reply_margin_s=_REPLY_MARGIN_S,
+        reply_margin_s=REPLY_MARGIN_S,
         health_every_cycles=_NO_HEALTH_POLL,
     )
     bus.connect()
@@ -105,7 +105,7 @@ def _sdk(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
 def _rustypot(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
     import rustypot
 
-    bus = rustypot.Xl430PyController(str(link), baud, _REPLY_MARGIN_S)
+    bus = rustypot.Xl430PyController(str(link), baud, REPLY_MARGIN_S)
     bus.set_fast_sync_read(fast)
     ids = list(range(1, SERVOS + 1))
     goals = [_GOAL_PULSE] * SERVOS

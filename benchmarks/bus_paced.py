@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from benchmarks.bus_clients import ours
 from benchmarks.core import realtime
-from benchmarks.emulated_bus import emulated_bus, wire_s
+from benchmarks.emulated_bus import SERVER, emulated_bus, wire_s
 from drivers.clock import NS_PER_S, MonotonicClock
 
 SHARE_HZ: Final = 100
@@ -37,7 +37,7 @@ def measure_paced(folder: Path, rounds: int, seconds: float) -> dict[str, Any]:
     """
     report: dict[str, Any] = {}
     for baud in ASKED_HZ:
-        with emulated_bus(folder, baud) as link, realtime() as permitted:
+        with emulated_bus(folder, SERVER, baud) as link, realtime() as permitted:
             report |= _at(link, baud, rounds, seconds) | {"paced_realtime": permitted}
             bare = [_at_rate(_do_nothing, SHARE_HZ, seconds)[1] for _ in range(rounds)]
             report[f"core_share_bare_sleep_{SHARE_HZ}hz"] = min(bare)
@@ -48,17 +48,17 @@ def measure_paced(folder: Path, rounds: int, seconds: float) -> dict[str, Any]:
 def _at(link: Path, baud: int, rounds: int, seconds: float) -> dict[str, Any]:
     name = f"{baud // 1_000_000}mbps"
     with ours(link, baud, True) as cycle:
-        _warm_up(cycle)
+        warm_up(cycle)
         results = [
             (
                 _at_rate(cycle, SHARE_HZ, seconds)[1],
                 _at_rate(cycle, ASKED_HZ[baud], seconds)[0],
-                _free_run_s(cycle, seconds) / wire_s(baud, fast=True),
+                free_run_s(cycle, seconds) / wire_s(baud, fast=True),
             )
             for _ in range(rounds)
         ]
     with ours(link, baud, False) as cycle:
-        _warm_up(cycle)
+        warm_up(cycle)
         plain = [_at_rate(cycle, SHARE_HZ, seconds)[1] for _ in range(rounds)]
     shares, rates, ratios = zip(*results, strict=True)
     return {
@@ -76,7 +76,8 @@ def _do_nothing() -> None:
     """Leave the period to its sleep."""
 
 
-def _warm_up(cycle: Cycle) -> None:
+def warm_up(cycle: Cycle) -> None:
+    """Run a few cycles that do not count."""
     for _ in range(_WARM_UP_CYCLES):
         cycle()
 
@@ -96,7 +97,7 @@ def _at_rate(cycle: Cycle, rate_hz: int, seconds: float) -> tuple[float, float]:
     return count * NS_PER_S / wall_ns, cpu_ns / wall_ns
 
 
-def _free_run_s(cycle: Cycle, seconds: float) -> float:
+def free_run_s(cycle: Cycle, seconds: float) -> float:
     """Return the median time of a cycle that follows the one before at once."""
     times_ns = []
     end_ns = time.monotonic_ns() + round(seconds * NS_PER_S)

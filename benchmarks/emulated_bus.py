@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -13,27 +13,30 @@ from benchmarks.bus_clients import MODEL, SERVOS
 from benchmarks.core import hardware_cores
 from drivers.clock import NS_PER_S, MonotonicClock
 
+SERVER: Final = ("--servos", str(SERVOS), "--models", MODEL)
 WRITE_BYTES: Final = 94
 READ_BYTES: Final = {False: 30 + 16 * 21, True: 30 + 8 + 16 * 14}
-_BITS_PER_BYTE: Final = 10
+BITS_PER_BYTE: Final = 10
 _START_PATIENCE_S: Final = 15.0
 
 
 def wire_s(baud: int, *, fast: bool) -> float:
     """Return how long the bytes of one cycle take on the wire."""
-    return (READ_BYTES[fast] + WRITE_BYTES) * _BITS_PER_BYTE / baud
+    return (READ_BYTES[fast] + WRITE_BYTES) * BITS_PER_BYTE / baud
 
 
 @contextmanager
-def emulated_bus(folder: Path, baud: int | None = None) -> Iterator[Path]:
+def emulated_bus(folder: Path, words: Sequence[str], baud: int | None = None) -> Iterator[Path]:
     """Serve servos on a pseudo-terminal; with `baud` every byte takes its time.
+
+    `words` are the options that say which servos.
 
     Raises:
         RuntimeError: the servos did not come up.
     """
     link = folder / f"servos-{baud or 'unpaced'}"
     command = [sys.executable, "-m", "sim_twin.servos", "--link", str(link)]
-    command += ["--servos", str(SERVOS), "--models", MODEL]
+    command += words
     if baud is not None:
         command += ["--baud", str(baud), "--return-delay-us", "0"]
     with subprocess.Popen(command) as server:

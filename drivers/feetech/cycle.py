@@ -57,6 +57,8 @@ class FeetechCycle:
         self._patience = ReplyPatience(margin_s=margin_s, attempts=1)
         self._roster = Roster(len(servos))
         self._stamps_ns: NDArray[np.int64] = np.full(len(servos), _NEVER_NS, dtype=np.int64)
+        self._all_fresh = False
+        self._errors: Sequence[int] = ()
         self._every_cycles = health_every_cycles
         self._count = self._turn = 0
         self._urgent: deque[int] = deque()
@@ -104,19 +106,29 @@ class FeetechCycle:
         self._finish()
 
     def _finish(self) -> None:
+        state, block, link = self._state, self._block, self._link
+        before_ns, state.stamp_ns = state.stamp_ns, link.now_ns()
+        link.counters.cycles += 1
+        self._journal.answer_times_ns.append(state.stamp_ns - link.last_sent_ns)
+        if block.errors != self._errors:
+            self._note_errors()
+        if len(block.answered) < len(self._servos):
+            self._finish_partial(before_ns)
+            return
+        if not self._all_fresh:
+            self._all_fresh = True
+            state.valid.fill(True)
+            state.age_s.fill(0.0)
+            self._roster.note_complete()
+
+    def _finish_partial(self, before_ns: int) -> None:
         state, block, counters = self._state, self._block, self._link.counters
-        state.stamp_ns = self._link.now_ns()
-        counters.cycles += 1
-        self._journal.answer_times_ns.append(state.stamp_ns - self._link.last_sent_ns)
+        self._forget_freshness(before_ns)
         answered = list(block.answered)
-        self._note_errors(answered)
         state.valid[:] = False
         state.valid[answered] = True
         self._stamps_ns[answered] = state.stamp_ns
         self._update_ages()
-        if len(answered) == len(self._servos):
-            self._roster.note_complete()
-            return
         self._journal.note_gaps()
         if len(answered) == len(block.members):
             self._roster.note_complete()
@@ -127,20 +139,27 @@ class FeetechCycle:
             counters.suspensions += len(dropped)
             self._block = self._new_block()
 
-    def _note_errors(self, answered: Sequence[int]) -> None:
+    def _note_errors(self) -> None:
         """Translate the error bytes; what they take away is read from the servo itself."""
-        state = self._state
+        state, answered = self._state, list(self._block.answered)
+        self._errors = self._block.errors
         before = state.error[answered].copy()
-        state.error[answered] = [hardware_errors(code) for code in self._block.errors.tolist()]
+        state.error[answered] = [hardware_errors(code) for code in self._block.errors]
         state.alert[answered] = state.error[answered] != 0
         for place in np.flatnonzero(before != state.error[answered]).tolist():
             self.ask_torque(answered[place])
         self._journal.note_errors()
 
     def _note_silence(self) -> None:
+        self._forget_freshness(self._state.stamp_ns)
         self._state.valid[:] = False
         self._state.stamp_ns = self._link.now_ns()
         self._update_ages()
+
+    def _forget_freshness(self, since_ns: int) -> None:
+        if self._all_fresh:
+            self._stamps_ns.fill(since_ns)
+        self._all_fresh = False
 
     def _update_ages(self) -> None:
         age_s = (self._state.stamp_ns - self._stamps_ns) / NS_PER_S

@@ -1,6 +1,8 @@
 """Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from drivers.feetech.codec import (
     FEETECH_BROADCAST_ID,
     FEETECH_HEADER,
     FeetechInstruction,
+    check_sum,
     encode_packet,
 )
 from drivers.feetech.link import FeetechLink
@@ -18,9 +21,9 @@ from drivers.feetech.settings import FeetechSetup
 from drivers.feetech.table import LOAD_FULL
 from drivers.servo.patience import ReplyPatience
 
-_FIRST_RECORD = len(FEETECH_HEADER) + 5  # id, length, instruction, address, size
-_RECORD_BYTES = 3
-_SIGN = 0x8000
+_FIRST_RECORD: Final = len(FEETECH_HEADER) + 5  # id, length, instruction, address, size
+_RECORD_BYTES: Final = 3
+_SIGN: Final = 0x8000
 
 Floats = NDArray[np.float64]
 
@@ -45,10 +48,15 @@ class FeetechGoals:
         self._at_zero = np.array(
             [servo.to_joint(offset) for servo, offset in zip(servos, offsets, strict=True)]
         )
-        self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
-        self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
-        self._big = np.array([servo.datasheet.byte_order == "big" for servo in servos])
-        self._pulses = np.zeros(len(servos))
+        self._per_joint = [
+            (zero, 1.0 / per_pulse, setup.minimum_pulse, setup.maximum_pulse)
+            for zero, per_pulse, setup in zip(
+                self._at_zero.tolist(), self._per_pulse.tolist(), setups, strict=True
+            )
+        ]
+        is_big = servos[0].datasheet.byte_order == "big"
+        self._low_at, self._high_at = (2, 1) if is_big else (1, 2)
+        self._pulses = [0] * len(servos)
         self._limits = {
             servo.id: setup.torque_limit for servo, setup in zip(servos, setups, strict=True)
         }
@@ -58,13 +66,12 @@ class FeetechGoals:
         for servo in servos:
             params += bytes((servo.id, 0, 0))
         frame = encode_packet(FEETECH_BROADCAST_ID, FeetechInstruction.SYNC_WRITE, params)
-        self._frame = np.frombuffer(bytearray(frame), np.uint8)
-        self._records = self._frame[_FIRST_RECORD:-1].reshape(len(servos), _RECORD_BYTES)
+        self._frame = bytearray(frame)
 
     @property
     def sent(self) -> Floats:
         """Return the goals sent last, on the joint side."""
-        joint: Floats = self._pulses * self._per_pulse + self._at_zero
+        joint: Floats = np.array(self._pulses) * self._per_pulse + self._at_zero
         return joint
 
     def write(self, position_rad: Floats) -> None:
@@ -74,18 +81,22 @@ class FeetechGoals:
             ValueError: a goal is not finite, or there is not one per servo.
             LinkLost: the adapter is gone.
         """
-        if position_rad.shape != self._pulses.shape or not np.isfinite(position_rad).all():
-            self._refuse(position_rad)
-        pulses = np.rint((position_rad - self._at_zero) / self._per_pulse)
-        np.clip(pulses, self._minimum, self._maximum, out=self._pulses)
-        words = np.abs(self._pulses).astype(np.uint16)
-        words |= np.where(self._pulses < 0, _SIGN, 0).astype(np.uint16)
-        low, high = words & 0xFF, words >> 8
-        self._records[:, 1] = np.where(self._big, high, low)
-        self._records[:, 2] = np.where(self._big, low, high)
-        frame = self._frame
-        frame[-1] = ~int(frame[len(FEETECH_HEADER) : -1].sum(dtype=np.uint32)) & 0xFF
-        self._link.send(frame.tobytes())
+        goals = position_rad.tolist()
+        if len(goals) != len(self._per_joint) or not isfinite(sum(goals)):
+            self._check(position_rad)
+        frame, place = self._frame, _FIRST_RECORD
+        for row, (goal, (zero, pulses_per, least, most)) in enumerate(
+            zip(goals, self._per_joint, strict=True)
+        ):
+            pulse = round((goal - zero) * pulses_per)
+            pulse = least if pulse < least else min(pulse, most)
+            self._pulses[row] = pulse
+            word = pulse if pulse >= 0 else _SIGN - pulse
+            frame[place + self._low_at] = word & 0xFF
+            frame[place + self._high_at] = word >> 8
+            place += _RECORD_BYTES
+        frame[-1] = check_sum(frame[len(FEETECH_HEADER) : -1])
+        self._link.send(bytes(frame))
 
     def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the duty of servos by id, where it changed; return those that did not take it.
@@ -121,9 +132,10 @@ class FeetechGoals:
             )
         return min(round(ratio * LOAD_FULL), self._limits[servo_id])
 
-    def _refuse(self, position_rad: Floats) -> None:
-        if position_rad.shape != self._pulses.shape:
+    def _check(self, position_rad: Floats) -> None:
+        if position_rad.shape != (len(self._joints),):
             raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
         finite = np.isfinite(position_rad)
         bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
-        raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
+        if bad:
+            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")

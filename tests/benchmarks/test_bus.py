@@ -31,3 +31,14 @@ def test_the_report_holds_the_ratio_and_every_client(capsys: pytest.CaptureFixtu
     ):
         assert report[name] > 0.0
     assert report["clients"]["ours_fast"]["wire_bytes_per_cycle"] == 356
+
+
+def test_feetech_servos_are_measured_beside_the_vendors_sdk(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ["--family", "feetech", "--rounds", "1", "--seconds", "0.1", "--json"]
+    assert main(words) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert 0.0 < report["cpu_ratio_vs_scservo_sdk"] < 1.0
+    assert report["cycle_time_ratio_vs_wire_limit"] > 1.0
+    assert set(report["clients"]) == {"ours", "scservo_sdk", "rustypot"}

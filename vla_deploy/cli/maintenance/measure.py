@@ -37,7 +37,7 @@ CAMPAIGNS: Final = {
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",
 }
-_BENCH_EXAMPLES: Final = "  vla-deploy bench bus --json\n  vla-deploy bench twin\n"
+_BENCH_EXAMPLES: Final = "  vla-deploy bench bus --family feetech --json\n  vla-deploy bench twin\n"
 _VALIDATE_EXAMPLES: Final = """  vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20 --junit out/kills.xml
 """
@@ -55,6 +55,7 @@ def register(commands: Any) -> None:
         action="append",
         help="of dashboard, perception, planner, speech: only this, repeatable",
     )
+    bench.add_argument("--family", help="of bus: the servos' family, dynamixel or feetech")
     validate = add_top_command(
         commands, "validate", _VALIDATE_EXAMPLES, run_campaign, json_help="print the report as JSON"
     )
@@ -82,6 +83,8 @@ def run_bench(arguments: argparse.Namespace) -> int:
         command.append("--json")
     for part in arguments.part or ():
         command += ["--part", part]
+    if arguments.family is not None:
+        command += ["--family", arguments.family]
     return subprocess.run(command, check=False).returncode
 
 
