@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any, TypeVar
 
-from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
 from sim_twin.battery import TwinBattery, dock_contact
@@ -25,7 +24,8 @@ from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
-from sim_twin.servos import Coupling, EmulatedServoSpec, ServoBank, WireTiming
+from sim_twin.servos import Coupling, WireTiming
+from sim_twin.servos.robot_bank import nominal_v, robot_bank
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySource
 
@@ -56,7 +56,8 @@ class Twin:
         self.person = WorldPerson(self.engine)
         shafts = self.engine.servos
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)
-        self.servos = ServoBank(_servo_specs(robot), timing=servo_timing, coupling=coupling)
+        models = {servo.id: servo.model for servo in robot.servo_bus.servos}
+        self.servos = robot_bank(models, robot.servo_bus.baud, servo_timing, coupling)
         self.drives = robot_drives(robot.can_bus)
         self._drive_laws = [drive.advance for drive in self.drives]
         self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
@@ -81,7 +82,7 @@ class Twin:
         }
         names = (*self.lines, *self.stream_lines, robot.camera.device)
         self.plugs = {name: Plug() for name in names}
-        self.servo_supply = Supply()
+        self.servo_supply = Supply(nominal_v(models))
         self.battery = self._battery(robot)
         self.faults = FaultInjector(self)
         self._hazards: HazardWatch | None = None
@@ -273,13 +274,3 @@ class Twin:
 
 def _keep_regulated(_volts: float) -> None:
     """Leave the servos' supply as it is: a regulator stands between it and the pack."""
-
-
-def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:
-    """Return the bus as its integrator left it: ids and baud rate set, all else as delivered."""
-    bauds = {speed: value for value, speed in BAUD_RATES.items()}
-    eeprom = {"baud_rate": bauds[robot.servo_bus.baud]}
-    return [
-        EmulatedServoSpec(id=servo.id, model_name=servo.model, eeprom=eeprom)
-        for servo in robot.servo_bus.servos
-    ]

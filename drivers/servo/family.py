@@ -108,8 +108,9 @@ def family_of(model: str) -> ServoFamily:
     Raises:
         UnknownModel: no family has the model; the message lists those there are.
     """
-    families = [servo_family(name) for name in FAMILIES]
-    for family in families:
+    families = []
+    for name in FAMILIES:
+        families.append(family := servo_family(name))
         if model in family.models:
             return family
     known = "; ".join(f"{family.name}: {', '.join(sorted(family.models))}" for family in families)

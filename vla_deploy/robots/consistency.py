@@ -9,6 +9,8 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+from drivers.errors import UnknownModel
+from drivers.servo.family import family_of
 from vla_deploy.robots.battery_settings import battery_is_usable
 from vla_deploy.runtime.table_schema import TableFault, is_number
 
@@ -121,6 +123,35 @@ def models_are_listed(document: Document) -> Iterator[TableFault]:
         if isinstance(model, str) and model not in models:
             key = f"servo_bus.servos[{i}].model"
             yield unknown_name(key, model, "a key of servo_models", models)
+
+
+def servos_have_one_driver(document: Document) -> Iterator[TableFault]:
+    """One driver knows all servos of the bus, and they can be set to its speed."""
+    named = [
+        (f"servo_bus.servos[{i}].model", row["model"])
+        for i, row in enumerate(_servos(document))
+        if isinstance(row.get("model"), str)
+    ]
+    families = {}
+    for key, model in named:
+        try:
+            families[key] = family_of(model)
+        except UnknownModel as error:
+            yield TableFault(key=key, got=repr(model), expected=f"a model with a driver: {error}")
+    if not families:
+        return
+    first, family = next(iter(families.items()))
+    for key, other in families.items():
+        if other.name != family.name:
+            yield TableFault(
+                key=key,
+                got=f"a {other.name} servo",
+                expected=f"a {family.name} servo, as {first}: servos of a bus are of one family",
+            )
+    baud = table(document, "servo_bus").get("baud")
+    if isinstance(baud, int) and baud not in family.baud_rates:
+        rates = ", ".join(map(str, sorted(family.baud_rates)))
+        yield TableFault(key="servo_bus.baud", got=repr(baud), expected=f"one of {rates}")
 
 
 def limits_match_servos(document: Document) -> Iterator[TableFault]:
@@ -241,6 +272,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     nothing_used_twice,
     drives_fit_protocol,
     models_are_listed,
+    servos_have_one_driver,
     limits_match_servos,
     servos_reach,
     groups_cover_joints,

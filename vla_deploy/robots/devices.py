@@ -38,7 +38,8 @@ class ServoBus:
     device: str
     path: str
     baud: int
-    protocol: int
+    protocol: int = 2
+    """Of Dynamixels, which is the only one that is spoken; others leave it out."""
     servos: tuple[Servo, ...]
 
 

@@ -58,12 +58,12 @@ ROBOT: Shape = {
 SERVO_BUS: Shape = {
     "device": TEXT,
     "path": TEXT,
-    "baud": one_of(57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000),
-    "protocol": one_of(2),
+    "baud": integer(1),
+    "protocol": one_of(2).optional,
     "servos": TABLES,
 }
 SERVO: Shape = {
-    "id": integer(0, 252),
+    "id": integer(0, 253),
     "model": TEXT,
     "joint": TEXT,
     "sign": one_of(-1, 1),

@@ -72,7 +72,7 @@ class FeetechFirmware:
         self._goals_moved = False
         self._feedback_is_fresh = False
         self._supply_v: float | None = None
-        self._rail_v = 0.0
+        self._rail_v = memory.sheets[0].voltage_v
         self._advanced_ns: int | None = None
         self._checked_ns = 0
         self.now_ns = 0

@@ -63,7 +63,7 @@ def test_device_paths_come_from_the_file_or_from_one_folder() -> None:
 
 
 TEN_FAULTS: tuple[tuple[tuple[str, str], str, str], ...] = (
-    ((r"^baud = 3000000", "baud = 31337"), "servo_bus.baud", "one of 57600"),
+    ((r"^baud = 3000000", "baud = 31337"), "servo_bus.baud", "one of 9600"),
     ((r"id = 2,", "id = 1,"), "servo_bus.servos[1].id", "not used by servo_bus.servos[0].id"),
     ((r'id = 3, model = "XM430-W350"', 'id = 3, model = "XM999"'), "servo_bus.servos[2].model",
      "a key of servo_models"),
