@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import Clock
 from drivers.twin_clock import TwinClock
@@ -38,6 +38,8 @@ from sim_twin.wire_digest import WireDigest
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.home_devices import BROKER_SOCKET
 
+_UNUSED_CAN_BUS: Final = "can"
+"""Where the hub of a robot without drives is: nothing is on it."""
 READY_FILE = "ready"
 MOST_PATH_BYTES = 90
 """A Unix socket's path holds 107 bytes; the device's name needs the rest."""
@@ -87,11 +89,10 @@ class TwinProcess:
         if self._twin.battery is not None:
             self._twin.battery.serve(devices)
         self._digest = WireDigest(lambda: self._now_ns())
-        self._hub = CanHub(
-            self._twin.can_wire, devices / robot.can_bus.device, on_packet=self._digest.add
-        )
+        can_bus = robot.parts.can_bus.device if robot.parts.can_bus else _UNUSED_CAN_BUS
+        self._hub = CanHub(self._twin.can_wire, devices / can_bus, on_packet=self._digest.add)
         self._twin.begin_home(devices / BROKER_SOCKET)
-        self._drawings = _start_drawings(options)
+        self._drawings = _start_drawings(options, robot)
         self._servo_line = self._open_servo_line(devices / robot.servo_bus.device)
         self._lines = {robot.servo_bus.device: self._servo_line} | {
             name: PtyLine(line, devices / name)
@@ -328,12 +329,12 @@ def _build_twin(options: TwinOptions, robot: RobotDescription) -> Twin:
     return twin
 
 
-def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
+def _start_drawings(options: TwinOptions, robot: RobotDescription) -> list[MirrorLink]:
     drawings: list[MirrorLink] = []
     try:
         if options.viewer:
             drawings.append(start_viewer(options.robot, options.world))
-        if options.camera:
+        if options.camera and robot.parts.camera is not None:
             devices_dir = options.devices_dir
             drawings.append(
                 start_camera(

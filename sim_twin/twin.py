@@ -30,6 +30,9 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySource
 
 S = TypeVar("S", bound=StreamedDevice)
+L = TypeVar("L", LidarDevice, ImuDevice)
+_NO_CAN_BITRATE = 1_000_000
+"""Of a wire that nothing is on."""
 
 
 class Twin:
@@ -58,20 +61,24 @@ class Twin:
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)
         models = {servo.id: servo.model for servo in robot.servo_bus.servos}
         self.servos = robot_bank(models, robot.servo_bus.baud, servo_timing, coupling)
-        self.drives = robot_drives(robot.can_bus)
+        parts = robot.parts
+        self.drives = robot_drives(parts.can_bus) if parts.can_bus else ()
         self._drive_laws = [drive.advance for drive in self.drives]
-        self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
-        self.lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
-        self.imu = ImuDevice(self.engine.imu.read, seed=seed)
-        self.serial_devices: dict[str, WireDevice] = {
-            robot.servo_bus.device: self.servos,
-            robot.lidar.device: self.lidar,
-            robot.imu.device: self.imu,
-        }
-        frame_bytes = {
-            robot.lidar.device: ld19.PACKET_BYTES,
-            robot.imu.device: bno085_rvc.FRAME_BYTES,
-        }
+        bitrate = parts.can_bus.bitrate if parts.can_bus else _NO_CAN_BITRATE
+        self.can_wire = CanWire(self.drives, bitrate=bitrate)
+        self.serial_devices: dict[str, WireDevice] = {robot.servo_bus.device: self.servos}
+        self._looking: list[LidarDevice | ImuDevice] = []
+        frame_bytes: dict[str, int] = {}
+        if parts.lidar is not None:
+            lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
+            self._looking.append(lidar)
+            self.serial_devices[parts.lidar.device] = lidar
+            frame_bytes[parts.lidar.device] = ld19.PACKET_BYTES
+        if parts.imu is not None:
+            imu = ImuDevice(self.engine.imu.read, seed=seed)
+            self._looking.append(imu)
+            self.serial_devices[parts.imu.device] = imu
+            frame_bytes[parts.imu.device] = bno085_rvc.FRAME_BYTES
         self.lines = {
             name: LineTamper(device, self._now_ns, frame_bytes.get(name))
             for name, device in self.serial_devices.items()
@@ -80,7 +87,9 @@ class Twin:
         self.stream_lines = {
             name: LineTamper(device, self._now_ns) for name, device in self.streamed_devices.items()
         }
-        names = (*self.lines, *self.stream_lines, robot.camera.device)
+        names = [*self.lines, *self.stream_lines]
+        if parts.camera is not None:
+            names.append(parts.camera.device)
         self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply(nominal_v(models))
         self.battery = self._battery(robot)
@@ -96,6 +105,30 @@ class Twin:
     def now_ns(self) -> int:
         """Return simulated time in nanoseconds."""
         return self.engine.now_ns
+
+    @property
+    def lidar(self) -> LidarDevice:
+        """Return the lidar.
+
+        Raises:
+            ModelMismatch: the robot file declares none.
+        """
+        return self._sensor(LidarDevice, "a lidar")
+
+    @property
+    def imu(self) -> ImuDevice:
+        """Return the IMU.
+
+        Raises:
+            ModelMismatch: the robot file declares none.
+        """
+        return self._sensor(ImuDevice, "an IMU")
+
+    def _sensor(self, kind: type[L], what: str) -> L:
+        for sensor in self._looking:
+            if isinstance(sensor, kind):
+                return sensor
+        raise TwinModelMismatch(f"the twin of {self.robot.name} needs {what} in the robot file")
 
     @property
     def estop_button(self) -> EstopButtonDevice:
@@ -208,10 +241,9 @@ class Twin:
         self.person.step()
         self.engine.step()
         now_ns = self.engine.now_ns
-        if now_ns >= self.lidar.due_ns:
-            self.lidar.step(now_ns)
-        if now_ns >= self.imu.due_ns:
-            self.imu.step(now_ns)
+        for sensor in self._looking:
+            if now_ns >= sensor.due_ns:
+                sensor.step(now_ns)
         self.can_wire.poll(now_ns)
         if self.battery is not None and now_ns >= self.battery.due_ns:
             self.battery.step(now_ns)

@@ -64,6 +64,9 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     effect = EFFECTS.get((component, of or fault))
     if effect is None:
         raise _unsupported(component, of or fault)
+    part = _PARTS.get(component)
+    if part is not None and getattr(robot.parts, part) is None:
+        raise FaultRefused(f"{component.value}: the robot file has no [{part}]")
     if component is Component.BATTERY and robot.battery is None:
         raise FaultRefused("battery: the robot file has no [battery]")
     instance, number = _instance(component, raw.get("instance"), robot)
@@ -84,13 +87,24 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     )
 
 
+_PARTS: Final = {
+    Component.LIDAR: "lidar",
+    Component.IMU: "imu",
+    Component.CAMERA: "camera",
+    Component.CAN_BUS: "can_bus",
+    Component.DRIVE: "can_bus",
+}
+"""The part of a robot that each component belongs to, where a robot may lack it."""
+
+
 def instances_of(component: Component, robot: RobotDescription) -> dict[str, int]:
     """Return names and ids of what there is several of; empty where there is but one."""
     match component:
         case Component.SERVO:
             return {servo.joint: servo.id for servo in robot.servo_bus.servos}
         case Component.DRIVE:
-            return {drive.joint: drive.node_id for drive in robot.can_bus.drives}
+            can_bus = robot.parts.can_bus
+            return {one.joint: one.node_id for one in (can_bus.drives if can_bus else ())}
         case Component.HOME_DEVICE:
             return {name: number for number, name in enumerate(robot.devices, 1)}
     return {}

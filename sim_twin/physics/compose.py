@@ -1,11 +1,13 @@
 """Compose one MuJoCo model from a robot's MJCF and a world's MJCF."""
 
+import math
 import warnings
 from pathlib import Path
 
 import mujoco
 
 from sim_twin.errors import TwinModelMismatch
+from sim_twin.worlds.placement import BodyPose
 
 STEP_S = 0.002
 ROBOT_ROOT = "base"
@@ -17,8 +19,8 @@ _IMPEDANCE_RATIO = 100.0
 """Friction over normal impedance: at 10, a held thing creeps 4 mm a minute through the fingers."""
 
 
-def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
-    """Put the robot into the world and return the compiled model.
+def compose(robot_xml: Path, world_xml: Path, mount: BodyPose | None = None) -> mujoco.MjModel:
+    """Put the robot into the world, a fixed one at the mount, and return the compiled model.
 
     The robot's geoms move to groups 2 (looks) and 3 (collision), so that rays can pass them by.
 
@@ -36,7 +38,7 @@ def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
         geom.group = ROBOT_LOOKS_GROUP if looks else ROBOT_COLLISION_GROUP
     _set_options(world)
     try:
-        return _attach(robot, world)
+        return _attach(robot, world, mount)
     except ValueError as error:
         raise TwinModelMismatch(f"{robot_xml} in {world_xml}: {error}") from error
 
@@ -48,16 +50,27 @@ def _load(path: Path) -> mujoco.MjSpec:
         raise TwinModelMismatch(f"{path}: {error}") from error
 
 
-def _attach(robot: mujoco.MjSpec, world: mujoco.MjSpec) -> mujoco.MjModel:
+def _attach(robot: mujoco.MjSpec, world: mujoco.MjSpec, mount: BodyPose | None) -> mujoco.MjModel:
     """Compose without MuJoCo's warning about saving, and its log file: nothing is saved."""
     mujoco.set_mju_user_warning(_drop)
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Attaching a spec with an empty prefix")
-            world.attach(robot, prefix="", frame=world.worldbody.add_frame())
+            world.attach(robot, prefix="", frame=_frame_of(robot, world, mount))
             return world.compile()
     finally:
         mujoco.set_mju_user_warning(None)
+
+
+def _frame_of(
+    robot: mujoco.MjSpec, world: mujoco.MjSpec, mount: BodyPose | None
+) -> mujoco.MjsFrame:
+    """Return where the robot is put: one that can be moved about is placed later."""
+    if mount is None or robot.body(ROBOT_ROOT).joints:
+        return world.worldbody.add_frame()
+    half = mount.yaw_rad / 2.0
+    turn = (math.cos(half), 0.0, 0.0, math.sin(half))
+    return world.worldbody.add_frame(pos=mount.position_m, quat=turn)
 
 
 def _drop(_message: str) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -28,14 +29,22 @@ class Engine:
         self.data = mujoco.MjData(model)
         self.servos = Shafts(model, self.data, servos)
         self.drives = Shafts(model, self.data, drives)
-        self.imu = MotionProbe(model, self.data)
         self.referee = Referee(model, self.data)
         self._held_things = HeldThings(model, self.data)
         self.now_ns = START_NS
         """Simulated time in nanoseconds."""
         self._move_joints_into_range()
         mujoco.mj_forward(model, self.data)
-        self.lidar = RangeProbe(model, self.data)
+
+    @cached_property
+    def lidar(self) -> RangeProbe:
+        """Return what a lidar at the model's site would measure."""
+        return RangeProbe(self.model, self.data)
+
+    @cached_property
+    def imu(self) -> MotionProbe:
+        """Return what an IMU at the model's site would feel."""
+        return MotionProbe(self.model, self.data)
 
     def place(self, body: str, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> None:
         """Put a free body somewhere, at rest.

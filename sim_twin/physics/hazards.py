@@ -60,10 +60,9 @@ class HazardWatch:
         self._low, self._high = low - slack, high + slack
         self._speed_limit = SPEED_SLACK_RATIO * robot.velocity_max
         self._root = model.body(ROBOT_ROOT).id
-        root_joint = int(model.body_jntadr[self._root])
-        self._root_dof = int(model.jnt_dofadr[root_joint])
+        self._root_dof = int(model.body_dofadr[self._root])
         self._is_robot = model.body_rootid[model.geom_bodyid] == self._root
-        self._is_fixed = model.body_weldid[model.geom_bodyid] == 0
+        self._is_fixed = (model.body_weldid[model.geom_bodyid] == 0) & ~self._is_robot
         self._is_floor = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value
         self._things = _free_bodies(model, self._root)
         self._boxes = _workspaces(model, robot)
@@ -115,7 +114,10 @@ class HazardWatch:
                 self._note("workspace", hand, outside_m, WORKSPACE_SLACK_M)
 
     def _look_at_base(self) -> None:
-        base, velocity = self._robot.base, self._data.qvel[self._root_dof : self._root_dof + 6]
+        base = self._robot.parts.base
+        if base is None:
+            return
+        velocity = self._data.qvel[self._root_dof : self._root_dof + 6]
         speed_m_s = math.hypot(velocity[0], velocity[1])
         upright = float(self._data.xmat[self._root][8])
         readings = (

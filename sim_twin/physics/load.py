@@ -20,7 +20,8 @@ def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
         ModelMismatch: there is no such world, or the two do not fit together.
     """
     try:
-        return compose(robot.mjcf_path, load_world(world).mjcf_path)
+        found = load_world(world)
+        return compose(robot.mjcf_path, found.mjcf_path, found.mount)
     except FileNotFoundError as error:
         raise TwinModelMismatch(str(error)) from error
 
@@ -32,8 +33,9 @@ def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
         ModelMismatch: there is no such world, or robot and world do not fit together.
     """
     engine = Engine(load_model(robot, world), servo_shafts(robot), drive_shafts(robot))
-    start = robot.start_pose
-    engine.place(ROBOT_ROOT, start.x_m, start.y_m, 0.0, start.yaw_rad)
+    if robot.parts.base is not None:
+        start = robot.start_pose
+        engine.place(ROBOT_ROOT, start.x_m, start.y_m, 0.0, start.yaw_rad)
     engine.pose(robot.poses.get(REST_POSE, {}))
     for name, pose in draw_poses(world, seed).items():
         engine.place(name, *pose.position_m, pose.yaw_rad)
@@ -50,4 +52,5 @@ def servo_shafts(robot: RobotDescription) -> list[Shaft]:
 
 def drive_shafts(robot: RobotDescription) -> list[Shaft]:
     """Return the wheels' shafts as they are: the emulated drives know their gear and sign."""
-    return [Shaft(joint=drive.joint) for drive in robot.can_bus.drives]
+    can_bus = robot.parts.can_bus
+    return [Shaft(joint=drive.joint) for drive in (can_bus.drives if can_bus else ())]

@@ -37,13 +37,17 @@ class WorldObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldSpec:
-    """Describe a world: its MJCF, its surfaces and the objects in the order of drawing."""
+    """Describe a world: its MJCF, its surfaces and the objects in the order of drawing.
+
+    `mount` is where the base of a robot that does not drive is screwed down, if there is a place.
+    """
 
     name: str
     mjcf_path: Path
     min_distance_m: float
     surfaces: Mapping[str, float]
     objects: Mapping[str, WorldObject]
+    mount: BodyPose | None = None
 
 
 def load_world(name: str) -> WorldSpec:
@@ -63,7 +67,13 @@ def load_world(name: str) -> WorldSpec:
         min_distance_m=document["min_distance_m"],
         surfaces=document["surfaces"],
         objects={name: _object(name, row) for name, row in document["objects"].items()},
+        mount=_mount(document["mount"]) if "mount" in document else None,
     )
+
+
+def _mount(row: Mapping[str, Any]) -> BodyPose:
+    x_m, y_m, z_m = row["position_m"]
+    return BodyPose(position_m=(x_m, y_m, z_m), yaw_rad=row["yaw_rad"])
 
 
 def _object(name: str, row: Mapping[str, Any]) -> WorldObject:

@@ -22,11 +22,11 @@ from vla_deploy.control.motion.axes import Flags, any_of
 from vla_deploy.control.motion.dispatch import Dispatcher, axis_limits
 from vla_deploy.control.motion.motions import MotionSet
 from vla_deploy.control.output.arming import Arming
+from vla_deploy.control.output.base_drive import base_drive
 from vla_deploy.control.output.base_output import BaseOutput
 from vla_deploy.control.output.joint_output import JointOutput
 from vla_deploy.control.output.payload import Payload
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.control.reporting.status import Status
 from vla_deploy.control.reporting.telemetry import Telemetry, TickClock
 from vla_deploy.ipc import SharedSpace, topics
@@ -64,7 +64,7 @@ class ControlNode:
         space = SharedSpace(context.run_dir / "ipc", clock)
         self._payload = Payload(robot, space.cell_reader(topics.EXECUTOR_STATUS))
         servos = self._servos = ServoLine(robot, profile, devices, clock)
-        wheels = self._wheels = Wheels(robot, profile, devices, clock)
+        wheels = self._wheels = base_drive(robot, profile, devices, clock)
         self._motions = MotionSet(axis_limits(robot))
         self._joints = JointOutput(robot, self._motions, servos, self._payload)
         self._base = BaseOutput(robot, wheels)

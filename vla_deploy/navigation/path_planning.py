@@ -165,11 +165,39 @@ def _unwind(came_from: dict[int, int], cell: int) -> list[int]:
     return cells[::-1]
 
 
+class NoWays(PathPlanner):
+    """Answer for a robot that stands fixed: no way leads anywhere."""
+
+    def __init__(self, name: str) -> None:
+        """Take the robot's name, which says why."""
+        self._reason = f"{name} has no base: it stays where it is mounted"
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Return that the robot cannot stand there."""
+        return False
+
+    def is_mapped(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return that there is no map that shows them."""
+        return np.zeros(len(points), dtype=np.bool_)
+
+    def plan(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
+        """Find no way.
+
+        Raises:
+            NoPath: always.
+        """
+        raise NoPath(self._reason)
+
+
 def base_planner(robot: RobotDescription) -> PathPlanner:
     """Return the planner for a robot's base on its own map, around its keep-out zones.
+
+    That of a robot without a base finds no way.
 
     Raises:
         MapInvalid: the robot file's map cannot be used.
     """
+    if robot.parts.base is None:
+        return NoWays(robot.name)
     grid = with_zones(load_map(robot.home.map_path), robot.home.zones)
     return PathPlanner(grid, robot.base.footprint_radius_m + CLEARANCE_MARGIN_M)

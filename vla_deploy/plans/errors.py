@@ -28,7 +28,9 @@ class UnknownPlace(PlanError):
     """Say that a place is not in the robot file."""
 
     def __init__(self, name: str, known: Iterable[str]) -> None:
-        super().__init__(f'I do not know the place "{name}"; I know: {", ".join(sorted(known))}')
+        places = ", ".join(sorted(known))
+        rest = f"I know: {places}" if places else "I know of none"
+        super().__init__(f'I do not know the place "{name}"; {rest}')
 
 
 class UnknownObject(PlanError):

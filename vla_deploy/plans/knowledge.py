@@ -196,18 +196,17 @@ def world_of(
     devices_on: Mapping[str, bool] = NOTHING_KNOWN,
 ) -> World:
     """Return what plans for this robot may refer to; `is_free` is its map, where one is at hand."""
-    openings_m = [
-        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
-    ]
+    openings_m = [robot.widest_m(hand) for hand in robot.hands]
+    base, home = robot.parts.base, robot.parts.home
     return World(
         places=spoken_places(robot.places),
         poses=frozenset(robot.poses),
         holding=dict(holding),
         sites=robot.places,
         furniture=frozenset(name for name, one in robot.places.items() if one.viewpoints),
-        zones=robot.home.zones,
-        footprint_radius_m=robot.base.footprint_radius_m,
-        max_speed_m_s=robot.base.max_speed_m_s,
+        zones=home.zones if home else (),
+        footprint_radius_m=base.footprint_radius_m if base else 0.0,
+        max_speed_m_s=base.max_speed_m_s if base else 0.0,
         opening_max_m=max(openings_m, default=None),
         bounds=robot.planning,
         is_free=is_free,

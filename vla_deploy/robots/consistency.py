@@ -92,6 +92,19 @@ def nothing_used_twice(document: Document) -> Iterator[TableFault]:
 NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
 
 
+def parts_come_together(document: Document) -> Iterator[TableFault]:
+    """A base has its drives and a home to drive in; what guards a base needs one."""
+    together = ("base", "can_bus", "home")
+    if any(key in document for key in together):
+        for key in (one for one in together if one not in document):
+            yield TableFault(
+                key=key, got="nothing", expected="a table: base, can_bus and home come together"
+            )
+    else:
+        for key in (one for one in ("zones", "tip_over") if one in document):
+            yield TableFault(key=key, got="a table", expected="nothing: the robot has no base")
+
+
 def drives_fit_protocol(document: Document) -> Iterator[TableFault]:
     """Node ids are those of the protocol, and ODrive axes have their list of endpoints."""
     bus = table(document, "can_bus")
@@ -270,6 +283,7 @@ def ros_is_on_where_needed(document: Document) -> Iterator[TableFault]:
 
 CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     nothing_used_twice,
+    parts_come_together,
     drives_fit_protocol,
     models_are_listed,
     servos_have_one_driver,

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +21,14 @@ from vla_deploy.robots.devices import (
     ServoModel,
     VoiceSettings,
 )
+from vla_deploy.robots.errors import PartMissing
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.ros_settings import UNUSED, RosSettings
+
+P = TypeVar("P")
 
 
 class StopCategory(IntEnum):
@@ -75,13 +79,25 @@ class StopGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hand:
-    """Tie an arm to its gripper; the opening between the pads is opening_ratio * gripper joint."""
+    """Tie an arm to its gripper.
+
+    The opening between the pads is opening_offset_m + opening_ratio * gripper joint.
+    """
 
     name: str
     arm: str
     gripper: str
     grip_site: str
     opening_ratio: float
+    opening_offset_m: float = 0.0
+
+    def opening_m(self, position: float) -> float:
+        """Return the opening between the pads at a position of the gripper's joint."""
+        return self.opening_offset_m + self.opening_ratio * position
+
+    def position_at(self, opening_m: float) -> float:
+        """Return the position of the gripper's joint at an opening between the pads."""
+        return (opening_m - self.opening_offset_m) / self.opening_ratio
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,23 +130,37 @@ class Home:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RobotParts:
+    """Hold what a robot may have beside its servos; None is a part that it does not have.
+
+    A base drives by the CAN bus, in its home: those three come together.
+    """
+
+    base: BaseGeometry | None = None
+    can_bus: CanBus | None = None
+    lidar: SerialSensor | None = None
+    imu: SerialSensor | None = None
+    camera: CameraDescription | None = None
+    home: Home | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotDescription:
-    """Hold everything that the robot file declares."""
+    """Hold everything that the robot file declares.
+
+    `parts` has those that a robot may lack. Who cannot work without one asks for it by its name,
+    such as `robot.base`, and gets PartMissing where there is none.
+    """
 
     name: str
     mjcf_path: Path
     servo_bus: ServoBus
     servo_models: Mapping[str, ServoModel]
-    can_bus: CanBus
-    base: BaseGeometry
-    lidar: SerialSensor
-    imu: SerialSensor
-    camera: CameraDescription
+    parts: RobotParts
     limits: Mapping[str, JointLimits]
     groups: Mapping[str, StopGroup]
     hands: Mapping[str, Hand]
     poses: Mapping[str, Mapping[str, float]]
-    home: Home
     estop: EstopButtonDescription | None = None
     microphone: Audio | None = None
     speaker: Audio | None = None
@@ -142,6 +172,67 @@ class RobotDescription:
     broker: MqttBroker | None = None
     devices: Mapping[str, HomeDevice] = field(default_factory=dict)
     """What the robot switches in its home, by name."""
+
+    @property
+    def base(self) -> BaseGeometry:
+        """Return the base.
+
+        Raises:
+            PartMissing: the robot stands where it is mounted.
+        """
+        return self._part(self.parts.base, "base")
+
+    @property
+    def can_bus(self) -> CanBus:
+        """Return the bus of the wheel drives.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        return self._part(self.parts.can_bus, "can_bus")
+
+    @property
+    def lidar(self) -> SerialSensor:
+        """Return the lidar.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        return self._part(self.parts.lidar, "lidar")
+
+    @property
+    def imu(self) -> SerialSensor:
+        """Return the IMU.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        return self._part(self.parts.imu, "imu")
+
+    @property
+    def camera(self) -> CameraDescription:
+        """Return the camera.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        return self._part(self.parts.camera, "camera")
+
+    @property
+    def home(self) -> Home:
+        """Return the home.
+
+        Raises:
+            PartMissing: the robot file has none.
+        """
+        return self._part(self.parts.home, "home")
+
+    def _part(self, part: P | None, name: str) -> P:
+        if part is None:
+            raise PartMissing(
+                f"{self.name} has no {name.replace('_', ' ')}: [{name}] is not in its file"
+            )
+        return part
 
     @property
     def gripper_joints(self) -> frozenset[str]:
@@ -161,13 +252,14 @@ class RobotDescription:
 
     @property
     def places(self) -> Mapping[str, Place]:
-        """Return the named places."""
-        return self.home.places
+        """Return the named places, none where the robot has no home."""
+        return self.parts.home.places if self.parts.home else {}
 
     @property
     def start_pose(self) -> Pose2D:
-        """Return the pose in which the robot is switched on."""
-        return self.home.places[self.home.start].pose
+        """Return the pose in which the robot is switched on, the map's origin without a home."""
+        home = self.parts.home
+        return home.places[home.start].pose if home else Pose2D(x_m=0.0, y_m=0.0, yaw_rad=0.0)
 
     @property
     def position_min(self) -> NDArray[np.float64]:
@@ -206,6 +298,15 @@ class RobotDescription:
             known = ", ".join(self.groups)
             raise KeyError(f"{self.name} has no joint group {name!r}; it has {known}") from None
 
+    def gripper_joint(self, hand: str) -> str:
+        """Return the joint of a hand's gripper."""
+        (joint,) = self.group(self.hands[hand].gripper).joints
+        return joint
+
+    def widest_m(self, hand: str) -> float:
+        """Return how far a hand opens."""
+        return self.hands[hand].opening_m(self.limits[self.gripper_joint(hand)].max)
+
     def model_of(self, joint: str) -> ServoModel:
         """Return the datasheet of the servo that drives `joint`."""
         servo = self.servo_bus.servos[self.joint_index[joint]]
@@ -227,9 +328,10 @@ class RobotDescription:
         Raises:
             KeyError: the robot has no device of that name; the message lists those it has.
         """
-        fixed = (self.servo_bus, self.can_bus, self.lidar, self.imu, self.camera)
-        optional = (self.estop, self.microphone, self.speaker)
-        paths = {device.device: device.path for device in (*fixed, *optional) if device}
+        parts = self.parts
+        devices = (self.servo_bus, parts.can_bus, parts.lidar, parts.imu, parts.camera)
+        sound = (self.estop, self.microphone, self.speaker)
+        paths = {device.device: device.path for device in (*devices, *sound) if device}
         if name not in paths:
             raise KeyError(f"{self.name} has no device {name!r}; it has {', '.join(paths)}")
         return paths[name] if devices_dir is None else str(devices_dir / name)

@@ -2,7 +2,8 @@
 
 RobotError
 ├── RobotFileError    the robot file, or a file it names, cannot be used: fix every fault it lists
-└── MapInvalid        the map of its home cannot be used, or not be written: mend its files
+├── MapInvalid        the map of its home cannot be used, or not be written: mend its files
+└── PartMissing       the robot file has no such part: it cannot do what needs it
 """
 
 from pathlib import Path
@@ -29,3 +30,7 @@ class RobotFileError(RobotError, ValueError):
 
 class MapInvalid(RobotError):
     """Say what is wrong with a map file."""
+
+
+class PartMissing(RobotError):
+    """Say which part a robot does not have, and so what it cannot do."""

@@ -11,12 +11,15 @@ def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> di
     """Return the link of every device; `devices_dir` replaces the file's own paths (twin mode)."""
     bauds = {
         robot.servo_bus.device: robot.servo_bus.baud,
-        robot.can_bus.device: robot.can_bus.bitrate,
-        robot.lidar.device: sensor_model(SensorKind.LIDAR, robot.lidar.model).baud,
-        robot.imu.device: sensor_model(SensorKind.IMU, robot.imu.model).baud,
-        robot.camera.device: 0,
     }
-    optional = (robot.estop, robot.microphone, robot.speaker)
+    parts = robot.parts
+    if parts.can_bus is not None:
+        bauds[parts.can_bus.device] = parts.can_bus.bitrate
+    if parts.lidar is not None:
+        bauds[parts.lidar.device] = sensor_model(SensorKind.LIDAR, parts.lidar.model).baud
+    if parts.imu is not None:
+        bauds[parts.imu.device] = sensor_model(SensorKind.IMU, parts.imu.model).baud
+    optional = (parts.camera, robot.estop, robot.microphone, robot.speaker)
     bauds.update({device.device: 0 for device in optional if device})
     return {
         name: DeviceLink(path=robot.device_path(name, devices_dir), baud=baud)

@@ -1,10 +1,10 @@
 """Load a robot file: read, judge everything, then build; never half a robot."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from xml.etree import ElementTree
 
 from platforms.profile_source import merged
@@ -22,6 +22,7 @@ from vla_deploy.robots.description import (
     KeepOutZone,
     Place,
     RobotDescription,
+    RobotParts,
     StopGroup,
 )
 from vla_deploy.robots.devices import (
@@ -39,6 +40,8 @@ from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.ros_settings import ROS, RosSettings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
+
+P = TypeVar("P")
 
 ROBOTS_DIR = Path(__file__).parent
 ROBOT_FILE = "robot.toml"
@@ -98,9 +101,11 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     faults = (*override_faults, *calibration_faults, *found)
     if faults:
         raise RobotFileError(file, faults)
-    camera, faults = with_calibration(CameraDescription(**document["camera"]), file.parent)
-    if faults:
-        raise RobotFileError(file, faults)
+    camera = None
+    if "camera" in document:
+        camera, faults = with_calibration(CameraDescription(**document["camera"]), file.parent)
+        if faults:
+            raise RobotFileError(file, faults)
     return _build(document, file.parent, camera)
 
 
@@ -185,17 +190,15 @@ def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableF
         yield from mjcf_faults(document, mjcf)
 
 
-def _build(document: Document, directory: Path, camera: CameraDescription) -> RobotDescription:
+def _build(
+    document: Document, directory: Path, camera: CameraDescription | None
+) -> RobotDescription:
     return RobotDescription(
         name=document["name"],
         mjcf_path=directory / document["mjcf"],
         servo_bus=build(ServoBus, document["servo_bus"]),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
-        can_bus=_can_bus(document["can_bus"], directory),
-        base=BaseGeometry(**document["base"]),
-        lidar=SerialSensor(**document["lidar"]),
-        imu=SerialSensor(**document["imu"]),
-        camera=camera,
+        parts=_parts(document, directory, camera),
         estop=EstopButtonDescription(**document["estop"]) if "estop" in document else None,
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
@@ -207,13 +210,26 @@ def _build(document: Document, directory: Path, camera: CameraDescription) -> Ro
             name: build(StopGroup, {"name": name, **row})
             for name, row in document["groups"].items()
         },
-        hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},
+        hands={name: Hand(name=name, **row) for name, row in document.get("hands", {}).items()},
         poses=subtables(document, "poses"),
-        home=_home(document["home"], directory),
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
         broker=_broker(document.get("mqtt"), directory),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},
+    )
+
+
+def _parts(document: Document, directory: Path, camera: CameraDescription | None) -> RobotParts:
+    def made(key: str, make: Callable[[Document], P]) -> P | None:
+        return make(document[key]) if key in document else None
+
+    return RobotParts(
+        base=made("base", lambda row: BaseGeometry(**row)),
+        can_bus=made("can_bus", lambda row: _can_bus(row, directory)),
+        lidar=made("lidar", lambda row: SerialSensor(**row)),
+        imu=made("imu", lambda row: SerialSensor(**row)),
+        camera=camera,
+        home=made("home", lambda row: _home(row, directory)),
     )
 
 

@@ -30,11 +30,11 @@ ROBOT: Shape = {
     "mjcf": TEXT,
     "servo_bus": TABLE,
     "servo_models": TABLE,
-    "can_bus": TABLE,
-    "base": TABLE,
-    "lidar": TABLE,
-    "imu": TABLE,
-    "camera": TABLE,
+    "can_bus": TABLE.optional,
+    "base": TABLE.optional,
+    "lidar": TABLE.optional,
+    "imu": TABLE.optional,
+    "camera": TABLE.optional,
     "estop": TABLE.optional,
     "microphone": TABLE.optional,
     "speaker": TABLE.optional,
@@ -45,9 +45,9 @@ ROBOT: Shape = {
     "devices": TABLES.optional,
     "limits": TABLE,
     "groups": TABLE,
-    "hands": TABLE,
-    "poses": TABLE,
-    "home": TABLE,
+    "hands": TABLE.optional,
+    "poses": TABLE.optional,
+    "home": TABLE.optional,
     "planning": TABLE.optional,
     "zones": TABLE.optional,
     "workspace": TABLE.optional,
@@ -156,7 +156,13 @@ GROUP: Shape = {
     "stop_category": one_of(0, 1, 2),
     "drop_payload": one_of(False, True).optional,
 }
-HAND: Shape = {"arm": TEXT, "gripper": TEXT, "grip_site": TEXT, "opening_ratio": POSITIVE}
+HAND: Shape = {
+    "arm": TEXT,
+    "gripper": TEXT,
+    "grip_site": TEXT,
+    "opening_ratio": POSITIVE,
+    "opening_offset_m": NUMBER.optional,
+}
 HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}
 PLACE: Shape = {**FLOOR_POSE, "aliases": TEXTS, "viewpoints": TABLES}

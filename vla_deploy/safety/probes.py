@@ -97,7 +97,10 @@ def joint_voltage_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding |
 
 
 def standstill_motion(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
-    """Find what moves under power while the robot has to stand still."""
+    """Find what moves under power while the robot has to stand still.
+
+    A speed that nobody measures any more shows nothing: that it is old is a finding of its own.
+    """
     if not inputs.standstill:
         return None
     for drive in inputs.drives if inputs.base_powered else ():
@@ -109,7 +112,9 @@ def standstill_motion(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | N
                 limit=limits.standstill_wheel_rad_s,
                 age_s=drive.age_s,
             )
-    return _powered_above(np.abs(inputs.velocity), limits.standstill_velocity, inputs, limits)
+    is_old = inputs.sample_age_s > limits.servo_age_s
+    speed_rad_s = np.where(is_old, 0.0, np.abs(inputs.velocity))
+    return _powered_above(speed_rad_s, limits.standstill_velocity, inputs, limits)
 
 
 def wheel_following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:

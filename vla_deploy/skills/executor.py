@@ -23,7 +23,7 @@ from vla_deploy.skills.errors import (
     TryAgain,
 )
 from vla_deploy.skills.records import ActionRecord, has_succeeded
-from vla_deploy.skills.resources import WAIT_LIMIT_S, needs_of
+from vla_deploy.skills.resources import WAIT_LIMIT_S, body_of, needs_of
 from vla_deploy.skills.table import SKILL_FUNCTIONS
 from vla_deploy.skills.world_check import WorldCheck
 
@@ -198,11 +198,15 @@ class PlanExecution:
             self._ask(record)
 
     def _ask(self, record: ActionRecord) -> None:
-        action = record.action
+        action, robot = record.action, self._context.robot
+        needs = needs_of(action, robot)
+        if missing := sorted(needs.keys() - body_of(robot).keys()):
+            self._give_up(record, f"{robot.name} has no {' and no '.join(missing)}")
+            return
         try:
             self._context.claims.ask(
                 self._holder(action),
-                needs_of(action, self._context.robot),
+                needs,
                 priority=-action.priority,  # claims know the greatest as the first
                 timeout_s=WAIT_LIMIT_S,
             )

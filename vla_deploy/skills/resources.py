@@ -10,7 +10,9 @@ from vla_deploy.robots import RobotDescription
 ARMS: Final = "arms"
 ONE_ARM: Final = "arm"
 DEVICE: Final = "device"
-SENSES: Final = ("camera", "speaker")
+CAMERA: Final = "camera"
+SPEAKER: Final = "speaker"
+"""Who has no speaker shows what it would say."""
 # Whoever waits longer than the longest skill takes waits for something that will not end.
 WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
 
@@ -18,7 +20,8 @@ WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
 def body_of(robot: RobotDescription) -> dict[str, int]:
     """Return what one action at a time may use: the robot's groups, its senses, its devices."""
     devices = (f"{DEVICE} {name}" for name in robot.devices)
-    return dict.fromkeys((*robot.groups, *SENSES, *devices), 1)
+    senses = [SPEAKER] if robot.parts.camera is None else [CAMERA, SPEAKER]
+    return dict.fromkeys((*robot.groups, *senses, *devices), 1)
 
 
 def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:

@@ -49,6 +49,25 @@ def optional(process: str) -> Predicate:
     return judge
 
 
+def with_parts(process: str, *parts: str) -> Predicate:
+    """Return a predicate: as `optional`, but only for a robot that has these parts."""
+
+    def judge(context: RunContext) -> str:
+        missing = [part for part in parts if getattr(context.robot.parts, part) is None]
+        if missing:
+            return f"{context.robot.name} has no {' and no '.join(missing)}"
+        return optional(process)(context)
+
+    return judge
+
+
+def with_sound(context: RunContext) -> str:
+    """Run where there is something to hear or to speak with."""
+    if context.robot.microphone is None and context.robot.speaker is None:
+        return f"{context.robot.name} has no microphone and no speaker"
+    return optional("speech")(context)
+
+
 def ros_asked(context: RunContext) -> str:
     """Run where the run, the robot file or the profile asks for ROS 2."""
     if context.ros or context.robot.ros.enabled or context.profile.ros:
@@ -173,7 +192,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="perception",
         command=("-m", "vla_deploy.perception", *_NODE),
         devices_command=_DEVICES,
-        when=optional("perception"),
+        when=with_parts("perception", "camera", "lidar", "imu", "home"),
         ready_topic="scan",
         ready_files=("ready/perception",),
         watched=(Watched(topic="scene", silence_limit_s=10.0, profile_rate="perception_rate_hz"),),
@@ -182,7 +201,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="speech",
         command=("-m", "vla_deploy.speech", *_NODE),
         devices_command=_DEVICES,
-        when=optional("speech"),
+        when=with_sound,
         with_previous=True,
         ready_topic="speech_status",
         ready_files=("ready/speech",),

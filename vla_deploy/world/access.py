@@ -110,9 +110,7 @@ class Body:
     @classmethod
     def of(cls, robot: RobotDescription, is_free: IsFree | None) -> Self:
         """Read a robot file: the widest opening of its hands, and their names."""
-        openings_m = [
-            robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
-        ]
+        openings_m = [robot.widest_m(hand) for hand in robot.hands]
         return cls(
             opening_max_m=max(openings_m, default=0.0), hands=tuple(robot.hands), is_free=is_free
         )

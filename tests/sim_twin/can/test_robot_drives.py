@@ -42,7 +42,11 @@ def robot_with(
         for drive in BUTLER.can_bus.drives
     )
     return replace(
-        BUTLER, can_bus=replace(BUTLER.can_bus, protocol=protocol, drives=drives, **files)
+        BUTLER,
+        parts=replace(
+            BUTLER.parts,
+            can_bus=replace(BUTLER.can_bus, protocol=protocol, drives=drives, **files),
+        ),
     )
 
 

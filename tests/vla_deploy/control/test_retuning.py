@@ -35,7 +35,8 @@ def test_drives_that_are_set_up_for_the_period_need_a_restart():
     drives = tuple(
         replace(drive, mode="cyclic_synchronous_velocity") for drive in ROBOT.can_bus.drives
     )
-    robot = replace(ROBOT, can_bus=replace(ROBOT.can_bus, drives=drives))
+    can_bus = replace(ROBOT.can_bus, drives=drives)
+    robot = replace(ROBOT, parts=replace(ROBOT.parts, can_bus=can_bus))
     with pytest.raises(NeedsRestart, match="drives in cyclic_synchronous_velocity"):
         retuned(robot, DESKTOP, replace(DESKTOP, control_rate_hz=200))
     assert retuned(robot, DESKTOP, replace(DESKTOP, executor_rate_hz=20)).period_s == 0.004

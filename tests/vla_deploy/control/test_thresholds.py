@@ -44,7 +44,8 @@ def test_what_a_robot_file_does_not_declare_is_not_judged() -> None:
 def test_senses_are_missed_only_where_something_is_judged_by_them() -> None:
     assert (LIMITS.depth_age_s, LIMITS.pose_age_s, LIMITS.imu_age_s) == (1.0, 0.5, 0.5)
     home = replace(ROBOT.home, zones=())
-    bare = safety_limits(replace(ROBOT, protection=NOTHING_DECLARED, home=home))
+    parts = replace(ROBOT.parts, home=home)
+    bare = safety_limits(replace(ROBOT, protection=NOTHING_DECLARED, parts=parts))
     assert {bare.depth_age_s, bare.pose_age_s, bare.imu_age_s} == {np.inf}
 
 

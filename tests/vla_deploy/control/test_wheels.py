@@ -15,9 +15,15 @@ from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive.axis import ODriveAxis
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.devices import Drive
 
 TICK_NS = 4_000_000
 DRIVES: dict[str, Callable[..., EmulatedDrive]] = {"cia402": WheelDrive, "odrive": ODriveAxis}
+
+
+def with_drives(robot: RobotDescription, drives: tuple[Drive, ...]) -> RobotDescription:
+    can_bus = replace(robot.can_bus, drives=drives)
+    return replace(robot, parts=replace(robot.parts, can_bus=can_bus))
 
 
 class Bench:
@@ -31,7 +37,7 @@ class Bench:
         self.missing = False
         butler = load_robot("butler")
         wiring = replace(butler.can_bus, protocol=protocol, endpoints_path=EMULATED_ENDPOINTS)
-        self.robot: RobotDescription = replace(butler, can_bus=wiring)
+        self.robot: RobotDescription = replace(butler, parts=replace(butler.parts, can_bus=wiring))
         self.wheels = Wheels(self.robot, load_profile("desktop"), self, self.world)  # type: ignore[arg-type]
 
     def can(self, name: str) -> can.BusABC:
@@ -127,7 +133,7 @@ def test_the_drives_mode_and_gear_come_from_the_robot_file() -> None:
         replace(drive, mode="cyclic_synchronous_velocity", gear_ratio=3.0)
         for drive in bench.robot.can_bus.drives
     ]
-    robot = replace(bench.robot, can_bus=replace(bench.robot.can_bus, drives=tuple(drives)))
+    robot = with_drives(bench.robot, tuple(drives))
     wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     wheels.open()
     first = bench.world.wheels[0].drive
@@ -144,7 +150,7 @@ def test_the_drives_mode_and_gear_come_from_the_robot_file() -> None:
 def test_other_motor_counts_than_declared_are_refused() -> None:
     bench = Bench("cia402")
     drives = tuple(replace(drive, counts_per_rev=4096) for drive in bench.robot.can_bus.drives)
-    robot = replace(bench.robot, can_bus=replace(bench.robot.can_bus, drives=drives))
+    robot = with_drives(bench.robot, drives)
     wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     with pytest.raises(WrongDevice, match="encoder increments"):
         wheels.open()

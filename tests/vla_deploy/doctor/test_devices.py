@@ -166,7 +166,9 @@ def test_a_measured_camera_is_told_with_date_and_error(computer) -> None:
         made_at="2026-11-22",
     )
     camera = replace(robot.camera, lens=lens, mounting=mounting)
-    context = replace(computer.context(), robot=replace(robot, camera=camera))
+    context = replace(
+        computer.context(), robot=replace(robot, parts=replace(robot.parts, camera=camera))
+    )
     first, second = camera_calibration(context)
     assert (first.level, second.level) == (FindingLevel.OK, FindingLevel.OK)
     assert "2026-11-22" in first.measured

@@ -125,7 +125,8 @@ def test_the_can_link_has_the_robots_bitrate() -> None:
 
 @pytest.mark.parametrize("path", ["slcan:/dev/serial/by-id/usb-x-if00", "/run/can-hub"])
 def test_a_bus_that_is_no_network_interface_needs_no_link(path: str) -> None:
-    files = texts(can_bus=replace(ROBOT.can_bus, path=path))
+    can_bus = replace(ROBOT.can_bus, path=path)
+    files = texts(parts=replace(ROBOT.parts, can_bus=can_bus))
     assert "vla-deploy-can.service" not in files
 
 

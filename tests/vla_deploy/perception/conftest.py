@@ -179,7 +179,9 @@ class Rig:
             yaw_rad=believed.yaw_rad,
         )
         places = {**home.places, home.start: replace(home.places[home.start], pose=start)}
-        robot = replace(flat.robot, home=replace(home, places=places))
+        robot = replace(
+            flat.robot, parts=replace(flat.robot.parts, home=replace(home, places=places))
+        )
         self.profile = load_profile("desktop") if profile is None else profile
         self.node = PerceptionNode(context, robot, self.profile, self)
         self.node.start()

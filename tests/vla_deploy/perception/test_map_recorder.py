@@ -38,7 +38,8 @@ def with_lens(camera: Intrinsics) -> RobotDescription:
         made_at="2026-07-01",
         tool="a checkerboard",
     )
-    return replace(ROBOT, camera=replace(ROBOT.camera, lens=lens))
+    camera = replace(ROBOT.camera, lens=lens)
+    return replace(ROBOT, parts=replace(ROBOT.parts, camera=camera))
 
 
 def sight_of_a_cabinet(camera: Intrinsics, base_from_camera: Floats) -> NDArray[np.uint16]:

@@ -27,7 +27,7 @@ def small_robot(
     )
     given = {
         "servo_bus": replace(butler.servo_bus, servos=servos),
-        "can_bus": replace(butler.can_bus, drives=()),
+        "parts": replace(butler.parts, can_bus=replace(butler.can_bus, drives=())),
         "limits": dict.fromkeys(joints, butler.limits["left_elbow"]),
         "hands": {},
     }

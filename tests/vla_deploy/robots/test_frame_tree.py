@@ -153,7 +153,9 @@ def test_a_follower_may_move_otherwise_than_its_leader(
 
 
 def test_two_sensors_may_sit_on_one_site(robot: RobotDescription) -> None:
-    shared = replace(robot, imu=replace(robot.imu, site=robot.lidar.site))
+    shared = replace(
+        robot, parts=replace(robot.parts, imu=replace(robot.imu, site=robot.lidar.site))
+    )
     fixed = {one.child: one for one in FrameTree.of(shared).fixed}
     assert fixed["imu_link"].xyz == fixed["lidar_link"].xyz == (0.0, 0.0, 0.19)
 

@@ -180,7 +180,9 @@ def test_the_camera_is_where_calibration_has_found_it(robot: RobotDescription) -
         residual_m=0.001,
         made_at="",
     )
-    calibrated = replace(robot, camera=replace(camera, mounting=mounting))
+    calibrated = replace(
+        robot, parts=replace(robot.parts, camera=replace(camera, mounting=mounting))
+    )
     model, stack = pinocchio.buildModelFromXML(urdf_of(calibrated)), RobotModel(calibrated)
     data = model.createData()
     values = np.random.default_rng(5).uniform(robot.position_min, robot.position_max)

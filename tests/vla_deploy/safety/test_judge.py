@@ -803,6 +803,13 @@ def test_a_loose_joint_may_move_during_standstill() -> None:
     assert ticks(SafetyState(), 100, **standing(**loose))[1] is CLEAR
 
 
+def test_a_speed_that_nobody_measures_any_more_is_no_motion_at_standstill() -> None:
+    fast = standing(velocity=np.array([9.0, 0.0]))
+    assert ticks(SafetyState(), 100, **fast)[1].cause is Cause.STANDSTILL_MOTION
+    old = {**fast, "sample_age_s": np.array([5.0, 5.0])}
+    assert ticks(SafetyState(), 100, **old)[1].cause is not Cause.STANDSTILL_MOTION
+
+
 @pytest.mark.parametrize("cause", [Cause.JOINT_POSITION_LIMIT, Cause.JOINT_VELOCITY_LIMIT])
 def test_a_joint_without_torque_has_no_limits(cause: Cause) -> None:
     _, verdict = ticks(SafetyState(), 60, **SPOILERS[cause], **LOOSE)

@@ -6,9 +6,9 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.control.motion.axes import Floats, any_of
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.joint_steps import JointSteps
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.ipc import CellReader, Sample, SharedSpace, topics
 from vla_deploy.ipc.payloads.supervision import BudgetStop
 from vla_deploy.safety import SafetyInputs, Surroundings
@@ -22,7 +22,9 @@ _NO_REASON = "a budget is exhausted"
 class InputCollector:
     """Read the cells that control depends on, and put a tick's measurements together."""
 
-    def __init__(self, space: SharedSpace, servos: ServoLine, wheels: Wheels, clock: Clock) -> None:
+    def __init__(
+        self, space: SharedSpace, servos: ServoLine, wheels: BaseDrive, clock: Clock
+    ) -> None:
         self.v_m_s = 0.0
         self.w_rad_s = 0.0
         self._base_commands = tuple(map(space.cell_reader, BASE_COMMANDS))
@@ -40,6 +42,8 @@ class InputCollector:
     def refresh(self) -> None:
         """Take in the newest base command and what the joints have told."""
         self._steps.take(self._servos.state)
+        if not self._wheels.has_wheels:
+            return
         sample = self._newest_base_command()
         if sample is None:
             return

@@ -41,7 +41,12 @@ class Nearby:
         self._reader: CellReader = space.cell_reader(topic)
         self._deadline_s = BY_NAME[topic].deadline_s
         self._body = body
-        self._lidar = model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
+        lidar = robot.parts.lidar
+        self._lidar = (
+            np.zeros(3)
+            if lidar is None
+            else model.site_pose(lidar.site, full_positions(robot))[:3, 3]
+        )
         self._sequence = 0
         self._points = _NO_POINTS
         self.age_s: float | None = None

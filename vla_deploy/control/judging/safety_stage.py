@@ -8,8 +8,8 @@ from vla_deploy.control.judging.surroundings import SurroundingsWatch
 from vla_deploy.control.judging.thresholds import safety_limits
 from vla_deploy.control.judging.tick_recorder import TickRecorder
 from vla_deploy.control.motion.axes import Flags, Floats, all_of
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import CLEAR, SafetyState, Verdict, evaluate
@@ -24,7 +24,7 @@ class Judging:
         space: SharedSpace,
         robot: RobotDescription,
         servos: ServoLine,
-        wheels: Wheels,
+        wheels: BaseDrive,
         clock: Clock,
     ) -> None:
         self.limits = safety_limits(robot)

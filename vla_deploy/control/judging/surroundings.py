@@ -60,22 +60,28 @@ class SurroundingsWatch:
         self._body = BodyShapes(robot)
         model = RobotModel(robot)
         self._contact = ContactTorque(robot, model)
-        self._footprint = Footprint(corners_m=((0.0, 0.0),), radius_m=robot.base.footprint_radius_m)
+        base, home = robot.parts.base, robot.parts.home
+        self._deceleration_m_s2 = base.max_acceleration_m_s2 if base else 0.0
+        radius_m = base.footprint_radius_m if base else 0.0
+        self._footprint = Footprint(corners_m=((0.0, 0.0),), radius_m=radius_m)
         self._zones = ZoneWatch(space, robot, model, self._body, self._footprint)
         self._clearance = ClearanceWatch(robot, self._body)
         self._pose = space.cell_reader(topics.POSE)
         self._imu = space.cell_reader(topics.IMU)
         self._acceleration: Floats | None = None
         self._areas = {
-            area.name: np.array(area.polygon_m, dtype=np.float64) for area in robot.home.zones
+            area.name: np.array(area.polygon_m, dtype=np.float64)
+            for area in (home.zones if home else ())
         }
         self._middles = {name: _around(area) for name, area in self._areas.items()}
         self._parts = [_Part(work, NS_PER_S // rate_hz) for work, rate_hz in self._declared_rates()]
 
     def _declared_rates(self) -> tuple[tuple[Callable[[_Body], None], int], ...]:
+        arms = ((self._look_at_contact, 50), (self._look_ahead, 50))
+        if self._robot.parts.base is None:
+            return arms
         return (
-            (self._look_at_contact, 50),
-            (self._look_ahead, 50),
+            *arms,
             (self._look_at_zones, 25),
             (self._look_at_keep_out, 10),
             (self._look_at_balance, 10),
@@ -103,8 +109,9 @@ class SurroundingsWatch:
         part = min(self._parts, key=lambda one: one.due_ns)
         if now_ns >= part.due_ns and _is_known(position) and _is_known(velocity):
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
-            deceleration = self._robot.base.max_acceleration_m_s2
-            motion = BaseMotion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
+            motion = BaseMotion(
+                v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=self._deceleration_m_s2
+            )
             part.work(_Body(now_ns, position, velocity, setpoint, motion))
         return self._known
 

@@ -40,7 +40,7 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
     margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
     facts = [family_of(servo.model).facts(servo.model) for servo in robot.servo_bus.servos]
     lowest_v, highest_v = np.array([each.voltage_limits_v for each in facts]).T
-    tip_over = robot.protection.tip_over
+    tip_over, base, home = robot.protection.tip_over, robot.parts.base, robot.parts.home
     return SafetyLimits(
         joint_names=robot.joint_names,
         position_lower=robot.position_min - margin,
@@ -51,9 +51,9 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
             [_POSITION_JUMP_RAD * servo.travel_per_rad for servo in robot.servo_bus.servos]
         ),
         following_error=_following_error(robot),
-        wheel_error_rad_s=_WHEEL_ERROR_OF_TOP
-        * robot.base.max_speed_m_s
-        / robot.base.wheel_radius_m,
+        wheel_error_rad_s=_WHEEL_ERROR_OF_TOP * base.max_speed_m_s / base.wheel_radius_m
+        if base
+        else np.inf,
         wheel_error_ratio=_WHEEL_ERROR_OF_COMMAND,
         servo_age_s=BY_NAME["joint_state"].deadline_s,
         base_command_age_s=BY_NAME["base_command"].deadline_s,
@@ -64,11 +64,11 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         voltage_min_v=lowest_v + _VOLTAGE_MARGIN_V,
         voltage_max_v=highest_v - _VOLTAGE_MARGIN_V,
         standstill_velocity=_STANDSTILL_SHARE * robot.velocity_max,
-        standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / robot.base.wheel_radius_m,
-        scan_required=True,
+        standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / base.wheel_radius_m if base else np.inf,
+        scan_required=base is not None,
         scan_age_s=BY_NAME["scan"].deadline_s,
         depth_age_s=BY_NAME["near_obstacles"].deadline_s if _looks_by_depth(robot) else np.inf,
-        pose_age_s=POSE_AGE_S if robot.home.zones else np.inf,
+        pose_age_s=POSE_AGE_S if home and home.zones else np.inf,
         imu_age_s=IMU_AGE_S if tip_over else np.inf,
         keep_out_depth_m=0.0,
         workspace_excess_m=0.0,

@@ -45,7 +45,7 @@ class ZoneWatch:
         self._nearby = {source: Nearby(source, space, robot, model, body) for source in ZoneSource}
         self._triggers: dict[str, ZoneMemory] = {}
         self._stands = False
-        self._radius_m = robot.base.footprint_radius_m
+        self._radius_m = footprint.radius_m
         self._reach_m = reaches_m(robot)
 
     @property
@@ -113,7 +113,9 @@ class ZoneWatch:
 
 def reaches_m(robot: RobotDescription) -> dict[str, float]:
     """Return how far from the base's centre a point can matter to each zone."""
-    base = robot.base
+    base = robot.parts.base
+    if base is None:
+        return {}
     top = BaseMotion(
         v_m_s=_FASTEST_RATIO * base.max_speed_m_s,
         w_rad_s=0.0,

@@ -3,8 +3,8 @@
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.safety import ResetOutcome
 
 RESET_NS: Final = 2 * NS_PER_S
@@ -18,7 +18,7 @@ class Resetting:
     much as its weight needs.
     """
 
-    def __init__(self, servos: ServoLine, wheels: Wheels) -> None:
+    def __init__(self, servos: ServoLine, wheels: BaseDrive) -> None:
         self._servos = servos
         self._wheels = wheels
         self._until_ns: int | None = None

@@ -62,6 +62,7 @@ def _set_up_anew(robot: RobotDescription, before: Profile, after: Profile) -> It
             yield f"{key}: {old:g} s -> {new:g} s is set up in the {device} at standstill only"
     if before.memory_lock != after.memory_lock:
         yield "memory_lock: to lock what is in use takes longer than a tick"
-    in_step = any(drive.mode == _RAMPED_BY_CYCLE for drive in robot.can_bus.drives)
+    drives = robot.parts.can_bus.drives if robot.parts.can_bus else ()
+    in_step = any(drive.mode == _RAMPED_BY_CYCLE for drive in drives)
     if in_step and before.control_rate_hz != after.control_rate_hz:
         yield f"control_rate_hz: drives in {_RAMPED_BY_CYCLE} are set up for the period"

@@ -3,11 +3,11 @@
 from vla_deploy.control.modes.stop_plan import StopPlan
 from vla_deploy.control.motion.axes import Axes
 from vla_deploy.control.motion.motions import MotionResult
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.base_output import BaseOutput
 from vla_deploy.control.output.joint_output import JointOutput
 from vla_deploy.control.output.payload import Payload
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import StopCategory
 from vla_deploy.safety import Reaction, Verdict
@@ -24,7 +24,7 @@ class Stopping:
         self,
         robot: RobotDescription,
         servos: ServoLine,
-        wheels: Wheels,
+        wheels: BaseDrive,
         joints: JointOutput,
         base: BaseOutput,
         payload: Payload,

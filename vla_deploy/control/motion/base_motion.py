@@ -19,8 +19,16 @@ class BaseLimits:
 
 
 def base_limits(robot: RobotDescription) -> BaseLimits:
-    """Return what the robot file allows the base."""
-    base = robot.base
+    """Return what the robot file allows the base; none may move where there is none."""
+    base = robot.parts.base
+    if base is None:
+        return BaseLimits(
+            speed_m_s=0.0,
+            turn_rad_s=0.0,
+            acceleration_m_s2=0.0,
+            turn_acceleration_rad_s2=0.0,
+            stop_deceleration_m_s2=0.0,
+        )
     return BaseLimits(
         speed_m_s=base.max_speed_m_s,
         turn_rad_s=base.max_turn_rad_s,

@@ -1,8 +1,8 @@
 """Bring power on in small steps, one servo a tick, so that the bus cycle never waits for it."""
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 
 CLEAR_NS = NS_PER_S // 2
 ENABLE_NS = NS_PER_S
@@ -15,7 +15,7 @@ class Arming:
     an armed watchdog, are left alone.
     """
 
-    def __init__(self, servos: ServoLine, wheels: Wheels, clock: Clock) -> None:
+    def __init__(self, servos: ServoLine, wheels: BaseDrive, clock: Clock) -> None:
         self.failure = ""
         self._servos = servos
         self._wheels = wheels
@@ -57,6 +57,8 @@ class Arming:
         return None
 
     def _power_wheels(self) -> bool | None:
+        if not self._wheels.has_wheels:
+            return True
         if not self._driving:
             self._driving = True
             self._deadline_ns = self._clock.now_ns() + ENABLE_NS

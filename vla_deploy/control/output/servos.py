@@ -67,7 +67,7 @@ class ServoLine:
         self._ids = [spec.id for spec in self._specs]
         self._bus: ServoBusDriver | None = None
         self._has_watchdog = True
-        self._next_open_ns = 0
+        self._next_open_ns = self._aged_ns = 0
         self.state = BusState.of(len(self._specs))
 
     def open(self, *, thorough: bool = True) -> None:
@@ -150,6 +150,7 @@ class ServoLine:
     def read(self) -> None:
         """Refresh `state`; values grow old while the line is lost."""
         if self._bus is None or self.lost:
+            self._age()
             return
         try:
             self._bus.read_state()
@@ -221,9 +222,15 @@ class ServoLine:
             return False
         return True
 
+    def _age(self) -> None:
+        now_ns = self._clock.now_ns()
+        self.state.age_s += (now_ns - self._aged_ns) / NS_PER_S
+        self._aged_ns = now_ns
+
     def _note_loss(self, error: LinkLost) -> None:
         self.failure = str(error)
         self.lost = True
+        self._aged_ns = self._clock.now_ns()
         self.close()
 
 

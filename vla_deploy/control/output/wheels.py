@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Generator
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +27,8 @@ _LOG = logging.getLogger(__name__)
 
 class Wheels:
     """Own the bus of both drives, left before right; a lost link is remembered after `open`."""
+
+    has_wheels: Final = True
 
     def __init__(
         self, robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock

@@ -7,8 +7,8 @@ from vla_deploy.control.modes.modes import Modes
 from vla_deploy.control.modes.operator_acts import OperatorInbox
 from vla_deploy.control.modes.state_machine import status_name
 from vla_deploy.control.motion.motions import MotionSet
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.control.reporting.status_document import (
     bus_document,
     detail,
@@ -31,7 +31,7 @@ class Status:
         inbox: OperatorInbox,
         motions: MotionSet,
         servos: ServoLine,
-        wheels: Wheels,
+        wheels: BaseDrive,
     ) -> None:
         self._ticks = ticks
         self._modes = modes

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from drivers.servo.state import BusState
 from vla_deploy.control.motion.axes import Floats
 from vla_deploy.control.motion.motions import MotionResult
-from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.reporting.tick_periods import TickPeriods
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.payloads.motion import ControlStatus
@@ -39,7 +39,7 @@ class Telemetry:
         columns["torque_enabled"][:] = state.torque_on
         self._joints.commit()
 
-    def tell_base(self, wheels: Wheels) -> None:
+    def tell_base(self, wheels: BaseDrive) -> None:
         """Publish base_state."""
         odometry, record = wheels.odometry, self._base.record
         record["x_m"] = odometry.x_m

@@ -108,7 +108,7 @@ class Hands:
     def __init__(self, robot: RobotDescription) -> None:
         index = robot.joint_index
         self._grippers = {
-            name: (index[hand.gripper], hand.opening_ratio) for name, hand in robot.hands.items()
+            name: (index[robot.gripper_joint(name)], hand) for name, hand in robot.hands.items()
         }
         self._touches = {name: Touch() for name in robot.hands}
         self._stamp_ns = 0
@@ -118,12 +118,12 @@ class Hands:
         if sample.stamp_ns <= self._stamp_ns:
             return
         self._stamp_ns, data = sample.stamp_ns, sample.data
-        for name, (joint, ratio) in self._grippers.items():
+        for name, (joint, hand) in self._grippers.items():
             fingers = FingerSample(
                 stamp_ns=sample.stamp_ns,
-                opening_m=ratio * float(data["position"][joint]),
-                goal_m=ratio * float(data["setpoint"][joint]),
-                speed_m_s=ratio * float(data["velocity"][joint]),
+                opening_m=hand.opening_m(float(data["position"][joint])),
+                goal_m=hand.opening_m(float(data["setpoint"][joint])),
+                speed_m_s=hand.opening_ratio * float(data["velocity"][joint]),
                 closing_ratio=-float(data["effort_ratio"][joint]),
                 is_powered=bool(data["torque_enabled"][joint]),
             )

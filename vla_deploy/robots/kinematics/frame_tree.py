@@ -158,7 +158,7 @@ def joints_of(robot: RobotDescription, document: MjcfDocument) -> tuple[FrameJoi
 
 
 def _wheels(robot: RobotDescription) -> tuple[str, ...]:
-    return tuple(drive.joint for drive in robot.can_bus.drives)
+    return tuple(drive.joint for drive in robot.parts.can_bus.drives) if robot.parts.can_bus else ()
 
 
 def _refuse(document: MjcfDocument, faults: Iterable[TableFault]) -> None:
@@ -293,11 +293,15 @@ def _device_frames(robot: RobotDescription, tree: KinematicTree) -> Iterator[Fra
     """Yield the frames of sensors and grips; the camera's is where its calibration puts it."""
     sites = {site.name: site for site in tree.sites}
     grips = dict.fromkeys(hand.grip_site for hand in robot.hands.values())
-    sensors = ((robot.lidar.site, LIDAR_FRAME), (robot.imu.site, IMU_FRAME))
+    parts = robot.parts
+    found = ((parts.lidar, LIDAR_FRAME), (parts.imu, IMU_FRAME))
+    sensors = [(sensor.site, frame) for sensor, frame in found if sensor is not None]
     for name, frame in (*sensors, *((grip, grip) for grip in grips)):
         site = sites[name]
         yield _fixed(site.link, frame, np.array(site.position_m), np.array(site.quaternion))
-    site, moved = sites[robot.camera.site], robot.camera.site_from_camera
+    if parts.camera is None:
+        return
+    site, moved = sites[parts.camera.site], parts.camera.site_from_camera
     stand = np.array(site.quaternion)
     place = np.array(site.position_m) + matrix(stand) @ moved[:3, 3]
     optical_to_body = np.array(BODY_TO_OPTICAL) * (-1.0, -1.0, -1.0, 1.0)

@@ -9,8 +9,9 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
+from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.description import RobotDescription
-from vla_deploy.robots.errors import RobotFileError
+from vla_deploy.robots.errors import PartMissing, RobotFileError
 from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 from vla_deploy.runtime.table_schema import TableFault
 
@@ -37,8 +38,7 @@ class RobotModel:
         self._frames: dict[str, int] = {}
         self.joint_names = robot.joint_names
         self.total_mass_kg = float(pinocchio.computeTotalMass(whole))
-        self._camera_site = robot.camera.site
-        self._site_from_camera = robot.camera.site_from_camera
+        self._camera = robot.parts.camera
         self._coupling = self._couple(mimics)
 
     def gravity(self, positions: Array) -> Array:
@@ -96,14 +96,22 @@ class RobotModel:
         """Return the camera's optical frame (x right, y down, z forward) in the base frame.
 
         It is where the calibration of its mounting puts it, else its site.
+
+        Raises:
+            PartMissing: the robot has none.
         """
-        pose: Array = self.site_pose(self._camera_site, positions) @ self._site_from_camera
+        camera = self._fitted_camera()
+        pose: Array = self.site_pose(camera.site, positions) @ camera.site_from_camera
         return pose
 
     @property
     def camera_joint(self) -> str:
-        """Return the joint that carries the camera."""
-        frame = self._model.frames[self._frame(self._camera_site)]
+        """Return the joint that carries the camera.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        frame = self._model.frames[self._frame(self._fitted_camera().site)]
         return str(self._model.names[frame.parentJoint])
 
     def shapes(
@@ -116,6 +124,11 @@ class RobotModel:
         for shape in pinocchio.buildGeomFromMJCF(self._model, self._path, kind).geometryObjects:
             joint = shape.parentJoint
             yield (str(self._model.names[joint]) if joint else None), shape
+
+    def _fitted_camera(self) -> CameraDescription:
+        if self._camera is None:
+            raise PartMissing("the robot has no camera: [camera] is not in its file")
+        return self._camera
 
     def _frame(self, site: str) -> int:
         frame = self._frames.get(site)

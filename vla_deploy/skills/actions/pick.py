@@ -170,8 +170,7 @@ def _choose(
     reasons: list[str] = []
     nearer_first = sorted(hands, key=lambda name: (name == "left") != (centre[1] >= 0.0))
     for hand in nearer_first:
-        described = context.robot.hands[hand]
-        widest_m = context.robot.limits[described.gripper].max * described.opening_ratio
+        widest_m = context.robot.widest_m(hand)
         size_m = tuple(float(side) for side in seen["size_m"])
         try:
             grasps = grasps_from_above(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import NS_PER_S
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
@@ -20,6 +21,9 @@ GENTLE_EFFORT = 0.25
 HELD_OPENING_M = 0.004
 HELD_EFFORT_SHARE = 0.4
 CLOSE_TIME_S = 0.4
+STANDING_RATIO = 0.03
+"""Of a joint's largest speed."""
+STAND_WITHIN_S = 3.0
 # Of the contact limits. On its way down, a free arm of the twin feels 0.14 of them at most.
 TOUCH_RATIO = 0.25
 FEELING_SPEED_RATIO = 0.15
@@ -43,14 +47,13 @@ class FingerTouch:
 
 def opening_of(context: SkillContext, hand: str) -> float:
     """Return the distance between a hand's fingers in metres."""
-    described = context.robot.hands[hand]
-    index = context.robot.joint_index[described.gripper]
-    return float(context.link.positions[index]) * described.opening_ratio
+    index = context.robot.joint_index[context.robot.gripper_joint(hand)]
+    return context.robot.hands[hand].opening_m(float(context.link.positions[index]))
 
 
 def feel(context: SkillContext, hand: str, goal_opening_m: float) -> FingerTouch:
     """Return what a hand's fingers feel now."""
-    index = context.robot.joint_index[context.robot.hands[hand].gripper]
+    index = context.robot.joint_index[context.robot.gripper_joint(hand)]
     opening_m = opening_of(context, hand)
     return FingerTouch(
         opening_m=opening_m,
@@ -63,19 +66,27 @@ def set_opening(
     context: SkillContext, hand: str, opening_m: float, effort_ratio: float = FULL_EFFORT
 ) -> Skill:
     """Send a hand's fingers to an opening with a bounded effort."""
-    described = context.robot.hands[hand]
-    limits = context.robot.limits[described.gripper]
-    position = min(max(opening_m / described.opening_ratio, limits.min), limits.max)
-    targets = {described.gripper: position}
-    yield from move_joints(context, targets, effort_ratio={described.gripper: effort_ratio})
+    joint = context.robot.gripper_joint(hand)
+    limits, wanted = context.robot.limits[joint], context.robot.hands[hand].position_at(opening_m)
+    targets = {joint: min(max(wanted, limits.min), limits.max)}
+    yield from move_joints(context, targets, effort_ratio={joint: effort_ratio})
     yield from pause(context, CLOSE_TIME_S)
+    yield from _stand(context, joint)
+
+
+def _stand(context: SkillContext, joint: str) -> Skill:
+    """Wait until a joint stands: fingers of little effort trail far behind their setpoint."""
+    index = context.robot.joint_index[joint]
+    still = STANDING_RATIO * context.robot.limits[joint].velocity
+    end_ns = context.link.working_ns() + round(STAND_WITHIN_S * NS_PER_S)
+    while context.link.working_ns() < end_ns and abs(context.link.velocities[index]) > still:
+        yield
 
 
 def open_gripper(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """Open one hand, or both; what was held is let go."""
     for hand in _hands(context, parameters):
-        limits = context.robot.limits[context.robot.hands[hand].gripper]
-        yield from set_opening(context, hand, limits.max * context.robot.hands[hand].opening_ratio)
+        yield from set_opening(context, hand, context.robot.widest_m(hand))
         context.hands[hand] = None
 
 
@@ -214,5 +225,5 @@ def _hands(context: SkillContext, parameters: Mapping[str, Any]) -> list[str]:
 
 
 def _smallest(context: SkillContext, hand: str) -> float:
-    described = context.robot.hands[hand]
-    return context.robot.limits[described.gripper].min * described.opening_ratio
+    robot = context.robot
+    return robot.hands[hand].opening_m(robot.limits[robot.gripper_joint(hand)].min)

@@ -20,6 +20,8 @@ from vla_deploy.navigation.follower import (
     scan_points,
 )
 from vla_deploy.navigation.localising.place_judge import MATCH_RATIO
+from vla_deploy.robots.description import BaseGeometry
+from vla_deploy.robots.errors import PartMissing
 from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.actions.beyond import navigation_request, pursue, server_drives
 from vla_deploy.skills.context import Skill, SkillContext
@@ -36,9 +38,21 @@ LOOK_AHEAD_M = 0.06
 ARRIVED_M, ARRIVED_RAD = 0.3, 0.5
 
 
+def base_of(context: SkillContext) -> BaseGeometry:
+    """Return the robot's base.
+
+    Raises:
+        NotPossible: it has none.
+    """
+    try:
+        return context.robot.base
+    except PartMissing as error:
+        raise NotPossible(str(error)) from error
+
+
 def limits_of(context: SkillContext, speed_m_s: float | None = None) -> DriveLimits:
     """Return the speeds at which this robot cruises, no faster than asked."""
-    base = context.robot.base
+    base = base_of(context)
     cruise_m_s = CRUISE_RATIO * base.max_speed_m_s
     return DriveLimits(
         speed_m_s=cruise_m_s if speed_m_s is None else min(cruise_m_s, speed_m_s),
@@ -64,6 +78,7 @@ def drive_to(
         TryAgain: the robot is lost, or something blocks the way for too long.
         SkillFailed: Nav2 rejected the pose or gave it up, or nobody knows how it ended.
     """
+    base_of(context)
     yield from find_myself(context)
     pose = context.link.pose
     if goal == pose:  # which may be tighter by millimetres than where it would be sent

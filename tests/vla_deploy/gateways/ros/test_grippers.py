@@ -8,10 +8,12 @@ import numpy as np
 from control_msgs.action import GripperCommand
 from vla_deploy.client.motions import Ended, JointView
 from vla_deploy.gateways.ros.inward.grippers import GripperAction, GripperJoint, Gripping
+from vla_deploy.robots.description import Hand as Described
 
 class Hand:
     kind = GripperCommand
-    fingers = GripperJoint(group="g", joint="j", gap_ratio=1.0, most_n=10.0, gap_m=(0.0, 0.1))
+    described = Described(name="h", arm="a", gripper="g", grip_site="s", opening_ratio=1.0)
+    fingers = GripperJoint(group="g", joint="j", hand=described, most_n=10.0, gap_m=(0.0, 0.1))
     result, feedback = GripperAction.result, GripperAction.feedback
     _fields, _ends = GripperAction._fields, GripperAction._ends
 

@@ -23,6 +23,7 @@ from vla_deploy.gateways.ros.inward.action_server import (
 )
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import Hand
 
 FEEDBACK_HZ: Final = 10.0
 REACHED_M: Final = 0.002
@@ -35,11 +36,11 @@ _NO_CODE: Final = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperJoint:
-    """Describe a hand's fingers: their joint, the gap per joint value, the force of full effort."""
+    """Describe a hand's fingers: their joint, how it makes a gap, the force of full effort."""
 
     group: str
     joint: str
-    gap_ratio: float
+    hand: Hand
     most_n: float
     gap_m: tuple[float, float]
 
@@ -47,14 +48,14 @@ class GripperJoint:
     def of(cls, robot: RobotDescription, hand: str) -> "GripperJoint":
         """Return what the robot file says of a hand."""
         described = robot.hands[hand]
-        joint = robot.group(described.gripper).joints[0]
-        limits, ratio = robot.limits[joint], described.opening_ratio
+        joint = robot.gripper_joint(hand)
+        limits = robot.limits[joint]
         return cls(
             group=described.gripper,
             joint=joint,
-            gap_ratio=ratio,
+            hand=described,
             most_n=robot.stall_effort(joint),
-            gap_m=(limits.min * ratio, limits.max * ratio),
+            gap_m=(described.opening_m(limits.min), described.opening_m(limits.max)),
         )
 
 
@@ -113,7 +114,7 @@ class GripperAction:
         fingers = self.fingers
         ratio = min(force_n / fingers.most_n, 1.0) if force_n else 1.0
         motion_id = self.motions.go(
-            {fingers.joint: gap_m / fingers.gap_ratio}, {fingers.joint: ratio}
+            {fingers.joint: fingers.hand.position_at(gap_m)}, {fingers.joint: ratio}
         )
         return Gripping(self, feedback, motion_id, gap_m, self._gateway.link.clock.now_ns())
 
@@ -218,8 +219,8 @@ class Gripping:
 
     def _state(self, view: JointView, now_ns: int) -> GripperState:
         fingers = self._fingers
-        gap_m = float(view.position[0]) * fingers.gap_ratio
-        speed_m_s = float(view.velocity[0]) * fingers.gap_ratio
+        gap_m = fingers.hand.opening_m(float(view.position[0]))
+        speed_m_s = float(view.velocity[0]) * fingers.hand.opening_ratio
         if abs(speed_m_s) > STILL_M_S:
             self._still_since_ns = None
         elif self._still_since_ns is None:

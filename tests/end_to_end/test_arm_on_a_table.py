@@ -1,0 +1,131 @@
+"""An SO-101 is a robot: six servos on one bus, on a table, moved by joints and by words."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from platforms import load_profile
+from sim_twin.faults.request import FaultRefused
+from sim_twin.harness.lockstep_stack import LockstepControl
+from vla_deploy.ipc import topics
+from vla_deploy.planning.node import PlannerNode
+from vla_deploy.skills.node import ExecutorNode
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Iterator[LockstepControl]:
+    made = LockstepControl(tmp_path, robot="so101", world="table")
+    made.arm()
+    yield made
+    made.close()
+
+
+def positions(arm: LockstepControl) -> dict[str, float]:
+    return {name: one["position"] for name, one in arm.lockstep.truth()["joints"].items()}
+
+
+def test_it_leaves_its_rest_and_goes_to_its_poses(arm: LockstepControl) -> None:
+    for name in ("folded", "ready", "folded"):
+        arm.go(arm.robot.poses[name])
+        arm.lockstep.run_for(3.0)
+        assert arm.state() == "armed", arm.control_status()
+        reached = positions(arm)
+        for joint, value in arm.robot.poses[name].items():
+            assert reached[joint] == pytest.approx(value, abs=0.02), (name, joint)
+    assert not arm.lockstep.twin.hazards.found
+
+
+def test_an_emergency_stop_in_motion_stands_and_holds(arm: LockstepControl) -> None:
+    arm.go(arm.robot.poses["ready"])
+    arm.lockstep.run_for(1.0)
+    arm.operate("estop")
+    arm.lockstep.run_for(0.6)
+    stood = positions(arm)
+    arm.lockstep.run_for(2.0)
+    assert arm.control_status()["estop_latched"]
+    assert positions(arm) == pytest.approx(stood, abs=0.01)
+
+
+def test_a_dead_cable_leaves_it_where_it_passes_and_it_goes_on_after_a_reset(
+    arm: LockstepControl,
+) -> None:
+    arm.go(arm.robot.poses["ready"])
+    arm.lockstep.run_for(1.0)
+    passing = positions(arm)
+    arm.lockstep.twin.plugs["servos"].pull()
+    arm.lockstep.run_for(2.0)
+    assert arm.control_status()["cause"] == "servo_bus_lost"
+    speeds = [abs(one["velocity"]) for one in arm.lockstep.truth()["joints"].values()]
+    assert max(speeds) < 0.01, "no watchdog stops it: its last goal is where it stands"
+    assert positions(arm) == pytest.approx(passing, abs=0.1)
+    arm.lockstep.twin.plugs["servos"].push()
+    arm.lockstep.run_for(2.5)
+    arm.arm()
+    arm.go(arm.robot.poses["ready"])
+    arm.lockstep.run_for(3.0)
+    assert positions(arm)["wrist_flex"] == pytest.approx(1.501, abs=0.02)
+
+
+def test_a_servo_that_is_too_hot_stops_it_and_is_named(arm: LockstepControl) -> None:
+    arm.go(arm.robot.poses["ready"])
+    arm.lockstep.run_for(3.0)
+    arm.lockstep.twin.servos.set_alert(3, 4)
+    arm.lockstep.run_for(1.0)
+    assert arm.state() == "stopped"
+    assert "elbow_flex" in str(arm.control_status())
+
+
+@pytest.mark.parametrize("component", ["lidar", "imu", "camera", "can_bus", "drive"])
+def test_what_it_does_not_have_cannot_fail(arm: LockstepControl, component: str) -> None:
+    with pytest.raises(FaultRefused, match=r"the robot file has no \["):
+        arm.faults.inject(component, None, "off" if component == "drive" else "unplug")
+
+
+class Talking:
+    """The arm with executor and planner, told in words."""
+
+    def __init__(self, arm: LockstepControl) -> None:
+        self.arm = arm
+        context, profile = arm.lockstep.context, load_profile("desktop")
+        arm.lockstep.add(ExecutorNode(context, arm.robot, profile.executor_rate_hz))
+        arm.lockstep.add(PlannerNode(context, arm.robot))
+        self._events = arm.link.events(topics.TASK_EVENT, from_start=True)
+        self._number = 0
+
+    def say(self, text: str) -> dict[str, Any]:
+        """Give a command and return its last event."""
+        self._number += 1
+        command_id = f"c{self._number}"
+        self.arm.link.writer(topics.UTTERANCE).publish(
+            {"command_id": command_id, "text": text, "source": "test"}
+        )
+        ends: list[dict[str, Any]] = []
+
+        def has_ended() -> bool:
+            told = [{**event.payload} for event in self._events.drain()]
+            ends.extend(
+                one
+                for one in told
+                if one["command_id"] == command_id and one["event"] in ("finished", "rejected")
+            )
+            return bool(ends)
+
+        assert self.arm.wait_until(has_ended, 30.0), text
+        return ends[-1]
+
+
+def test_words_move_its_hand_and_what_it_lacks_is_named(arm: LockstepControl) -> None:
+    arm.go(arm.robot.poses["ready"])
+    arm.lockstep.run_for(3.0)
+    talking = Talking(arm)
+    assert talking.say("open the gripper")["success"]
+    wide = positions(arm)["gripper"]
+    assert talking.say("close the gripper")["success"]
+    assert wide - positions(arm)["gripper"] > 1.5
+    for text, part in (("turn left", "base"), ("look down", "camera and no head")):
+        assert f"so101 has no {part}" in str(talking.say(text)), text
+    assert "I know of none" in str(talking.say("go to the kitchen"))
+    assert np.isfinite(list(positions(arm).values())).all()

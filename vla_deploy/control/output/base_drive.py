@@ -1,0 +1,154 @@
+"""Declare what control asks of the base's drives, and stand in for them where there are none."""
+
+from typing import Protocol
+
+from drivers.clock import Clock
+from drivers.opener import DeviceOpener
+from platforms import Profile
+from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.robots import RobotDescription
+from vla_deploy.safety import DriveSample
+
+
+class BaseDrive(Protocol):
+    """Drive the base; a lost bus is remembered after `open`, not raised."""
+
+    name: str
+    lost: bool
+    failure: str
+    v_m_s: float
+    w_rad_s: float
+    odometry: Odometry
+
+    @property
+    def has_wheels(self) -> bool:
+        """Return whether there is anything to drive."""
+        ...
+
+    @property
+    def enabled(self) -> bool:
+        """Return whether the wheels follow the commanded speed."""
+        ...
+
+    @property
+    def faulted(self) -> bool:
+        """Return whether a drive is in a fault state."""
+        ...
+
+    @property
+    def still(self) -> bool:
+        """Return whether the wheels stand, or cannot be driven any more."""
+        ...
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Return what the bus has counted."""
+        ...
+
+    def open(self) -> None:
+        """Open the bus and set the drives up.
+
+        Raises:
+            DriverError: the interface is missing, or a drive is silent or not as declared.
+        """
+        ...
+
+    def try_reopen(self) -> bool:
+        """Go a step towards opening a lost bus again, and return whether it is back."""
+        ...
+
+    def samples(self) -> tuple[DriveSample, ...]:
+        """Return what the safety judge wants to know of each drive."""
+        ...
+
+    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+        """Command a base velocity, and take in what the drives tell."""
+        ...
+
+    def enable(self) -> None:
+        """Begin to power the drives."""
+        ...
+
+    def disable(self) -> None:
+        """Take the power off the drives."""
+        ...
+
+    def cut_power(self) -> None:
+        """Take the power off at once."""
+        ...
+
+    def quick_stop(self) -> None:
+        """Let the drives brake by themselves, then take their power off."""
+        ...
+
+    def reset_fault(self) -> None:
+        """Ask faulted drives to leave their fault."""
+        ...
+
+    def close(self) -> None:
+        """Brake, and leave the bus."""
+        ...
+
+
+class FixedBase:
+    """Be the base of a robot that stands where it is mounted: nothing drives, nothing fails."""
+
+    has_wheels = False
+    enabled = False
+    faulted = False
+    still = True
+
+    def __init__(self) -> None:
+        self.name = "base"
+        self.lost = False
+        self.failure = ""
+        self.v_m_s = 0.0
+        self.w_rad_s = 0.0
+        self.odometry = Odometry(DifferentialDrive(wheel_radius_m=1.0, track_m=1.0))
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Return nothing: there is no bus."""
+        return {}
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def try_reopen(self) -> bool:
+        """Return that nothing came back, for nothing was lost."""
+        return False
+
+    def samples(self) -> tuple[DriveSample, ...]:
+        """Return nothing: there are no drives to judge."""
+        return ()
+
+    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+        """Do nothing."""
+
+    def enable(self) -> None:
+        """Do nothing."""
+
+    def disable(self) -> None:
+        """Do nothing."""
+
+    def cut_power(self) -> None:
+        """Do nothing."""
+
+    def quick_stop(self) -> None:
+        """Do nothing."""
+
+    def reset_fault(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def base_drive(
+    robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+) -> BaseDrive:
+    """Return the wheels of a robot, or what stands in for them."""
+    if robot.parts.base is None:
+        return FixedBase()
+    return Wheels(robot, profile, devices, clock)
