@@ -10,6 +10,7 @@ import pytest
 from platforms import load_profile
 from sim_twin.faults.request import FaultRefused
 from sim_twin.harness.lockstep_stack import LockstepControl
+from sim_twin.harness.processes import armed_processes
 from vla_deploy.ipc import topics
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.skills.node import ExecutorNode
@@ -129,3 +130,21 @@ def test_words_move_its_hand_and_what_it_lacks_is_named(arm: LockstepControl) ->
         assert f"so101 has no {part}" in str(talking.say(text)), text
     assert "I know of none" in str(talking.say("go to the kitchen"))
     assert np.isfinite(list(positions(arm).values())).all()
+
+
+@pytest.mark.stack
+def test_its_processes_are_those_that_it_has_use_for(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    options = ("--fast", "--robot", "so101", "--world", "table")
+    with armed_processes(tmp_path_factory.mktemp("arm") / "base", *options) as run:
+        rows = {row["name"]: row for row in run.status()["process_table"]["processes"]}
+        off = {name: row["reason"] for name, row in rows.items() if row["state"] == "off"}
+        assert off["perception"] == "so101 has no camera and no lidar and no imu and no home"
+        assert off["speech"] == "so101 has no microphone and no speaker"
+        assert set(off) == {"perception", "speech", "ros"}
+        moved = run.ask("joint", "move", "shoulder_pan", "--to", "0.5")
+        assert moved.returncode == 0, moved.stderr
+        assert run.truth()["joints"]["shoulder_pan"]["position"] == pytest.approx(0.5, abs=0.02)
+        assert run.say("open the gripper")["success"]
+        assert run.say("drive forward one metre")["error"] == "so101 has no base"

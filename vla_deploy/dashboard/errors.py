@@ -18,6 +18,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from vla_deploy.ipc import BadPayload, IpcError, ReplayOnly
+from vla_deploy.robots.errors import PartMissing
 
 _DESCRIPTION: Final = "see the API's description: /api/v1/openapi.json"
 _IPC_ANSWERS: Final[Mapping[type[IpcError], tuple[HTTPStatus, str, str]]] = {
@@ -95,6 +96,7 @@ def add_error_handlers(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _invalid)
     for kind, answer in _IPC_ANSWERS.items():
         app.add_exception_handler(kind, partial(_ipc, *answer))
+    app.add_exception_handler(PartMissing, _missing)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(Exception, _broken)
 
@@ -114,6 +116,10 @@ async def _invalid(_: Request, error: Any) -> JSONResponse:
 
 async def _ipc(status: HTTPStatus, code: str, hint: str, _: Request, error: Any) -> JSONResponse:
     return error_response(status, code, str(error), hint)
+
+
+async def _missing(_: Request, error: Any) -> JSONResponse:
+    return error_response(HTTPStatus.NOT_FOUND, "part_missing", str(error), "vla-deploy status")
 
 
 async def _http(_: Request, error: Any) -> JSONResponse:

@@ -62,7 +62,8 @@ def device_files(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 def _nodes(robot: RobotDescription) -> Iterator[DeviceNode]:
     for attribute, group in _GROUPS.items():
-        device = getattr(robot, attribute)
+        owner = robot.parts if hasattr(robot.parts, attribute) else robot
+        device = getattr(owner, attribute)
         if device is not None and device.path.startswith("/"):
             access = os.R_OK if attribute in _READ_ONLY else _OS_ACCESS
             yield DeviceNode(name=device.device, path=device.path, group=group, access=access)
@@ -116,7 +117,7 @@ def _late_adapter(context: DoctorContext, name: str, wait_ms: float, path: str) 
 
 def can_link(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Check that the wheel drives' CAN link is up, in good health, and has the right bit rate."""
-    if context.robot is None:
+    if context.robot is None or context.robot.parts.can_bus is None:
         return
     name, bitrate = context.robot.can_bus.path, context.robot.can_bus.bitrate
     up = f"sudo ip link set {name} up type can bitrate {bitrate} restart-ms 100"
@@ -166,7 +167,7 @@ def sound(context: DoctorContext) -> Iterator[DoctorFinding]:
 
 def camera_calibration(context: DoctorContext) -> Iterator[DoctorFinding]:
     """Return whether lens and mounting of the robot's camera were calibrated, and how well."""
-    if context.robot is None:
+    if context.robot is None or context.robot.parts.camera is None:
         return
     name, camera = context.robot.name, context.robot.camera
     yield _lens(camera.lens, name)

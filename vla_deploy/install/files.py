@@ -141,7 +141,7 @@ def _values(
         "MEMORY_HIGH_MB": f"{memory_mb * _HIGH_OVER_BUDGET:.0f}",
         "MEMORY_MAX_MB": f"{memory_mb * _MAX_OVER_BUDGET:.0f}",
         "CAN_INTERFACE": "" if choice.twin else _can_interface(robot),
-        "CAN_BITRATE": str(robot.can_bus.bitrate),
+        "CAN_BITRATE": str(robot.parts.can_bus.bitrate) if robot.parts.can_bus else "",
         "CREDENTIALS": "\n".join(
             f"LoadCredential={_argument(credential.name)}:{_argument(str(credential.path))}"
             for credential in choice.credentials
@@ -166,13 +166,13 @@ def _argument(text: str) -> str:
 
 def _can_interface(robot: RobotDescription) -> str:
     """Return the network interface; none for a serial adapter or a socket."""
-    path = robot.can_bus.path
+    path = robot.parts.can_bus.path if robot.parts.can_bus else ""
     return path if _INTERFACE.fullmatch(path) else ""
 
 
 def _links(robot: RobotDescription) -> list[str]:
     """Return one rule per USB device that the robot file names: `/dev/vla-deploy/<device>`."""
-    sensors = [robot.lidar, robot.imu]
+    sensors = [one for one in (robot.parts.lidar, robot.parts.imu) if one is not None]
     paths = {robot.servo_bus.device: robot.servo_bus.path}
     paths |= {sensor.device: sensor.path for sensor in sensors}
     if robot.estop is not None:

@@ -71,7 +71,7 @@ def with_sound(context: RunContext) -> str:
 def ros_asked(context: RunContext) -> str:
     """Run where the run, the robot file or the profile asks for ROS 2."""
     if context.ros or context.robot.ros.enabled or context.profile.ros:
-        return optional("ros")(context)
+        return with_parts("ros", "base", "lidar", "imu", "camera", "home")(context)
     return "nobody asks for ROS 2: run --ros, or [ros] of the robot file"
 
 

@@ -40,6 +40,7 @@ class Status:
         self._motions = motions
         self._servos = servos
         self._wheels = wheels
+        self._buses = (servos, wheels) if wheels.has_wheels else (servos,)
         self._pace = StatusPace()
 
     def due(self, every_ticks: int) -> ControlStatus | None:
@@ -70,7 +71,7 @@ class Status:
             "period_s": round(ticks.period_s, 6),
             "nominal_period_s": ticks.nominal_s,
             "period_ratio": ticks.periods.document(),
-            "buses": bus_document(self._servos, self._wheels),
+            "buses": bus_document(*self._buses),
             "joints": joint_document(self._servos.state),
             "active_motions": self._motions.active_ids,
         }

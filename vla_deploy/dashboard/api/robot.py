@@ -44,11 +44,11 @@ class StaticModel:
 
         Wheels have no entry in the joint arrays: they are drawn at zero.
         """
-        robot = self.robot
+        robot, base = self.robot, self.robot.parts.base
         return {
             "name": robot.name,
             "joint_names": robot.joint_names,
-            "footprint_m": robot.base.footprint_radius_m,
+            "footprint_m": base.footprint_radius_m if base else 0.0,
             "links": [_rounded(asdict(link)) for link in self.tree.links],
             "zones": [
                 {"name": zone.name, "kind": zone.kind, "polygon_m": zone.polygon_m}
@@ -62,6 +62,7 @@ class StaticModel:
 
         Raises:
             MapInvalid: the robot's map cannot be used.
+            PartMissing: the robot has no home.
         """
         home, (height, width) = self.robot.home, self._map_file.shades.shape
         return {

@@ -39,7 +39,12 @@ class RobotViews:
 
         self._model = RobotModel(robot)
         self._names = robot.joint_names
-        self._lidar_m = self._model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
+        lidar = robot.parts.lidar
+        self._lidar_m = (
+            np.zeros(3)
+            if lidar is None
+            else self._model.site_pose(lidar.site, full_positions(robot))[:3, 3]
+        )
 
     def joints(self, state: np.void, stamp_ns: int) -> Json:
         """Return every joint's position and velocity, leaving out NaN."""

@@ -67,7 +67,7 @@ def zones(robot: RobotDescription, stamp_ns: int) -> Json:
             lines=[_outline(zone.polygon_m, 0.01, _ZONE)],
             texts=[_text(zone.name, *_middle(zone.polygon_m), 0.05)],
         )
-        for zone in robot.home.zones
+        for zone in (robot.parts.home.zones if robot.parts.home else ())
     ]
     return {"deletions": [], "entities": entities}
 

@@ -12,7 +12,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.ipc.memory.layout import is_document, record_dtype
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.errors import MapInvalid
+from vla_deploy.robots.errors import MapInvalid, PartMissing
 from vla_deploy.telemetry.channels import Channel
 from vla_deploy.telemetry.schemas import robot_views, scene_views
 from vla_deploy.telemetry.schemas.foxglove_json import Json, foxglove_schema
@@ -129,12 +129,14 @@ class ViewDrawer:
             yield view.channel, _text(view.draw(self._views, value, stamp_ns))
 
     def constant_views(self, stamp_ns: int, wanted: Wanted) -> Iterator[tuple[str, bytes]]:
-        """Yield channel and JSON of the constant views, leaving out a map that cannot be read."""
+        """Yield channel and JSON of the constant views that there are and that can be drawn."""
         for one in CONSTANT_VIEWS:
             if not wanted(one.channel):
                 continue
             try:
                 yield one.channel, _text(one.draw(self._robot, stamp_ns))
+            except PartMissing:
+                continue  # there is nothing to draw
             except MapInvalid as error:
                 _log.warning("degraded: no %s: %s", one.channel, error)
 
