@@ -1,7 +1,7 @@
 """Drive all servos of one Dynamixel bus: one block read and one sync write per cycle."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,6 @@ class DynamixelBus:
     the wire time plus `reply_margin_s` in a cycle. After LinkLost the bus is finished: make a new
     transport and a new bus, and connect; torque stays off or on as the servos left it.
     """
-
-    has_watchdog: Final = True
 
     def __init__(
         self,

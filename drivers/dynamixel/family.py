@@ -62,6 +62,7 @@ class DynamixelFamily:
                 initial("min_voltage_limit") * VOLTAGE_UNIT_V,
                 initial("max_voltage_limit") * VOLTAGE_UNIT_V,
             ),
+            protocol="dynamixel 2",
         )
 
     def servo(

@@ -41,10 +41,9 @@ class FeetechBlock:
         self,
         members: Sequence[int],
         servos: Sequence[FeetechServo],
-        offsets: Sequence[int],
         state: BusState,
     ) -> None:
-        """Read the servos whose bus indices are `members`; `offsets` are their homing offsets."""
+        """Read the servos whose bus indices are `members`."""
         self.members = tuple(members)
         chosen = [servos[index] for index in members]
         self.ids = [servo.id for servo in chosen]
@@ -68,7 +67,7 @@ class FeetechBlock:
         load = np.array([servo.sign / LOAD_FULL for servo in chosen])
         volts = np.full(len(chosen), FEETECH_VOLTAGE_UNIT_V)
         self._units = np.stack([step, step, load, volts, np.ones(len(chosen))])
-        self._zeros = np.array([servos[index].to_joint(offsets[index]) for index in members])
+        self._zeros = np.array([servo.to_joint(0) for servo in chosen])
 
     def take(self, reply: bytes) -> bool:
         """Store a reply of the usual form; False, and nothing is stored, where it is another."""

@@ -1,7 +1,7 @@
 """Drive all servos of one FEETECH bus: one sync read and one sync write per cycle."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.journal import BusJournal
 from drivers.servo.state import BusState
 
-HOLD_GAINS: Final[Mapping[str, int]] = {"position_p_gain": 32, "position_d_gain": 32}
-"""The factory's gains. With LeRobot's P of 16 an arm rests twice as far below its goal."""
-
 
 class FeetechBus:
     """Own the transport of one bus and everything known of its servos.
@@ -32,10 +29,10 @@ class FeetechBus:
     transport and a new bus, and connect.
 
     These servos have **no bus watchdog**: when the host or the cable dies they keep their torque
-    and go on to their last goal. Whoever opens the bus sees to it that goals are never far ahead.
+    and go on to their last goal. Who opens the bus must not send goals that are far ahead. In
+    `state.watchdog` stands 1 for each servo that holds because this bus has told it to, 0 for those
+    that were found holding: what another program wrote to them is not known.
     """
-
-    has_watchdog: Final = False
 
     def __init__(
         self,
@@ -149,7 +146,8 @@ class FeetechBus:
         """Hold servos (all by default) at their present pose.
 
         Raises:
-            ServoFault: a servo reports an error that takes its torque away.
+            ServoFault: a servo reports an error that takes its torque away, or stands outside its
+                own position limits.
             ServoSilent: a servo does not answer.
             NotKept: a servo refuses a step.
             DriverError: the bus is not connected.
@@ -157,10 +155,11 @@ class FeetechBus:
         """
         cycle = self._connected()
         chosen = self._chosen(ids)
-        shutdown = {self.servos[n].id: self._setups[n].shutdown for n in chosen}
-        switch_torque_on(self._link, [self.servos[n] for n in chosen], shutdown, HOLD_GAINS)
+        servos, setups = [self.servos[n] for n in chosen], [self._setups[n] for n in chosen]
+        switch_torque_on(self._link, servos, setups)
         for index in chosen:
             self.state.torque_on[index] = True
+            self.state.watchdog[index] = 1
             cycle.goals.forget_limit(self.servos[index].id)
 
     def disable_torque(self, ids: Sequence[int] | None = None) -> dict[int, DriverError]:
@@ -173,6 +172,7 @@ class FeetechBus:
         failures = switch_torque_off(self._link, [self.servos[index] for index in chosen])
         for index in chosen:
             self.state.torque_on[index] = self.servos[index].id in failures
+            self.state.watchdog[index] = 0
         return failures
 
     def clear_watchdog(self) -> None:
@@ -188,6 +188,7 @@ class FeetechBus:
         (index,) = self._chosen([servo_id])
         self._link.send(encode_packet(servo_id, FeetechInstruction.REBOOT))
         self.state.torque_on[index] = False
+        self.state.watchdog[index] = 0
         if self._cycle is not None:
             self._cycle.suspend(index)
 
@@ -214,7 +215,9 @@ class FeetechBus:
         return self._link.read(self.servos[index], name)
 
     def write_register(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register of one servo, in the servo's units; EEPROM is kept until power is cut.
+        """Write a register of one servo, in the servo's units.
+
+        What is EEPROM, and locked as it should be, is forgotten with the servo's power.
 
         Raises:
             ValueError: no such servo or register, read-only, or the value does not fit it.

@@ -1,7 +1,7 @@
 """Run what a connected bus does in every cycle, and bring servos back that were away."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -11,15 +11,10 @@ from drivers.clock import NS_PER_S
 from drivers.errors import DriverError, LinkLost, NoReply, ProtocolError
 from drivers.feetech.block import BLOCK_BYTES, FeetechBlock
 from drivers.feetech.goals import FeetechGoals
-from drivers.feetech.link import FeetechLink
+from drivers.feetech.link import FeetechLink, value_in
 from drivers.feetech.servo import FeetechServo
-from drivers.feetech.settings import (
-    EEPROM_BYTES,
-    FeetechSetup,
-    write_kept_settings,
-    write_run_settings,
-)
-from drivers.feetech.table import hardware_errors
+from drivers.feetech.settings import EEPROM_BYTES, FeetechSetup, write_kept_settings
+from drivers.feetech.table import TorqueSwitch, hardware_errors
 from drivers.servo.journal import BusJournal
 from drivers.servo.patience import ReplyPatience
 from drivers.servo.roster import Roster
@@ -50,7 +45,7 @@ class FeetechCycle:
         """Work on servos that were set up as `setups` says."""
         self._link = link
         self._servos = servos
-        self._offsets = [setup.homing_offset for setup in setups]
+        self._setups = setups
         self._state = state
         self._journal = journal
         self._margin_s = margin_s
@@ -58,9 +53,10 @@ class FeetechCycle:
         self._roster = Roster(len(servos))
         self._stamps_ns: NDArray[np.int64] = np.full(len(servos), _NEVER_NS, dtype=np.int64)
         self._all_fresh = False
-        self._errors: Sequence[int] = ()
+        self._errors: tuple[Sequence[int], Sequence[int]] = ((), ())
         self._every_cycles = health_every_cycles
-        self._count = self._turn = 0
+        self._count = self._turn = self._probes = 0
+        self._returns: dict[int, Iterator[None]] = {}
         self._urgent: deque[int] = deque()
         self.goals = FeetechGoals(link, servos, setups, margin_s=margin_s)
         self.notices: deque[str] = deque(maxlen=_MOST_NOTICES)
@@ -92,7 +88,7 @@ class FeetechCycle:
             self._urgent.append(index)
 
     def _new_block(self) -> FeetechBlock:
-        return FeetechBlock(self._roster.polled, self._servos, self._offsets, self._state)
+        return FeetechBlock(self._roster.polled, self._servos, self._state)
 
     def _read_block(self) -> None:
         link, block = self._link, self._block
@@ -110,7 +106,7 @@ class FeetechCycle:
         before_ns, state.stamp_ns = state.stamp_ns, link.now_ns()
         link.counters.cycles += 1
         self._journal.answer_times_ns.append(state.stamp_ns - link.last_sent_ns)
-        if block.errors != self._errors:
+        if (block.answered, block.errors) != self._errors:
             self._note_errors()
         if len(block.answered) < len(self._servos):
             self._finish_partial(before_ns)
@@ -142,7 +138,7 @@ class FeetechCycle:
     def _note_errors(self) -> None:
         """Translate the error bytes; what they take away is read from the servo itself."""
         state, answered = self._state, list(self._block.answered)
-        self._errors = self._block.errors
+        self._errors = (self._block.answered, self._block.errors)
         before = state.error[answered].copy()
         state.error[answered] = [hardware_errors(code) for code in self._block.errors]
         state.alert[answered] = state.error[answered] != 0
@@ -171,46 +167,73 @@ class FeetechCycle:
         if self._urgent:
             self._read_torque(self._urgent.popleft())
             return
+        if self._returns:
+            self._go_on_with_return()
+            return
         self._count += 1
         if self._count % self._every_cycles:
             return
         self._turn += 1
         away, polled = self._roster.suspended, self._roster.polled
         if away and (len(away) > len(polled) or self._turn % _PROBE_EVERY_TURNS == 0):
-            self._probe(away[self._turn % len(away)])
+            self._probes += 1
+            self._returns[away[self._probes % len(away)]] = self._bring_back(
+                away[self._probes % len(away)]
+            )
+            self._go_on_with_return()
             return
-        self._read_torque(polled[self._turn % len(polled)])
+        # Probes take turns away, so places are counted apart: none may fall on the same turns.
+        self._read_torque(polled[(self._turn - self._probes) % len(polled)])
 
     def _read_torque(self, index: int) -> None:
         try:
             value = self._link.read(self._servos[index], "torque_enable", self._patience)
         except (NoReply, ProtocolError):  # counted by the link; the next turn asks again
             return
-        self._state.torque_on[index] = value == 1
+        self._state.torque_on[index] = value == TorqueSwitch.ON
 
-    def _probe(self, index: int) -> None:
-        """Ask a servo that was away, and set it up again if it answers."""
-        servo = self._servos[index]
+    def _go_on_with_return(self) -> None:
+        """Make one more transaction with a servo that was away."""
+        index, steps = next(iter(self._returns.items()))
         try:
-            images = self._link.read_spans([servo], 0, EEPROM_BYTES, self._patience)
-            if servo.id not in images:
-                return
-            told = self._bring_back(servo, images[servo.id].params)
+            next(steps)
+        except StopIteration:
+            del self._returns[index]
         except LinkLost:
             raise
         except DriverError:  # counted by the link; the next probe begins anew
+            del self._returns[index]
+
+    def _bring_back(self, index: int) -> Iterator[None]:
+        """Set up a servo that was away, a transaction at each step, and poll it again.
+
+        One that has kept its torque has kept its memory, too: it is left as it is.
+        """
+        servo, setup = self._servos[index], self._setups[index]
+        images = self._link.read_spans([servo], 0, EEPROM_BYTES, self._patience)
+        if servo.id not in images:
             return
-        self._state.torque_on[index] = not told
+        image = images[servo.id].params
+        if (number := value_in(servo, image, 0, "model_number")) != setup.model_number:
+            self._notice(f"{servo}: another servo answers in its place, of model {number}")
+            return
+        yield
+        told = []
+        torque = self._link.read(servo, "torque_enable", self._patience)
+        if torque != TorqueSwitch.ON:
+            told.append("torque is off until it is armed anew")
+            for text in write_kept_settings(self._link, servo, image, self._patience):
+                told += [text] if text else []
+                yield
+        self._state.torque_on[index] = torque == TorqueSwitch.ON
+        if torque != TorqueSwitch.ON:
+            self._state.watchdog[index] = 0
         self._roster.resume(index)
         self._block = self._new_block()
         self.goals.forget_limit(servo.id)
         self._link.counters.returns += 1
-        self.notices.append("; ".join([f"{servo}: answers again", *told]))
+        self._notice("; ".join([f"{servo}: answers again", *told]))
 
-    def _bring_back(self, servo: FeetechServo, image: bytes) -> list[str]:
-        """Return what was written: nothing to one that has kept its torque, and so its memory."""
-        if self._link.read(servo, "torque_enable", self._patience):
-            return []
-        told = list(write_kept_settings(self._link, servo, image))
-        write_run_settings(self._link, servo)
-        return ["torque is off until it is armed anew", *told]
+    def _notice(self, text: str) -> None:
+        if text not in self.notices:
+            self.notices.append(text)

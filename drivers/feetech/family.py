@@ -5,10 +5,11 @@ from typing import Final, cast
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock
-from drivers.feetech.bus import HOLD_GAINS, FeetechBus
+from drivers.feetech.bus import FeetechBus
 from drivers.feetech.servo import FeetechServo
-from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS
+from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS, FEETECH_VOLTAGE_UNIT_V
 from drivers.feetech.tools.bench import FeetechBench
+from drivers.feetech.torque import HOLD_GAINS
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
@@ -44,7 +45,11 @@ class FeetechFamily:
             senses_current=False,
             full_duty_error_rad=steps * sheet.step_rad,
             temperature_limit_c=float(sheet.registers["temperature_limit"].initial),
-            voltage_limits_v=sheet.voltage_range_v,
+            voltage_limits_v=(
+                9.0 if sheet.voltage_v > 9.0 else sheet.voltage_range_v[0],
+                sheet.registers["max_voltage_limit"].initial * FEETECH_VOLTAGE_UNIT_V,
+            ),
+            protocol=f"feetech {sheet.byte_order}-endian",
         )
 
     def servo(

@@ -44,10 +44,7 @@ class FeetechGoals:
         self._joints = [servo.joint for servo in servos]
         self._patience = ReplyPatience(margin_s=margin_s, attempts=2)
         self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
-        offsets = [setup.homing_offset for setup in setups]
-        self._at_zero = np.array(
-            [servo.to_joint(offset) for servo, offset in zip(servos, offsets, strict=True)]
-        )
+        self._at_zero = np.array([servo.to_joint(0) for servo in servos])
         self._per_joint = [
             (zero, 1.0 / per_pulse, setup.minimum_pulse, setup.maximum_pulse)
             for zero, per_pulse, setup in zip(
@@ -102,7 +99,7 @@ class FeetechGoals:
         """Limit the duty of servos by id, where it changed; return those that did not take it.
 
         Raises:
-            ValueError: a ratio is not within 0..1, an id is unknown, or a servo has no limit.
+            ValueError: a ratio is not within 0..1, or an id is unknown.
             LinkLost: the adapter is gone.
         """
         failures: dict[int, DriverError] = {}
@@ -110,8 +107,13 @@ class FeetechGoals:
             value = self._limit_value(servo_id, ratio)
             if self._sent_limits.get(servo_id) == value:
                 continue
+            servo = self._servos[servo_id]
+            if "torque_limit" not in servo.datasheet.registers:
+                if ratio < 1.0:
+                    failures[servo_id] = DriverError(f"{servo}: this model has no torque limit")
+                continue
             try:
-                self._link.write(self._servos[servo_id], "torque_limit", value, self._patience)
+                self._link.write(servo, "torque_limit", value, self._patience)
                 self._sent_limits[servo_id] = value
             except LinkLost:
                 raise

@@ -20,7 +20,6 @@ from drivers.servo.wire import Wire
 
 SETUP_PATIENCE: Final = ReplyPatience(margin_s=0.02, attempts=3)
 """For what is asked before or after motion, when a retry costs nothing."""
-MOST_ADDRESS: Final = 0xFF
 
 
 class FeetechLink(Wire):
@@ -161,10 +160,27 @@ class FeetechLink(Wire):
             ValueError: no such register, read-only, or a value does not fit its bytes.
             LinkLost: the adapter is gone.
         """
-        register = register_of(servos[0], name)
-        params = bytes((register.address, register.size))
-        for servo, value in zip(servos, values, strict=True):
-            params += bytes((servo.id,)) + encode_value(servo, register_of(servo, name), value)
+        registers = [register_of(servo, name) for servo in servos]
+        self.write_spans(
+            servos,
+            [
+                (register.address, encode_value(servo, register, value))
+                for servo, register, value in zip(servos, registers, values, strict=True)
+            ],
+        )
+
+    def write_spans(
+        self, servos: Sequence[FeetechServo], spans: Sequence[tuple[int, bytes]]
+    ) -> None:
+        """Write as many bytes at one address of many servos at one instant; nobody answers.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        address, data = spans[0]
+        params = bytes((address, len(data)))
+        for servo, (_, each) in zip(servos, spans, strict=True):
+            params += bytes((servo.id,)) + each
         self.send(encode_packet(FEETECH_BROADCAST_ID, FeetechInstruction.SYNC_WRITE, params))
 
     def _sync_read(

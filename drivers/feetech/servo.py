@@ -11,8 +11,9 @@ from drivers.servo.joint_servo import JointServo
 class FeetechServo(JointServo):
     """Describe a FEETECH servo as the robot file declares it.
 
-    Pulses are those of the encoder: what the servo's homing offset takes off is added again, so
-    that a servo calibrated by other software keeps its offset and needs none in the robot file.
+    Pulses are those that the servo shows. Its homing offset, which other software may have written
+    to it, is part of them and stays as it is: an arm that LeRobot has calibrated has the middle of
+    each joint at 2048, as the robot file says.
     """
 
     def _checks(self) -> list[tuple[bool, str]]:

@@ -1,19 +1,23 @@
 """Check that a FEETECH servo is the declared one, and write what this driver needs of it."""
 
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.feetech.link import FeetechLink, value_in
+from drivers.errors import DriverError
+from drivers.feetech.link import SETUP_PATIENCE, FeetechLink, value_in
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.table import (
     FEETECH_MODELS,
     FEETECH_VOLTAGE_UNIT_V,
     MULTI_TURN_FEEDBACK,
     FeetechMode,
+    TorqueSwitch,
     hardware_errors,
 )
 from drivers.servo.errors import NotKept, ServoSilent, SlowAdapter, WrongServo
+from drivers.servo.patience import ReplyPatience
 
 EEPROM_BYTES: Final = 40
 _SENSED_START: Final = 56
@@ -27,9 +31,9 @@ class FeetechSetup:
     """Hold what was found in a servo, and what was written to it."""
 
     firmware: tuple[int, int]
+    model_number: int
     minimum_pulse: int
     maximum_pulse: int
-    homing_offset: int
     torque_limit: int
     """In thousandths of full duty."""
     shutdown: int
@@ -99,57 +103,54 @@ def differences(servo: FeetechServo, image: bytes) -> dict[str, tuple[int, int]]
     return {name: pair for name, pair in found.items() if pair[0] != pair[1]}
 
 
-def write_kept_settings(link: FeetechLink, servo: FeetechServo, image: bytes) -> Iterator[str]:
-    """Write the settings that differ, so that they outlive a power cut; yield what was changed.
+def write_kept_settings(
+    link: FeetechLink,
+    servo: FeetechServo,
+    image: bytes,
+    patience: ReplyPatience = SETUP_PATIENCE,
+) -> Iterator[str]:
+    """Write the settings that differ, so that they outlive a power cut, and lock them.
+
+    It yields what was changed, one transaction at each step, "" where nothing was.
 
     Raises:
         NotKept: a setting reads as another value than was written.
         ServoSilent: no answer.
     """
     changes = differences(servo, image)
-    if not changes:
-        return
-    link.write(servo, "lock", 0)
     try:
+        if changes:
+            link.write(servo, "lock", 0, patience)
         for name, (old, new) in changes.items():
-            link.write(servo, name, new)
-            if (kept := link.read(servo, name)) != new:
+            yield ""
+            link.write(servo, name, new, patience)
+            yield ""
+            if (kept := link.read(servo, name, patience)) != new:
                 raise NotKept(f"{servo}: {name} expected {new}, got {kept} after writing it")
             yield f"{name} {old} -> {new}"
-    finally:
-        link.write(servo, "lock", 1)
-
-
-def write_run_settings(link: FeetechLink, servo: FeetechServo) -> None:
-    """Write what a servo forgets with its power: setpoints are followed as fast as it can.
-
-    Raises:
-        ServoSilent: no answer.
-    """
-    for name in ("acceleration", "goal_time", "goal_velocity"):
-        link.write(servo, name, 0)
+    except DriverError:
+        with suppress(DriverError):  # the first error says what is wrong
+            link.write(servo, "lock", 1, patience)
+        raise
+    link.write(servo, "lock", 1, patience)
 
 
 def _set_up(
     link: FeetechLink, servo: FeetechServo, image: bytes, torque: int, error: int
 ) -> FeetechSetup:
-    written = tuple(write_kept_settings(link, servo, image))
-    if not torque:
-        write_run_settings(link, servo)
-    registers = servo.datasheet.registers
-    has_offset = "homing_offset" in registers
+    written = tuple(text for text in write_kept_settings(link, servo, image) if text)
     minimum = value_in(servo, image, 0, "min_position_limit")
     maximum = value_in(servo, image, 0, "max_position_limit")
-    if minimum == maximum == 0:
-        minimum, maximum = 1 - (1 << 15), (1 << 15) - 1
+    if minimum == maximum == 0:  # no limits: but for the one turn that is shown
+        minimum, maximum = 0, 2 * servo.datasheet.centre_step + 1
     return FeetechSetup(
         firmware=(image[0], image[1]),
+        model_number=value_in(servo, image, 0, "model_number"),
         minimum_pulse=minimum,
         maximum_pulse=maximum,
-        homing_offset=value_in(servo, image, 0, "homing_offset") if has_offset else 0,
         torque_limit=value_in(servo, image, 0, "max_torque_limit"),
         shutdown=hardware_errors(value_in(servo, image, 0, "shutdown")),
-        torque_on=bool(torque),
+        torque_on=torque == TorqueSwitch.ON,
         error=hardware_errors(error),
         written=written,
     )

@@ -6,40 +6,52 @@ from typing import Final
 from drivers.errors import DriverError, LinkLost
 from drivers.feetech.link import SETUP_PATIENCE, FeetechLink, register_of
 from drivers.feetech.servo import FeetechServo
+from drivers.feetech.settings import FeetechSetup
 from drivers.feetech.table import TorqueSwitch, hardware_errors
 from drivers.servo.errors import NotKept, ServoFault, ServoSilent
 from drivers.servo.patience import ReplyPatience
 from drivers.servo.state import hardware_error_text
 
+HOLD_GAINS: Final[Mapping[str, int]] = {"position_p_gain": 32, "position_d_gain": 32}
+"""The factory's gains. With LeRobot's P of 16 an arm rests twice as far below its goal."""
+_MOTION: Final = ("acceleration", "goal_position", "goal_time", "goal_velocity", "torque_limit")
+"""What a servo forgets with its power, in the order of the addresses; SCS have no torque limit."""
 _ATTEMPTS: Final = 3
 _URGENT: Final = ReplyPatience(margin_s=0.005, attempts=2)
 
 
 def switch_torque_on(
-    link: FeetechLink,
-    servos: Sequence[FeetechServo],
-    shutdown: Mapping[int, int],
-    registers: Mapping[str, int],
+    link: FeetechLink, servos: Sequence[FeetechServo], setups: Sequence[FeetechSetup]
 ) -> None:
     """Hold the servos where they are; on any failure switch them off again.
 
     A servo goes to the goal that it was given last as soon as it has torque, however old that is:
-    so the present position is written first. `shutdown` says by id which errors forbid it, and
-    `registers` what else each servo gets before.
+    so the present position is written first, and with it all that makes it follow goals as this
+    driver expects. The EEPROM is locked before the gains, which it keeps otherwise.
 
     Raises:
-        ServoFault: a servo reports an error that takes its torque away.
+        ServoFault: a servo reports an error that takes its torque away, or stands outside its own
+            position limits, into which it would go at full speed.
         ServoSilent: a servo does not answer.
         NotKept: a servo refuses a step.
         LinkLost: the adapter is gone.
     """
-    _check_fitness(link, servos, shutdown)
+    _check_fitness(link, servos, setups)
     try:
-        for name, value in registers.items():
-            _write_kept(link, servos, name, dict.fromkeys(_ids(servos), value))
+        link.write_each(servos, "lock", [1] * len(servos))
+        _write_kept(link, servos, [HOLD_GAINS] * len(servos))
         present = _read_each(link, servos, "present_position")
-        _write_kept(link, servos, "goal_position", present)
-        _write_kept(link, servos, "torque_enable", dict.fromkeys(_ids(servos), TorqueSwitch.ON))
+        _check_limits(servos, setups, present)
+        motion = [
+            {
+                **dict.fromkeys(_MOTION, 0),
+                "goal_position": present[servo.id],
+                "torque_limit": setup.torque_limit,
+            }
+            for servo, setup in zip(servos, setups, strict=True)
+        ]
+        _write_kept(link, servos, motion)
+        _write_kept(link, servos, [{"torque_enable": TorqueSwitch.ON}] * len(servos))
     except LinkLost:
         raise
     except DriverError:
@@ -54,10 +66,12 @@ def switch_torque_off(link: FeetechLink, servos: Sequence[FeetechServo]) -> dict
         LinkLost: the adapter is gone; the servos keep their torque and their goals.
     """
     link.write_each(servos, "torque_enable", [TorqueSwitch.FREE] * len(servos))
-    torque = _read_register(link, servos, "torque_enable", _URGENT)
+    register = register_of(servos[0], "torque_enable")
+    answers = link.read_spans(servos, register.address, register.size, _URGENT)
     failures: dict[int, DriverError] = {}
     for servo in servos:
-        if torque.get(servo.id) == TorqueSwitch.FREE:
+        answer = answers.get(servo.id)
+        if answer is not None and answer.params[0] == TorqueSwitch.FREE:
             continue
         try:
             link.write(servo, "torque_enable", TorqueSwitch.FREE, _URGENT)
@@ -69,54 +83,70 @@ def switch_torque_off(link: FeetechLink, servos: Sequence[FeetechServo]) -> dict
 
 
 def _write_kept(
-    link: FeetechLink, servos: Sequence[FeetechServo], name: str, values: Mapping[int, int]
+    link: FeetechLink, servos: Sequence[FeetechServo], values: Sequence[Mapping[str, int]]
 ) -> None:
+    """Write neighbouring registers of many servos at one instant, and read back what they hold."""
+    spans = [_span(servo, wanted) for servo, wanted in zip(servos, values, strict=True)]
     wrong: list[str] = []
     for _ in range(_ATTEMPTS):
-        link.write_each(servos, name, [values[servo.id] for servo in servos])
-        got = _read_each(link, servos, name)
+        link.write_spans(servos, spans)
+        answers = link.read_spans(servos, spans[0][0], len(spans[0][1]), SETUP_PATIENCE)
+        _require_all(servos, answers)
         wrong = [
-            f"{servo}: {name} expected {values[servo.id]}, got {got[servo.id]}"
-            for servo in servos
-            if got[servo.id] != values[servo.id]
+            f"{servo}: {', '.join(wanted)} expected {data.hex(' ')}, "
+            f"got {answers[servo.id].params.hex(' ')}"
+            for servo, wanted, (_, data) in zip(servos, values, spans, strict=True)
+            if answers[servo.id].params != data
         ]
         if not wrong:
             return
-    raise NotKept("; ".join(wrong) + "; check the servo's position limits and errors")
+    raise NotKept("; ".join(wrong) + "; check the servo's limits and errors")
+
+
+def _span(servo: FeetechServo, values: Mapping[str, int]) -> tuple[int, bytes]:
+    """Return where the registers that a servo has begin, and their bytes."""
+    registers = [
+        servo.datasheet.registers[name] for name in values if name in servo.datasheet.registers
+    ]
+    data = b"".join(register.to_bytes(values[register.name]) for register in registers)
+    return registers[0].address, data
 
 
 def _check_fitness(
-    link: FeetechLink, servos: Sequence[FeetechServo], shutdown: Mapping[int, int]
+    link: FeetechLink, servos: Sequence[FeetechServo], setups: Sequence[FeetechSetup]
 ) -> None:
     errors = _read_each(link, servos, "hardware_error_status")
-    for servo in servos:
+    for servo, setup in zip(servos, setups, strict=True):
         error = hardware_errors(errors[servo.id])
-        if error & shutdown[servo.id]:
+        if error & setup.shutdown:
             raise ServoFault(
                 f"{servo}: hardware error: {hardware_error_text(error)}; remove the cause, then "
                 "reboot the servo; an overload may need its power to be cut"
             )
 
 
-def _ids(servos: Sequence[FeetechServo]) -> list[int]:
-    return [servo.id for servo in servos]
-
-
-def _read_register(
-    link: FeetechLink, servos: Sequence[FeetechServo], name: str, patience: ReplyPatience
-) -> dict[int, int]:
-    register = register_of(servos[0], name)
-    spans = link.read_spans(servos, register.address, register.size, patience)
-    return {
-        servo.id: register_of(servo, name).from_bytes(spans[servo.id].params)
-        for servo in servos
-        if servo.id in spans
-    }
+def _check_limits(
+    servos: Sequence[FeetechServo], setups: Sequence[FeetechSetup], present: Mapping[int, int]
+) -> None:
+    for servo, setup in zip(servos, setups, strict=True):
+        if not setup.minimum_pulse <= present[servo.id] <= setup.maximum_pulse:
+            raise ServoFault(
+                f"{servo}: stands at {present[servo.id]}, outside its own position limits "
+                f"{setup.minimum_pulse}..{setup.maximum_pulse}, and would go there at full speed; "
+                "move it inside by hand, or write other limits to registers 9 and 11"
+            )
 
 
 def _read_each(link: FeetechLink, servos: Sequence[FeetechServo], name: str) -> dict[int, int]:
-    values = _read_register(link, servos, name, SETUP_PATIENCE)
-    silent = [str(servo) for servo in servos if servo.id not in values]
+    register = register_of(servos[0], name)
+    answers = link.read_spans(servos, register.address, register.size, SETUP_PATIENCE)
+    _require_all(servos, answers)
+    return {
+        servo.id: register_of(servo, name).from_bytes(answers[servo.id].params) for servo in servos
+    }
+
+
+def _require_all(servos: Sequence[FeetechServo], answers: Mapping[int, object]) -> None:
+    silent = [str(servo) for servo in servos if servo.id not in answers]
     if silent:
         raise ServoSilent(f"no answer from {', '.join(silent)}; check power and cable")
-    return values

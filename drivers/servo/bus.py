@@ -25,11 +25,6 @@ class ServoBusDriver(Protocol):
         """Return what is told of every cycle."""
         ...
 
-    @property
-    def has_watchdog(self) -> bool:
-        """Return whether the servos stop by themselves when the bus falls silent."""
-        ...
-
     def connect(self, *, thorough: bool = True) -> object:
         """Check that every servo is the declared one and set it up; torque is left as it is.
 

@@ -24,6 +24,8 @@ class ServoFacts:
     """The position error of the shaft at which the motor gives all it has, by our gains."""
     temperature_limit_c: float
     voltage_limits_v: tuple[float, float]
+    protocol: str
+    """What is spoken on its wire: servos of one bus have the same."""
 
 
 class ServoFamily(Protocol):

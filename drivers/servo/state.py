@@ -41,7 +41,10 @@ class BusState:
     """Bits of `HardwareError`."""
     torque_on: Bools
     watchdog: NDArray[np.int16]
-    """bus_watchdog (98): 0 off, 1..127 armed in units of 20 ms, -1 tripped."""
+    """bus_watchdog (98) of a Dynamixel: 0 off, 1..127 armed in units of 20 ms, -1 tripped.
+
+    Of servos without one: 1 where this bus made them hold, else 0.
+    """
     voltage_v: Floats
     temperature_c: Floats
     climate_stamp_ns: NDArray[np.int64]

@@ -188,6 +188,10 @@ class NoWays(PathPlanner):
         """
         raise NoPath(self._reason)
 
+    def room_m(self, x_m: float, y_m: float) -> float:
+        """Return that there is no room."""
+        return 0.0
+
 
 def base_planner(robot: RobotDescription) -> PathPlanner:
     """Return the planner for a robot's base on its own map, around its keep-out zones.

@@ -103,6 +103,10 @@ def parts_come_together(document: Document) -> Iterator[TableFault]:
     else:
         for key in (one for one in ("zones", "tip_over") if one in document):
             yield TableFault(key=key, got="a table", expected="nothing: the robot has no base")
+    needs = {"base": "lidar", "tip_over": "imu"}
+    for key, needed in needs.items():
+        if key in document and needed not in document:
+            yield TableFault(key=needed, got="nothing", expected=f"a table: [{key}] needs it")
 
 
 def drives_fit_protocol(document: Document) -> Iterator[TableFault]:
@@ -139,32 +143,44 @@ def models_are_listed(document: Document) -> Iterator[TableFault]:
 
 
 def servos_have_one_driver(document: Document) -> Iterator[TableFault]:
-    """One driver knows all servos of the bus, and they can be set to its speed."""
-    named = [
-        (f"servo_bus.servos[{i}].model", row["model"])
-        for i, row in enumerate(_servos(document))
-        if isinstance(row.get("model"), str)
-    ]
-    families = {}
-    for key, model in named:
+    """One driver knows all servos of the bus, by their ids too, and can set them to its speed."""
+    protocols: dict[str, str] = {}
+    families = []
+    for i, row in enumerate(_servos(document)):
+        key, model, servo_id = f"servo_bus.servos[{i}]", row.get("model"), row.get("id")
+        if not isinstance(model, str):
+            continue
         try:
-            families[key] = family_of(model)
+            family = family_of(model)
+            if isinstance(servo_id, int):
+                family.servo(
+                    servo_id=servo_id,
+                    model_name=model,
+                    joint=str(row.get("joint")),
+                    sign=1,
+                    offset_rad=0.0,
+                    travel_per_rad=1.0,
+                )
         except UnknownModel as error:
-            yield TableFault(key=key, got=repr(model), expected=f"a model with a driver: {error}")
+            expected = f"a model with a driver: {error}"
+            yield TableFault(key=f"{key}.model", got=repr(model), expected=expected)
+            continue
+        except ValueError as error:
+            yield TableFault(key=f"{key}.id", got=repr(servo_id), expected=f"another: {error}")
+            continue
+        families.append(family)
+        protocols[f"{key}.model"] = family.facts(model).protocol
     if not families:
         return
-    first, family = next(iter(families.items()))
-    for key, other in families.items():
-        if other.name != family.name:
-            yield TableFault(
-                key=key,
-                got=f"a {other.name} servo",
-                expected=f"a {family.name} servo, as {first}: servos of a bus are of one family",
-            )
-    baud = table(document, "servo_bus").get("baud")
-    if isinstance(baud, int) and baud not in family.baud_rates:
-        rates = ", ".join(map(str, sorted(family.baud_rates)))
-        yield TableFault(key="servo_bus.baud", got=repr(baud), expected=f"one of {rates}")
+    first, protocol = next(iter(protocols.items()))
+    for key, other in protocols.items():
+        if other != protocol:
+            expected = f"one of {protocol}, as {first}: servos of a bus speak the same"
+            yield TableFault(key=key, got=f"a servo that speaks {other}", expected=expected)
+    baud, rates = table(document, "servo_bus").get("baud"), families[0].baud_rates
+    if isinstance(baud, int) and baud not in rates:
+        known = ", ".join(map(str, sorted(rates)))
+        yield TableFault(key="servo_bus.baud", got=repr(baud), expected=f"one of {known}")
 
 
 def limits_match_servos(document: Document) -> Iterator[TableFault]:

@@ -1,11 +1,13 @@
 """Talk to whatever FEETECH servos are on a bus: their ids and models are asked for."""
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
+from drivers.errors import DriverError
 from drivers.feetech.block import BLOCK_BYTES, BLOCK_START
 from drivers.feetech.codec import (
     FEETECH_BROADCAST_ID,
@@ -201,7 +203,12 @@ class FeetechBench:
             LinkLost: the adapter is gone.
         """
         self.link.write(_spec(servo), "lock", 0)
-        self.link.write(_spec(servo), "id", new_id)
+        try:
+            self.link.write(_spec(servo), "id", new_id)
+        except DriverError:
+            with suppress(DriverError):  # the first error says what is wrong
+                self.link.write(_spec(servo), "lock", 1)
+            raise
         self.link.write(replace(_spec(servo), id=new_id), "lock", 1)
 
     def bauds(self, servo: JointServo) -> Collection[int]:
@@ -307,12 +314,9 @@ class FeetechBench:
         found = {}
         for servo in map(_spec, servos):
             try:
-                present = self.link.read(servo, "present_position")
-                has_offset = "homing_offset" in servo.datasheet.registers
-                offset = self.link.read(servo, "homing_offset") if has_offset else 0
+                found[servo.id] = self.link.read(servo, "present_position")
             except (ServoSilent, CorruptReply):
                 continue
-            found[servo.id] = present + offset
         return found
 
     def read_servos(

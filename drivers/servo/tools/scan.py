@@ -73,7 +73,8 @@ class ServoScan:
             f"{self._label(one.servo_id)} is {one.model_name}, the robot file says "
             f"{self.declared[one.servo_id][1]}"
             for one in self.reports[0].servos
-            if one.servo_id in self.declared and self.declared[one.servo_id][1] != one.model_name
+            if one.servo_id in self.declared
+            and not _is_model(one.model_name, self.declared[one.servo_id][1])
         ]
         return f"{'; '.join(wrong)}; correct the robot file or the wiring" if wrong else ""
 
@@ -96,6 +97,11 @@ class ServoScan:
                 )
         asked = ", ".join(str(report.baud) for report in self.reports)
         return f"{self.port}: no servo answers at {asked} baud; check power, cable and port"
+
+
+def _is_model(found: str, declared: str) -> bool:
+    """Return whether a servo is the declared one, as far as its number tells motor and gear."""
+    return declared == found or declared.startswith(f"{found}-")
 
 
 def scan_speed(

@@ -108,10 +108,10 @@ def test_readings_are_in_units_and_errors_in_words(make_bench: MakeBench) -> Non
     assert link.hardware_error(servos[1]) == HardwareError.OVERHEATING
 
 
-def test_positions_are_the_encoders_whatever_the_homing_offset(make_bench: MakeBench) -> None:
+def test_positions_are_what_the_servos_show(make_bench: MakeBench) -> None:
     bench = make_bench(2, eeprom={2: {"homing_offset": 700}})
     link = bench.open()
-    assert link.positions([link.servo(1), link.servo(2)]) == {1: 2048, 2: 2048}
+    assert link.positions([link.servo(1), link.servo(2)]) == {1: 2048, 2: 1348}
 
 
 def test_a_model_that_is_not_known_is_refused_with_those_that_are(make_bench: MakeBench) -> None:

@@ -33,14 +33,14 @@ def state() -> BusState:
 
 @pytest.fixture
 def block(state: BusState) -> FeetechBlock:
-    return FeetechBlock([0, 1], SERVOS, [0, 10], state)
+    return FeetechBlock([0, 1], SERVOS, state)
 
 
 def test_the_usual_reply_is_taken_in_si_with_its_signs(
     block: FeetechBlock, state: BusState
 ) -> None:
     assert block.take(USUAL)
-    second = (2048 - (-12 + 10)) * STEP_RAD + 0.5
+    second = (2048 - -12) * STEP_RAD + 0.5
     assert state.position_rad == pytest.approx([100 * STEP_RAD, second])
     assert state.velocity_rad_s == pytest.approx([-50 * STEP_RAD, -100 * STEP_RAD])
     assert state.effort_ratio == pytest.approx([-0.25, -1.0])

@@ -9,6 +9,7 @@ import pytest
 from drivers.errors import DriverError, LinkLost
 from drivers.feetech.codec import FeetechInstruction
 from drivers.feetech.servo import FeetechServo
+from drivers.feetech.table import STEP_RAD
 from drivers.servo.errors import ServoFault, ServoSilent, WrongServo
 from drivers.servo.hardware_error import HardwareError
 
@@ -95,19 +96,83 @@ def test_values_are_those_of_the_shafts_on_the_joint_side(bench: Any) -> None:
     assert not state.torque_on.any()
 
 
-def test_a_servo_calibrated_by_other_software_keeps_its_homing_offset(
+def test_a_homing_offset_of_other_software_is_part_of_what_a_servo_shows(
     make_bench: MakeBench,
 ) -> None:
     bench = make_bench(2, eeprom={1: {"homing_offset": -300}, 2: {"homing_offset": 500}})
+    shaft_rad = np.array([-300, 500]) * STEP_RAD  # the middle, as LeRobot has calibrated it
+    bench.rotors.position_rad[:] = shaft_rad
+    bench.run(0.1)
     bench.bus.connect()
-    bench.rotors.position_rad[:] = [0.3, -0.2]
     bench.cycle()
-    assert bench.bus.state.position_rad == pytest.approx([0.3, 0.2 + 0.1], abs=0.002)
+    assert bench.bus.state.position_rad == pytest.approx([0.0, 0.1], abs=0.002)
     bench.bus.enable_torque()
-    bench.bus.write_goals(np.array([0.5, 0.4]))
+    bench.bus.write_goals(np.array([0.2, 0.3]))
     bench.cycle(200)
-    assert bench.bus.state.position_rad == pytest.approx([0.5, 0.4], abs=0.02)
+    assert bench.bus.state.position_rad == pytest.approx([0.2, 0.3], abs=0.02)
     assert bench.bank.register(1, "homing_offset") == -300
+
+
+def test_an_open_lock_is_closed_and_gains_are_not_burnt_in(make_bench: MakeBench) -> None:
+    bench = make_bench(1, eeprom={1: {"position_p_gain": 16, "return_delay_time": 0}})
+    link = bench.open().link
+    link.write(bench.specs[0], "lock", 0)
+    assert bench.bus.connect()[0].written == ()
+    assert bench.bank.register(1, "lock") == 1
+    link.write(bench.specs[0], "lock", 0)  # by another program, meanwhile
+    bench.bus.enable_torque()
+    assert bench.bank.register(1, "position_p_gain") == 32
+    bench.bus.reboot(1)
+    bench.run(1.0)
+    assert bench.bank.register(1, "position_p_gain") == 16
+
+
+def test_a_servo_outside_its_own_limits_is_not_armed(make_bench: MakeBench) -> None:
+    limits = {"min_position_limit": 1000, "max_position_limit": 3000}
+    bench = make_bench(2, eeprom={2: limits})
+    bench.rotors.position_rad[1] = (3500 - 2048) * STEP_RAD
+    bench.run(0.1)
+    bench.bus.connect()
+    before = bench.rotors.position_rad.copy()
+    with pytest.raises(ServoFault, match=r"stands at 3500, outside its own .* 1000\.\.3000"):
+        bench.bus.enable_torque()
+    bench.cycle(100)
+    assert np.abs(bench.rotors.position_rad - before).max() < 0.001
+    assert not bench.bus.state.torque_on.any()
+
+
+def test_torque_of_another_program_is_not_taken_for_our_own(make_bench: MakeBench) -> None:
+    bench = make_bench(2, eeprom={1: {"return_delay_time": 0}, 2: {"return_delay_time": 0}})
+    link = bench.open().link
+    for name, value in (("torque_limit", 100), ("acceleration", 20), ("torque_enable", 1)):
+        link.write(bench.specs[0], name, value)
+    bench.bus.connect()
+    assert bench.bus.state.torque_on.tolist() == [True, False]
+    assert bench.bus.state.watchdog.tolist() == [0, 0]
+    bench.bus.enable_torque()
+    assert bench.bus.state.watchdog.tolist() == [1, 1]
+    assert bench.bank.register(1, "torque_limit") == 1000
+    assert bench.bank.register(1, "acceleration") == 0
+
+
+def test_every_servo_is_looked_after_while_one_is_away(bench: Any) -> None:
+    bench.bus.enable_torque()
+    bench.bank.silence(6)
+    bench.cycle(30)
+    for servo in bench.specs[:5]:
+        bench.open().link.write(servo, "torque_enable", 0)
+    bench.cycle(250)
+    assert not bench.bus.state.torque_on[:5].any()
+
+
+def test_all_that_were_away_come_back_although_the_first_does_not(bench: Any) -> None:
+    for servo_id in (2, 3, 4, 5):
+        bench.bank.silence(servo_id)
+    bench.cycle(60)
+    for servo_id in (3, 4, 5):
+        bench.bank.silence(servo_id, silent=False)
+    bench.cycle(600)
+    assert bench.bus.state.valid.tolist() == [True, False, True, True, True, True]
 
 
 def test_one_cycle_is_one_read_and_one_write(bench: Any) -> None:
@@ -263,6 +328,8 @@ def test_scs_servos_are_read_one_by_one_high_byte_first(make_bench: MakeBench) -
     bench.bus.write_goals(np.array([0.4, 0.2]))
     bench.cycle(200)
     assert bench.bus.state.position_rad == pytest.approx([0.4, 0.2], abs=0.03)
+    assert bench.bus.limit_effort({1: 1.0}) == {}
+    assert "no torque limit" in str(bench.bus.limit_effort({1: 0.5})[1])
 
 
 def test_a_bus_that_cannot_be_is_refused(make_bench: MakeBench) -> None:

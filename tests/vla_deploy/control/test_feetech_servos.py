@@ -105,7 +105,7 @@ def test_an_overload_stops_the_robot_and_a_reset_reboots_the_servo(
         (
             'model = "STS3250", joint = "head_pan"',
             'model = "XL430-W250", joint = "head_pan"',
-            "one family",
+            "speak the same",
         ),
         (
             'model = "STS3250", joint = "head_pan"',

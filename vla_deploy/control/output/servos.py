@@ -66,7 +66,6 @@ class ServoLine:
         self._specs = servo_specs(robot)
         self._ids = [spec.id for spec in self._specs]
         self._bus: ServoBusDriver | None = None
-        self._has_watchdog = True
         self._next_open_ns = self._aged_ns = 0
         self.state = BusState.of(len(self._specs))
 
@@ -94,7 +93,6 @@ class ServoLine:
             bus.close()
             raise
         self._bus = bus
-        self._has_watchdog = bus.has_watchdog
         self.lost = False
 
     def try_reopen(self) -> bool:
@@ -137,9 +135,8 @@ class ServoLine:
 
     @property
     def unguarded(self) -> Axes:
-        """Return the servos that hold no torque under an armed watchdog, where they have one."""
-        unarmed = (self.state.watchdog <= 0) & self._has_watchdog
-        return np.flatnonzero(~self.state.torque_on | unarmed)
+        """Return the servos that hold no torque under a watchdog, or command, of this bus."""
+        return np.flatnonzero(~self.state.torque_on | (self.state.watchdog <= 0))
 
     @property
     def faulted_but_holding(self) -> list[str]:
