@@ -15,6 +15,7 @@ from drivers.dynamixel.tables.control_table import (
     VOLTAGE_UNIT_V,
 )
 from drivers.dynamixel.tools.bench import DynamixelBench
+from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
@@ -34,6 +35,7 @@ class DynamixelFamily:
     """Make Dynamixel servos and buses."""
 
     name: Final = "dynamixel"
+    highest_id: Final = MAX_SERVO_ID
 
     @property
     def models(self) -> Collection[str]:

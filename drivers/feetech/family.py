@@ -6,6 +6,7 @@ from typing import Final, cast
 from drivers.base import ByteTransport
 from drivers.clock import Clock
 from drivers.feetech.bus import FeetechBus
+from drivers.feetech.codec import FEETECH_MAX_ID
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS, FEETECH_VOLTAGE_UNIT_V
 from drivers.feetech.tools.bench import FeetechBench
@@ -26,6 +27,7 @@ class FeetechFamily:
     """Make FEETECH servos and buses."""
 
     name: Final = "feetech"
+    highest_id: Final = FEETECH_MAX_ID
 
     @property
     def models(self) -> Collection[str]:

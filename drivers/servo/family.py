@@ -46,6 +46,11 @@ class ServoFamily(Protocol):
         """Return the speeds that a servo can be set to, in bits per second."""
         ...
 
+    @property
+    def highest_id(self) -> int:
+        """Return the highest id that a servo can have; the lowest is 0."""
+        ...
+
     def facts(self, model: str) -> ServoFacts:
         """Return what control must know of a model."""
         ...

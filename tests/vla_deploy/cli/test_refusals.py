@@ -50,6 +50,8 @@ REFUSALS = [
     ("robot urdf --robot nobody", "nobody: (file): got no such file, expected a robot file, its"),
     ("servo", "vla-deploy servo: the following arguments are required: SERVO_COMMAND"),
     ("servo set-id 253 1", "expected an id in 0..252, got '253'"),
+    ("servo set-id 254 1 --family feetech", "feetech: expected an id in 0..253, got '254'"),
+    ("servo set-id -- -1 1", "expected a whole number from 0, got '-1'"),
     ("servo scan --baud 12345", "argument --baud: invalid choice"),
     ("servo scan --ids 9-3", "expected the smaller id first, got '9-3'"),
     *((f"servo monitor --rate {rate}", f"--rate: expected 0.1 to 100, got '{rate}'")

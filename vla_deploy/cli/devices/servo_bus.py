@@ -24,7 +24,6 @@ SPEEDS = tuple(
     )
 )
 """The speeds of servos that a tty offers too."""
-HIGHEST_ID = 253
 DEFAULT_BAUD = 1_000_000
 SERIAL_NAMES = ("ttyUSB*", "ttyACM*", "ttyTHS*")
 
@@ -132,6 +131,7 @@ def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
 
     Raises:
         RobotFileError: the robot file has faults.
+        UsageError: no servo of the family can have an id that they name.
     """
     is_port_alone = arguments.port is not None and arguments.robot is None
     robot = None if is_port_alone else load_robot(arguments.robot or "butler")
@@ -139,6 +139,7 @@ def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
     family = servo_family(arguments.family or FAMILIES[0])
     if bus is not None and arguments.family is None:
         family = family_of(bus.servos[0].model)
+    _require_ids(arguments, family)
     return ServoBusPort(
         port=arguments.port or Path(bus.path if bus else ""),
         baud=arguments.baud or (bus.baud if bus else DEFAULT_BAUD),
@@ -149,14 +150,24 @@ def bus_of(arguments: argparse.Namespace) -> ServoBusPort:
     )
 
 
+def _require_ids(arguments: argparse.Namespace, family: ServoFamily) -> None:
+    given = vars(arguments)
+    ids = [*(given.get("ids") or ()), *(given[key] for key in ("id", "new_id") if key in given)]
+    for one in ids:
+        if one > family.highest_id:
+            raise UsageError(
+                f"{family.name}: expected an id in 0..{family.highest_id}, got '{one}'"
+            )
+
+
 def servo_id(text: str) -> int:
-    """Read one id.
+    """Read one id; whether a servo of the bus can have it, `bus_of` says.
 
     Raises:
-        argparse.ArgumentTypeError: it is no id that a servo can have.
+        argparse.ArgumentTypeError: it is no whole number.
     """
-    if not text.isdecimal() or int(text) > HIGHEST_ID:
-        raise argparse.ArgumentTypeError(f"expected an id in 0..{HIGHEST_ID}, got {text!r}")
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
     return int(text)
 
 

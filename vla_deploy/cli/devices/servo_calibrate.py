@@ -11,7 +11,7 @@ from typing import Any, Final
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.tools.bench import ServoBench
 from drivers.servo.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
-from drivers.servo.tools.travel import PULSES_PER_REV, ServoMounting, TravelRefused
+from drivers.servo.tools.travel import PULSE_RAD, PULSES_PER_REV, ServoMounting, TravelRefused
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
     ServoBusPort,
@@ -97,6 +97,7 @@ def calibrate(
     pose = _read_pose(robot, arguments.from_pose) if arguments.from_pose else {}
     names = _chosen_joints(robot, arguments.joint or list(pose))
     joints = guided_joints(robot, names)
+    _require_turns(joints)
     _require_values(joints, pose, arguments)
     watched = answering_servos(robot, link, names)
     _release(arguments, link, watched)
@@ -207,6 +208,20 @@ def _chosen_joints(robot: RobotDescription, names: Sequence[str]) -> list[str]:
         known = ", ".join(robot.joint_names)
         raise UsageError(f"{robot.name} has no servo joint {', '.join(unknown)}; it has {known}")
     return list(names) or list(robot.joint_names)
+
+
+def _require_turns(joints: Sequence[GuidedJoint]) -> None:
+    """Check that the servos measure a whole turn in the pulses that the guide counts in.
+
+    Raises:
+        UsageError: one does not.
+    """
+    for joint in joints:
+        if joint.servo.pulse_rad != PULSE_RAD:
+            raise UsageError(
+                f"{joint.servo} does not measure a whole turn in {PULSES_PER_REV} pulses, and only "
+                "such servos can be calibrated here; write sign and offset into the robot file"
+            )
 
 
 def _require_values(

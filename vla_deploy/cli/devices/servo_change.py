@@ -118,8 +118,9 @@ def run_set_baud(arguments: argparse.Namespace) -> int:
             link.release(servo)
             link.set_baud(servo, new)
     with bus.open(new) as link:
-        for servo in servos:
-            _require_new_speed(link, bus, servo, new)
+        complaints = [_complaint(link, bus, servo, new) for servo in servos]
+    if any(complaints):
+        raise CommandFailed("; ".join(filter(None, complaints)))
     document = {"ids": [servo.id for servo in servos], "baud": new, "old_baud": bus.baud}
     return emit(arguments, document, f"{names}: {new} baud", indent=None)
 
@@ -130,17 +131,17 @@ def _require_speed(link: ServoBench, servo: JointServo, baud: int) -> None:
         raise UsageError(f"{servo}: speeds are {', '.join(map(str, sorted(bauds)))}, got {baud}")
 
 
-def _require_new_speed(link: ServoBench, bus: ServoBusPort, servo: JointServo, baud: int) -> None:
+def _complaint(link: ServoBench, bus: ServoBusPort, servo: JointServo, baud: int) -> str:
+    """Return what is wrong with a servo's new speed, "" for nothing."""
     try:
         got = link.present_baud(servo)
-    except (NoReply, ProtocolError) as error:
-        raise CommandFailed(
+    except (NoReply, ProtocolError):
+        return (
             f"{servo} took {baud} baud, but does not answer at it; the adapter may be too slow. "
             f"Find it: vla-deploy servo scan --port {bus.port}; go back: vla-deploy servo "
             f"set-baud {bus.baud} {servo.id} --port {bus.port} --baud {baud}"
-        ) from error
-    if got != baud:
-        raise CommandFailed(f"{servo}: says {got} baud, expected {baud}")
+        )
+    return "" if got == baud else f"{servo}: says {got} baud, expected {baud}"
 
 
 def run_reboot(arguments: argparse.Namespace) -> int:

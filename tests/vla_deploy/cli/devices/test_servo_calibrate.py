@@ -4,6 +4,7 @@ import argparse
 import json
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import tau
@@ -388,6 +389,17 @@ def test_a_request_that_makes_no_sense_is_refused_before_anything_is_done(
     with pytest.raises(UsageError) as caught:
         run(butler, hand, *words)
     assert complaint in str(caught.value)
+    assert hand.asked == []
+
+
+def test_a_servo_that_measures_no_whole_turn_is_refused(make_butler):
+    butler = make_butler()
+    bus = butler.robot.servo_bus
+    short = [replace(one, model="SCS0009") for one in bus.servos]
+    butler.robot = replace(butler.robot, servo_bus=replace(bus, servos=tuple(short)))
+    hand = Hand(butler)
+    with pytest.raises(UsageError, match=r"head_pan, SCS0009\) does not measure a whole turn"):
+        run(butler, hand, "--joint", "head_pan")
     assert hand.asked == []
 
 
