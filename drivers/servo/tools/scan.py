@@ -74,7 +74,7 @@ class ServoScan:
             f"{self.declared[one.servo_id][1]}"
             for one in self.reports[0].servos
             if one.servo_id in self.declared
-            and not _is_model(one.model_name, self.declared[one.servo_id][1])
+            and not is_model(one.model_name, self.declared[one.servo_id][1])
         ]
         return f"{'; '.join(wrong)}; correct the robot file or the wiring" if wrong else ""
 
@@ -99,7 +99,7 @@ class ServoScan:
         return f"{self.port}: no servo answers at {asked} baud; check power, cable and port"
 
 
-def _is_model(found: str, declared: str) -> bool:
+def is_model(found: str, declared: str) -> bool:
     """Return whether a servo is the declared one, as far as its number tells motor and gear."""
     return declared == found or declared.startswith(f"{found}-")
 

@@ -1,10 +1,7 @@
 """`vla-deploy servo calibrate`: measure the mounting of servos on joints; nothing is driven."""
 
 import argparse
-import os
-import select
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +10,7 @@ from drivers.servo.tools.bench import ServoBench
 from drivers.servo.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
 from drivers.servo.tools.travel import PULSE_RAD, PULSES_PER_REV, ServoMounting, TravelRefused
 from vla_deploy.cli.commands import add_command, emit
+from vla_deploy.cli.devices.console import Console
 from vla_deploy.cli.devices.servo_bus import (
     ServoBusPort,
     add_bus_arguments,
@@ -29,7 +27,6 @@ from vla_deploy.robots.joint_calibration import (
     guided_joints,
 )
 
-_POLL_S: Final = 0.02
 _TRIES: Final = 3
 EXAMPLES = """  vla-deploy servo calibrate --robot butler --joint left_elbow
   vla-deploy servo calibrate --robot butler --method mark --at 0
@@ -251,27 +248,3 @@ def _words(joint: GuidedJoint, after: ServoMounting) -> str:
     if after.sign != before.sign:
         sign += f" -> {after.sign:+d}"
     return f"{joint.name}: {sign}, offset {before.offset:.4f} -> {after.offset:.4f} ({change:+.4f})"
-
-
-class Console:
-    """Guide the person at the terminal, or a script at the other end of a pipe."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self._stream = sys.stderr if quiet else sys.stdout
-
-    def tell(self, text: str) -> None:
-        """Print a message."""
-        print(text, file=self._stream, flush=True)
-
-    def wait(self, text: str, meanwhile: Callable[[], None]) -> None:
-        """Print what to do and wait for Enter.
-
-        Raises:
-            CommandFailed: the input ended.
-        """
-        print(f"{text}, then press Enter", file=self._stream, flush=True)
-        while not select.select([sys.stdin], [], [], _POLL_S)[0]:
-            meanwhile()
-        while (byte := os.read(sys.stdin.fileno(), 1)) != b"\n":
-            if not byte:
-                raise CommandFailed("the input ended; what was written before stays")

@@ -109,7 +109,7 @@ def run_set_baud(arguments: argparse.Namespace) -> int:
     with bus.open() as link:
         servos = [link.servo(one, bus.joint(one)) for one in arguments.ids]
         for servo in servos:
-            _require_speed(link, servo, new)
+            require_speed(link, servo, new)
             _require_alone(link, bus, servo.id)
         names = ", ".join(map(str, servos))
         torque = _torque_question(link, servos)
@@ -125,7 +125,12 @@ def run_set_baud(arguments: argparse.Namespace) -> int:
     return emit(arguments, document, f"{names}: {new} baud", indent=None)
 
 
-def _require_speed(link: ServoBench, servo: JointServo, baud: int) -> None:
+def require_speed(link: ServoBench, servo: JointServo, baud: int) -> None:
+    """Check that a servo can be set to a speed.
+
+    Raises:
+        UsageError: it cannot.
+    """
     bauds = link.bauds(servo)
     if baud not in bauds:
         raise UsageError(f"{servo}: speeds are {', '.join(map(str, sorted(bauds)))}, got {baud}")

@@ -59,7 +59,7 @@ def run_scan(arguments: argparse.Namespace) -> int:
     progress = ProgressLine(quiet=arguments.json)
     reports = []
     try:
-        for baud in _speeds(bus):
+        for baud in speeds_to_ask(bus):
             with bus.open(baud) as link:
                 reports.append(scan_speed(link, arguments.ids, progress))
             if bus.is_pseudo_terminal and reports[-1].servos:
@@ -78,7 +78,8 @@ def run_scan(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _speeds(bus: ServoBusPort) -> Sequence[int]:
+def speeds_to_ask(bus: ServoBusPort) -> Sequence[int]:
+    """Return the speeds at which servos are looked for, the bus' own first."""
     if bus.baud_given:
         return (bus.baud,)
     return (bus.baud, *(speed for speed in bus.speeds if speed != bus.baud))
