@@ -13,6 +13,7 @@ from sim_twin.harness.lockstep_stack import LockstepControl
 from sim_twin.harness.processes import armed_processes
 from vla_deploy.ipc import topics
 from vla_deploy.planning.node import PlannerNode
+from vla_deploy.robots import load_robot
 from vla_deploy.skills.node import ExecutorNode
 
 
@@ -118,10 +119,13 @@ class Talking:
         return ends[-1]
 
 
-def test_words_move_its_hand_and_what_it_lacks_is_named(arm: LockstepControl) -> None:
+def test_words_move_it_and_what_it_lacks_is_named(arm: LockstepControl) -> None:
+    talking = Talking(arm)
+    ended = talking.say("tuck your arm")
+    assert ended.get("success"), ended
+    assert positions(arm) == pytest.approx(arm.robot.poses["folded"], abs=0.06)
     arm.go(arm.robot.poses["ready"])
     arm.lockstep.run_for(3.0)
-    talking = Talking(arm)
     assert talking.say("open the gripper")["success"]
     wide = positions(arm)["gripper"]
     assert talking.say("close the gripper")["success"]
@@ -146,5 +150,10 @@ def test_its_processes_are_those_that_it_has_use_for(
         moved = run.ask("joint", "move", "shoulder_pan", "--to", "0.5")
         assert moved.returncode == 0, moved.stderr
         assert run.truth()["joints"]["shoulder_pan"]["position"] == pytest.approx(0.5, abs=0.02)
+        ended = run.say("go to the ready pose")
+        assert ended.get("success"), ended
+        assert run.truth()["joints"]["elbow_flex"]["position"] == pytest.approx(
+            load_robot("so101").poses["ready"]["elbow_flex"], abs=0.06
+        )
         assert run.say("open the gripper")["success"]
         assert run.say("drive forward one metre")["error"] == "so101 has no base"

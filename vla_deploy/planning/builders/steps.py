@@ -32,11 +32,11 @@ DEFAULT_WAIT_S: Final = 5.0
 # "Go back" alone is about the command before; in a longer one it is about where that began.
 MOST_WORDS_ALONE: Final = 4
 _SPEAKERS: Final = frozenset({"me", "us", "here", "over here"})
-# What poses are called besides their names in robot files.
-_POSES: Final[Mapping[str, str]] = {
-    "tucked": "tuck", "fold": "tuck", "folded": "tuck", "stow": "tuck", "pull": "tuck",
-    "resting": "rest", "relax": "rest", "lower": "rest",
-}  # fmt: skip
+# Words for the same pose; which of them a robot's own is called, its file says.
+_SAME_POSE: Final = (
+    frozenset({"tuck", "tucked", "fold", "folded", "stow", "pull"}),
+    frozenset({"rest", "resting", "relax", "lower"}),
+)
 _DIRECTIONS: Final = {"straight ahead": "ahead", "floor": "down", "ceiling": "up"}
 _RELATIONS: Final[Mapping[str, str]] = {
     "in": "in", "into": "in", "inside": "in", "on": "on", "onto": "on", "on top of": "on",
@@ -243,8 +243,11 @@ def _arm(step: Step) -> dict[str, str]:
     return {"arm": step["arm"]} if "arm" in step else {}
 
 
-def _pose(_spoken: Steps, step: Step) -> list[Skill]:
-    name = _POSES.get(step["name"], step["name"].replace(" ", "_"))
+def _pose(spoken: Steps, step: Step) -> list[Skill]:
+    said = step["name"].replace(" ", "_")
+    same = next((words for words in _SAME_POSE if said in words), frozenset())
+    poses = spoken.request.world.poses
+    name = said if said in poses else next(iter(sorted(same & poses)), said)
     return [("move_arm", {"pose": name, **_arm(step)})]
 
 

@@ -46,6 +46,10 @@ _VERBS: Final = (
 )
 FILLERS: Final = frozenset(f"{_SMALL} {_COURTESY} {_VERBS}".split())
 """They say nothing that a step could leave out; what changes a command's scope is none of them."""
+_SAID_BY_STEP: Final[Mapping[str, frozenset[str]]] = {
+    "pose": frozenset({"arm", "arms", "pose", "position", "posture"}),
+}
+"""Words that a step says by what it does, without a copy of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,13 +84,18 @@ def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection
         jumps += span.jumps if span is not None else int(value not in IMPLIED) * len(words)
     rest = [word for at, word in enumerate(command) if at not in used]
     is_corrected = any(word in _TAKEN_BACK for word in rest)
+    said = copied.union(
+        FILLERS,
+        *(_SAID_BY_STEP.get(step["do"], ()) for step in steps),
+        (step["arm"] for step in steps if "arm" in step),
+    )
     return Oddities(
         strange=sum(word not in known and not word.isdecimal() for word in rest),
         left_out=0
         if is_corrected
         else sum(word in _TELLING and word not in copied for word in rest),
         jumps=0 if is_corrected else jumps,
-        uncovered=tuple(word for word in rest if word not in FILLERS | copied),
+        uncovered=tuple(word for word in rest if word not in said),
     )
 
 

@@ -42,9 +42,13 @@ def leave_underside(context: SkillContext) -> Skill:
 def way_back_m(context: SkillContext) -> float:
     """Return how far back the base has to go for its arms to be free, 0 where they are.
 
+    It is 0, too, for a robot without a base, which never gets under furniture by itself.
+
     Raises:
         NotPossible: nothing within `FARTHEST_BACK_M` frees them.
     """
+    if context.robot.parts.base is None:
+        return 0.0
     pose, parts = context.link.pose, list(_low_parts(context))
     hands: list[str] = []
     for step in range(round(FARTHEST_BACK_M / STEP_BACK_M) + 1):

@@ -60,6 +60,24 @@ def test_a_step_becomes_actions_in_the_speakers_words(
 
 
 @pytest.mark.parametrize(
+    ("name", "poses", "pose"),
+    [
+        ("fold", {"tuck", "rest"}, "tuck"),
+        ("fold", {"folded", "rest"}, "folded"),
+        ("folded", {"folded", "tuck"}, "folded"),
+        ("look ahead", {"look_ahead"}, "look_ahead"),
+        ("dance", {"rest"}, "dance"),
+    ],
+)
+def test_a_pose_is_the_one_that_the_robot_has(name: str, poses: set[str], pose: str) -> None:
+    world = replace(WORLD, poses=frozenset(poses))
+    request = PlanRequest(command_id="c", text=name, world=world, here=HERE)
+    assert planned(name, {"do": "pose", "name": name}, request=request) == [
+        ("move_arm", {"pose": pose})
+    ]
+
+
+@pytest.mark.parametrize(
     ("to", "skills"),
     [
         ({}, [("hand_over", {"object": "bottle"})]),

@@ -53,9 +53,12 @@ PICK = {"do": "pick", "what": "red cup"}
          {"count": 0}),
         ("put the red cup in the box",
          {"do": "put", "what": "red box", "where": "box", "how": "in"}, {"jumps": 2}),
+        ("move the left arm to the ready pose", {"do": "pose", "name": "ready", "arm": "left"},
+         {"uncovered": ()}),
     ],
     ids=["plain", "neither copied nor a filler", "a new word that is copied",
-         "a word never shown", "a colour left out", "taken back", "two things as one"],
+         "a word never shown", "a colour left out", "taken back", "two things as one",
+         "what a pose is called by"],
 )  # fmt: skip
 def test_what_is_odd_is_counted(
     command: str, step: dict[str, str], oddities: dict[str, object]
