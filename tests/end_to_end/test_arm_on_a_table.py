@@ -130,6 +130,7 @@ def test_words_move_it_and_what_it_lacks_is_named(arm: LockstepControl) -> None:
     wide = positions(arm)["gripper"]
     assert talking.say("close the gripper")["success"]
     assert wide - positions(arm)["gripper"] > 1.5
+    assert talking.say("wait one second and then stop")["success"]
     for text, part in (("turn left", "base"), ("look down", "camera and no head")):
         assert f"so101 has no {part}" in str(talking.say(text)), text
     assert "I know of none" in str(talking.say("go to the kitchen"))

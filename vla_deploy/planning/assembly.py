@@ -23,6 +23,7 @@ from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.planner import Planner, checked
+from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.one_line import one_line
 
@@ -79,7 +80,7 @@ def open_planner(
 
 
 def _shape(robot: RobotDescription) -> type[PlanAnswer]:
-    return answer_for(sorted(robot.places), sorted(robot.devices))
+    return answer_for(sorted(robot.places), sorted(robot.devices), world_of(robot, {}).skills)
 
 
 def open_local_models(

@@ -8,6 +8,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
+from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
@@ -75,7 +76,7 @@ class World:
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
     known. `is_free` returns whether the base fits on a point of the map; None means that no map is
     at hand. A gripper opens `opening_max_m` wide, None where that is not known. The robot charges
-    at the place `station`, where it has one.
+    at the place `station`, where it has one. `skills` are those that its body is able to.
     """
 
     places: Mapping[str, str]
@@ -93,6 +94,7 @@ class World:
     devices: Mapping[str, str] = field(default_factory=dict)
     devices_on: Mapping[str, bool] = field(default_factory=dict)
     device_kinds: Mapping[str, DeviceKind] = field(default_factory=dict)
+    skills: frozenset[str] = frozenset(SKILLS)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -214,4 +216,19 @@ def world_of(
         devices=spoken_devices(robot),
         devices_on=devices_on,
         device_kinds={name: one.kind for name, one in robot.devices.items()},
+        skills=_skills_of(robot),
+    )
+
+
+def _skills_of(robot: RobotDescription) -> frozenset[str]:
+    """Return the skills for which the robot has all parts; every robot can stop what it has."""
+    parts = {
+        *robot.groups,
+        "speaker",  # without one it shows what it would say
+        *(("camera",) if robot.parts.camera else ()),
+        *(("arm", "arms") if robot.hands else ()),
+        *(("device",) if robot.devices else ()),
+    }
+    return frozenset(
+        name for name, spec in SKILLS.items() if name == "stop" or parts.issuperset(spec.resources)
     )

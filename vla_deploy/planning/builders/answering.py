@@ -20,10 +20,18 @@ from vla_deploy.world.thing import FLOOR
 Fields = Mapping[str, str]
 MOST_TOLD = 6
 READY = "I am ready for a command."
-ABILITIES = (
-    "I can go to places, look for things, pick them up, put them in the box or on a table, "
-    "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
+ABILITIES: Final = (
+    ("navigate_to", "go to places"),
+    ("find_object", "look for things and tell you what I see"),
+    ("pick_up", "pick things up and put them in the box or on a table"),
+    ("hand_over", "bring them to you"),
+    ("place", "tidy up"),
+    ("move_arm", "bring my arm to a pose"),
+    ("open_gripper", "open and close my hand"),
+    ("turn_on", "switch lamps and sockets"),
+    ("stop", "stand still when you tell me to"),
 )
+"""What each skill is good for, where the robot has it."""
 
 
 def _tell_sight(fields: Fields, request: PlanRequest) -> list[Skill]:
@@ -150,7 +158,9 @@ ANSWERS: Final[Mapping[str, Callable[[Fields, PlanRequest], list[Skill]]]] = {
     "whether": _tell_whether,
     "device": _tell_devices,
     "doing": _tell_doing,
-    "able": lambda _fields, _request: _say(ABILITIES),
+    "able": lambda _, request: _say(
+        f"I can {listed([text for skill, text in ABILITIES if skill in request.world.skills])}."
+    ),
     # One that may not move refuses every plan before.
     "ready": lambda _fields, _request: _say(READY),
     "thanks": lambda _fields, _request: _say("You are welcome."),

@@ -1,6 +1,6 @@
 """Define the answer that a chat model gives to a command, and its JSON Schema for a robot."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
@@ -56,8 +56,10 @@ class PlanAnswer(BaseModel):
         return parse_plan({"goal": goal, "reasoning": self.reasoning, "actions": actions})
 
 
-def answer_for(places: Sequence[str], devices: Sequence[str] = ()) -> type[PlanAnswer]:
-    """Return the shape of answers for a robot that knows these places and devices of the home.
+def answer_for(
+    places: Sequence[str], devices: Sequence[str] = (), skills: Collection[str] = SKILLS
+) -> type[PlanAnswer]:
+    """Return the shape of answers for a robot with these skills, places, and devices of the home.
 
     Each step is a skill with its parameters next to it; places and devices are enumerations, and a
     parameter that may be left out may be null.
@@ -66,7 +68,7 @@ def answer_for(places: Sequence[str], devices: Sequence[str] = ()) -> type[PlanA
     forms = [
         form
         for name, spec in SKILLS.items()
-        if devices or name not in SWITCHING
+        if name in skills and (devices or name not in SWITCHING)
         for form in _forms(name, spec, names)
     ]
     schema = {"type": "array", "maxItems": _MOST_ASKED, "items": {"anyOf": forms}}

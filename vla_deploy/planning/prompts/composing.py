@@ -14,7 +14,7 @@ from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.model_servers.chat import Chat, ChatMessage
 from vla_deploy.planning.interfaces import ActionNote, PlanRequest
 from vla_deploy.planning.understanding import ConversationTurn
-from vla_deploy.plans.catalogue import SKILLS, SWITCHING
+from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.access import GRIP_HEIGHTS_M, REACH_M
@@ -32,10 +32,7 @@ def chat_for(request: PlanRequest, robot: str, room: int = ROOM, jpeg: bytes | N
     extra = [*(("scene_analysis",) if jpeg else ()), *(("recovery",) if request.failed else ())]
     fields = {
         "robot": plain(robot),
-        "skills": skills_in_words(
-            has_hands=request.world.opening_max_m is not None,
-            has_devices=bool(request.world.devices),
-        ),
+        "skills": skills_in_words(request.world.skills),
         "limits": "\n".join(f"- {one}" for one in limits(request.world)),
     }
     system = "\n\n".join(filled(part, **fields) for part in ("plan", "safety", *extra))
@@ -59,19 +56,23 @@ def _template(name: str) -> Template:
 
 
 @cache
-def skills_in_words(*, has_hands: bool, has_devices: bool) -> str:
-    """Return every skill of a robot on a line: its name, its parameters, what it does."""
+def skills_in_words(skills: frozenset[str]) -> str:
+    """Return skills, each on a line: its name, its parameters, what it does."""
     return "\n".join(
         f"- {name}({', '.join(spec.parameters)}): {spec.summary}"
         for name, spec in SKILLS.items()
-        if (has_hands or "arm" not in spec.parameters) and (has_devices or name not in SWITCHING)
+        if name in skills
     )
 
 
 def limits(world: World) -> Iterator[str]:
     """Yield what bounds a plan for this robot: how it moves, what it reaches and carries."""
     speed = "" if world.max_speed_m_s is None else f", at most {world.max_speed_m_s:g} m/s"
-    yield f"it drives on wheels, on one level floor{speed}; no stairs, steps, thresholds or ramps"
+    if "move" in world.skills:
+        way = f"on wheels, on one level floor{speed}"
+        yield f"it drives {way}; no stairs, steps, thresholds or ramps"
+    else:
+        yield "it stays where it stands, and cannot drive"
     if world.footprint_radius_m:
         yield f"it needs a way {2 * world.footprint_radius_m:.2f} m wide, and opens no doors"
     yield f"it recognises these kinds of things: {', '.join(OBJECT_CLASSES)}"

@@ -161,3 +161,12 @@ def test_what_cannot_be_done_is_refused_with_its_reason(step: Step, error: type[
 def test_one_step_that_is_none_leaves_no_plan_at_all() -> None:
     with pytest.raises(CannotBeDone):
         planned("go home and fly", {"do": "go", "where": "home"}, {"do": "impossible"})
+
+
+def test_what_it_can_do_is_what_its_body_can() -> None:
+    world = world_of(load_robot("so101"), {})
+    request = PlanRequest(command_id="c", text="what can you do", world=world)
+    assert planned("what can you do", {"do": "ask", "about": "able"}, request=request) == [
+        ("speak", {"text": "I can bring my arm to a pose, open and close my hand and stand still "
+                           "when you tell me to."})
+    ]  # fmt: skip
