@@ -26,6 +26,7 @@ from drivers.errors import DriverError
 from drivers.servo.counters import BusCounters
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.journal import BusJournal
+from drivers.servo.members import BusMembers
 from drivers.servo.state import BusState
 
 
@@ -61,13 +62,12 @@ class DynamixelBus:
         Raises:
             ValueError: no servo, an id or joint twice, or the watchdog time is out of range.
         """
-        _check_servos(servos)
+        self._members = BusMembers(servos)
         self.servos = tuple(servos)
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
         self.journal = BusJournal(self.servos, self.state, fault_policy or FaultPolicy())
         self._guard = WatchdogGuard()
-        self._by_id = {servo.id: index for index, servo in enumerate(servos)}
         self._watchdog_s = watchdog_s
         self._watchdog_units = watchdog_units(watchdog_s)
         self._hold_gains = dict(hold_gains or {})
@@ -190,7 +190,7 @@ class DynamixelBus:
             Rejected: a servo refuses a gain, or (NotKept) a step.
             LinkLost: the adapter is gone.
         """
-        chosen = self._chosen(ids)
+        chosen = self._members.chosen(ids)
         for index in chosen:
             for name, gain in self._hold_gains.items():
                 self._registers.write(self.servos[index], name, gain)
@@ -210,7 +210,7 @@ class DynamixelBus:
         Raises:
             LinkLost: the adapter is gone; armed watchdogs stop the servos.
         """
-        chosen = self._chosen(ids)
+        chosen = self._members.chosen(ids)
         failures = disable_torque(self._registers, [self.servos[index] for index in chosen])
         for index in chosen:
             self.state.torque_on[index] = self.servos[index].id in failures
@@ -238,7 +238,12 @@ class DynamixelBus:
             NotKept: a servo refuses.
             LinkLost: the adapter is gone.
         """
-        write_kept(self._registers, "bus_watchdog", self.servos, dict.fromkeys(self._by_id, 0))
+        write_kept(
+            self._registers,
+            "bus_watchdog",
+            self.servos,
+            dict.fromkeys((servo.id for servo in self.servos), 0),
+        )
         self.state.watchdog[:] = 0
         self._forget_status()
         self._guard.note(WatchdogEvent.CLEAR)
@@ -251,7 +256,7 @@ class DynamixelBus:
             ServoSilent: it does not answer.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         self._registers.reboot(self.servos[index])
         self.state.torque_on[index] = False
         self.state.watchdog[index] = 0
@@ -278,7 +283,7 @@ class DynamixelBus:
             Rejected: the servo refuses.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         return self._registers.read(self.servos[index], name)
 
     def write_register(self, servo_id: int, name: str, value: int) -> None:
@@ -292,7 +297,7 @@ class DynamixelBus:
             ServoSilent: no answer.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         self._registers.write(self.servos[index], name, value)
 
     # --- inside -------------------------------------------------------------------------------
@@ -302,27 +307,6 @@ class DynamixelBus:
             raise DriverError("the servo bus is not connected; call connect() first")
         return self._cycle
 
-    def _chosen(self, ids: Sequence[int] | None) -> list[int]:
-        if ids is None:
-            return list(range(len(self.servos)))
-        unknown = sorted(set(ids) - set(self._by_id))
-        if unknown:
-            raise ValueError(f"no servo {unknown} on this bus; it has {sorted(self._by_id)}")
-        return [self._by_id[servo_id] for servo_id in ids]
-
     def _forget_status(self) -> None:
         if self._cycle is not None:
             self._cycle.forget_status()
-
-
-def _check_servos(servos: Sequence[ServoSpec]) -> None:
-    if not servos:
-        raise ValueError("a servo bus needs at least one servo, got none")
-    _check_unique("id", [str(servo.id) for servo in servos])
-    _check_unique("joint", [servo.joint for servo in servos])
-
-
-def _check_unique(what: str, values: list[str]) -> None:
-    twice = sorted({value for value in values if values.count(value) > 1})
-    if twice:
-        raise ValueError(f"each servo needs its own {what}, got twice: {', '.join(twice)}")

@@ -21,6 +21,7 @@ from drivers.dynamixel.wire.codec import (
 )
 from drivers.dynamixel.wire.link import PacketLink
 from drivers.errors import DriverError, LinkLost
+from drivers.servo.members import require_goals
 from drivers.servo.patience import ReplyPatience
 
 _GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
@@ -77,7 +78,7 @@ class GoalWriter:
         """
         goals = position_rad.tolist()
         if len(goals) != len(self._joints) or not isfinite(sum(goals)):
-            self._check(position_rad)
+            require_goals(self._joints, position_rad)
         pulses = position_rad * self._pulses_per
         np.add(pulses, self._pulse_at_zero, pulses)
         np.rint(pulses, pulses)
@@ -122,14 +123,6 @@ class GoalWriter:
                 f"{self._servos[servo_id]}: PWM ratio must be within 0..1, got {ratio}"
             )
         return min(round(ratio * PWM_FULL), self._pwm_limit[servo_id])
-
-    def _check(self, position_rad: Floats) -> None:
-        if position_rad.shape != (len(self._joints),):
-            raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
-        finite = np.isfinite(position_rad)
-        bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
-        if bad:
-            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
 
 
 class GoalFrame:

@@ -18,6 +18,7 @@ from drivers.feetech.torque import switch_torque_off, switch_torque_on
 from drivers.servo.counters import BusCounters
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.journal import BusJournal
+from drivers.servo.members import BusMembers
 from drivers.servo.state import BusState
 
 
@@ -52,12 +53,12 @@ class FeetechBus:
         Raises:
             ValueError: no servo, an id or joint twice, or servos of both byte orders.
         """
-        _check_members(servos)
+        self._members = BusMembers(servos)
+        _check_byte_order(servos)
         self.servos = tuple(servos)
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
         self.journal = BusJournal(self.servos, self.state, fault_policy or FaultPolicy())
-        self._by_id = {servo.id: index for index, servo in enumerate(servos)}
         self._margin_s = reply_margin_s
         self._health_every_cycles = health_every_cycles
         self._link = FeetechLink(transport, clock, baud, self.counters)
@@ -154,7 +155,7 @@ class FeetechBus:
             LinkLost: the adapter is gone.
         """
         cycle = self._connected()
-        chosen = self._chosen(ids)
+        chosen = self._members.chosen(ids)
         servos, setups = [self.servos[n] for n in chosen], [self._setups[n] for n in chosen]
         switch_torque_on(self._link, servos, setups)
         for index in chosen:
@@ -168,7 +169,7 @@ class FeetechBus:
         Raises:
             LinkLost: the adapter is gone; the servos keep their torque.
         """
-        chosen = self._chosen(ids)
+        chosen = self._members.chosen(ids)
         failures = switch_torque_off(self._link, [self.servos[index] for index in chosen])
         for index in chosen:
             self.state.torque_on[index] = self.servos[index].id in failures
@@ -185,7 +186,7 @@ class FeetechBus:
             ValueError: no such servo.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         self._link.send(encode_packet(servo_id, FeetechInstruction.REBOOT))
         self.state.torque_on[index] = False
         self.state.watchdog[index] = 0
@@ -211,7 +212,7 @@ class FeetechBus:
             ServoSilent: no answer.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         return self._link.read(self.servos[index], name)
 
     def write_register(self, servo_id: int, name: str, value: int) -> None:
@@ -224,7 +225,7 @@ class FeetechBus:
             ServoSilent: no answer.
             LinkLost: the adapter is gone.
         """
-        (index,) = self._chosen([servo_id])
+        (index,) = self._members.chosen([servo_id])
         self._link.write(self.servos[index], name, value)
 
     # --- inside -------------------------------------------------------------------------------
@@ -234,22 +235,8 @@ class FeetechBus:
             raise DriverError("the servo bus is not connected; call connect() first")
         return self._cycle
 
-    def _chosen(self, ids: Sequence[int] | None) -> list[int]:
-        if ids is None:
-            return list(range(len(self.servos)))
-        unknown = sorted(set(ids) - set(self._by_id))
-        if unknown:
-            raise ValueError(f"no servo {unknown} on this bus; it has {sorted(self._by_id)}")
-        return [self._by_id[servo_id] for servo_id in ids]
 
-
-def _check_members(servos: Sequence[FeetechServo]) -> None:
-    if not servos:
-        raise ValueError("a servo bus needs at least one servo, got none")
-    for what in ("id", "joint"):
-        values = [str(getattr(servo, what)) for servo in servos]
-        if twice := sorted({value for value in values if values.count(value) > 1}):
-            raise ValueError(f"each servo needs its own {what}, got twice: {', '.join(twice)}")
+def _check_byte_order(servos: Sequence[FeetechServo]) -> None:
     orders = {servo.datasheet.byte_order for servo in servos}
     if len(orders) > 1:
         raise ValueError(

@@ -19,6 +19,7 @@ from drivers.feetech.link import FeetechLink
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.settings import FeetechSetup
 from drivers.feetech.table import LOAD_FULL
+from drivers.servo.members import require_goals
 from drivers.servo.patience import ReplyPatience
 
 _FIRST_RECORD: Final = len(FEETECH_HEADER) + 5  # id, length, instruction, address, size
@@ -80,7 +81,7 @@ class FeetechGoals:
         """
         goals = position_rad.tolist()
         if len(goals) != len(self._per_joint) or not isfinite(sum(goals)):
-            self._check(position_rad)
+            require_goals(self._joints, position_rad)
         frame, place = self._frame, _FIRST_RECORD
         for row, (goal, (zero, pulses_per, least, most)) in enumerate(
             zip(goals, self._per_joint, strict=True)
@@ -133,11 +134,3 @@ class FeetechGoals:
                 f"{self._servos[servo_id]}: effort ratio must be within 0..1, got {ratio}"
             )
         return min(round(ratio * LOAD_FULL), self._limits[servo_id])
-
-    def _check(self, position_rad: Floats) -> None:
-        if position_rad.shape != (len(self._joints),):
-            raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
-        finite = np.isfinite(position_rad)
-        bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
-        if bad:
-            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final, cast
 
 from drivers.base import ByteTransport
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import (
     BAUD_RATES,
@@ -25,7 +25,7 @@ from drivers.dynamixel.wire.codec import (
 from drivers.dynamixel.wire.link import PacketLink
 from drivers.dynamixel.wire.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.servo.counters import BusCounters
-from drivers.servo.errors import ServoSilent, WrongServo
+from drivers.servo.errors import WrongServo
 from drivers.servo.fault_policy import describe_bits
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
@@ -36,11 +36,10 @@ from drivers.servo.tools.bench import (
     Keep,
     RegisterValue,
     ServoReading,
+    await_boot,
 )
 
 PING_ANSWER_BYTES: Final = 3
-_BOOT_PATIENCE_S: Final = 3.0
-_BOOT_POLL_S: Final = 0.05
 _SLOT_S: Final = 0.003
 """The longest that each servo's turn to answer a broadcast ping takes, its bytes left out."""
 _PROBES: Final = 3
@@ -338,14 +337,7 @@ class DynamixelBench:
             ServoSilent: it does not come back within 3 s.
             LinkLost: the adapter is gone.
         """
-        end_ns = self._clock.now_ns() + round(_BOOT_PATIENCE_S * NS_PER_S)
-        while True:
-            self._clock.sleep_until(self._clock.now_ns() + round(_BOOT_POLL_S * NS_PER_S))
-            try:
-                return self.ping(servo_id, ONE_TRY)
-            except ServoSilent:
-                if self._clock.now_ns() > end_ns:
-                    raise
+        return await_boot(self, self._clock, servo_id)
 
     def listen(
         self, servo_id: int, instruction: Instruction, params: bytes, answer_bytes: int

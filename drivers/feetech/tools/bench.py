@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from drivers.base import ByteTransport
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from drivers.errors import DriverError
 from drivers.feetech.block import BLOCK_BYTES, BLOCK_START
 from drivers.feetech.codec import (
@@ -39,12 +39,11 @@ from drivers.servo.tools.bench import (
     Keep,
     RegisterValue,
     ServoReading,
+    await_boot,
 )
 
 _SLOT_S: Final = 0.003
 """The longest that each servo's turn to answer a broadcast ping takes, its bytes left out."""
-_BOOT_PATIENCE_S: Final = 3.0
-_BOOT_POLL_S: Final = 0.05
 _PROBES: Final = 3
 _HEAD_BYTES: Final = 5  # firmware .. model number
 _MOST_AT_ONCE: Final = 40
@@ -275,14 +274,7 @@ class FeetechBench:
             ServoSilent: it does not come back within 3 s.
             LinkLost: the adapter is gone.
         """
-        end_ns = self._clock.now_ns() + round(_BOOT_PATIENCE_S * NS_PER_S)
-        while True:
-            self._clock.sleep_until(self._clock.now_ns() + round(_BOOT_POLL_S * NS_PER_S))
-            try:
-                return self.ping(servo_id, ONE_TRY)
-            except ServoSilent:
-                if self._clock.now_ns() > end_ns:
-                    raise
+        return await_boot(self, self._clock, servo_id)
 
     def registers(self, servo: JointServo) -> list[RegisterValue]:
         """Return every register of a servo, by address.

@@ -5,12 +5,16 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
+from drivers.clock import NS_PER_S, Clock
 from drivers.servo.counters import BusCounters
+from drivers.servo.errors import ServoSilent
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
 
 ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)
 THREE_TRIES: Final = ReplyPatience(margin_s=0.02, attempts=3)
+_BOOT_PATIENCE_S: Final = 3.0
+_BOOT_POLL_S: Final = 0.05
 
 
 class Keep(Enum):
@@ -180,3 +184,20 @@ class ServoBench(Protocol):
     ) -> list[ServoReading]:
         """Return the readings of the servos that answer; `joints` names joints by servo id."""
         ...
+
+
+def await_boot(bench: ServoBench, clock: Clock, servo_id: int) -> FoundServo:
+    """Ping until a restarted servo answers.
+
+    Raises:
+        ServoSilent: it does not come back within 3 s.
+        LinkLost: the adapter is gone.
+    """
+    end_ns = clock.now_ns() + round(_BOOT_PATIENCE_S * NS_PER_S)
+    while True:
+        clock.sleep_until(clock.now_ns() + round(_BOOT_POLL_S * NS_PER_S))
+        try:
+            return bench.ping(servo_id, ONE_TRY)
+        except ServoSilent:
+            if clock.now_ns() > end_ns:
+                raise

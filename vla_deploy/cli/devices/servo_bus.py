@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -158,6 +158,19 @@ def _require_ids(arguments: argparse.Namespace, family: ServoFamily) -> None:
             raise UsageError(
                 f"{family.name}: expected an id in 0..{family.highest_id}, got '{one}'"
             )
+
+
+def chosen_joints(robot: RobotDescription, names: Sequence[str]) -> list[str]:
+    """Return the named joints, all of them when none is named.
+
+    Raises:
+        UsageError: the robot has no such joint.
+    """
+    unknown = [name for name in names if name not in robot.joint_index]
+    if unknown:
+        known = ", ".join(robot.joint_names)
+        raise UsageError(f"{robot.name} has no servo joint {', '.join(unknown)}; it has {known}")
+    return list(names) or list(robot.joint_names)
 
 
 def servo_id(text: str) -> int:

@@ -16,6 +16,7 @@ from vla_deploy.cli.devices.servo_bus import (
     add_bus_arguments,
     add_yes_argument,
     bus_of,
+    chosen_joints,
     confirm,
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -92,7 +93,7 @@ def calibrate(
         DriverError: a servo is silent, or the bus is lost.
     """
     pose = _read_pose(robot, arguments.from_pose) if arguments.from_pose else {}
-    names = _chosen_joints(robot, arguments.joint or list(pose))
+    names = chosen_joints(robot, arguments.joint or list(pose))
     joints = guided_joints(robot, names)
     _require_turns(joints)
     _require_values(joints, pose, arguments)
@@ -192,19 +193,6 @@ def _read_pose(robot: RobotDescription, text: str) -> dict[str, float]:
         if not equals:
             raise UsageError(f"--from-pose {text}: expected joint=value, got {part!r}")
     return values
-
-
-def _chosen_joints(robot: RobotDescription, names: Sequence[str]) -> list[str]:
-    """Return the named joints, all of them when none is named.
-
-    Raises:
-        UsageError: the robot has no such joint.
-    """
-    unknown = [name for name in names if name not in robot.joint_index]
-    if unknown:
-        known = ", ".join(robot.joint_names)
-        raise UsageError(f"{robot.name} has no servo joint {', '.join(unknown)}; it has {known}")
-    return list(names) or list(robot.joint_names)
 
 
 def _require_turns(joints: Sequence[GuidedJoint]) -> None:

@@ -15,6 +15,7 @@ from vla_deploy.cli.devices.servo_bus import (
     add_bus_arguments,
     add_yes_argument,
     bus_of,
+    chosen_joints,
     confirm,
 )
 from vla_deploy.cli.devices.servo_change import require_speed
@@ -85,17 +86,14 @@ def set_up(
     return 0
 
 
-def _chosen(robot: RobotDescription, joints: Collection[str]) -> Sequence[Servo]:
+def _chosen(robot: RobotDescription, joints: Sequence[str]) -> Sequence[Servo]:
     """Return the servos to set up, the highest id first: a new servo has a low one.
 
     Raises:
         UsageError: the robot has no such joint.
     """
-    unknown = [name for name in joints if name not in robot.joint_index]
-    if unknown:
-        known = ", ".join(robot.joint_names)
-        raise UsageError(f"{robot.name} has no servo joint {', '.join(unknown)}; it has {known}")
-    chosen = [one for one in robot.servo_bus.servos if not joints or one.joint in joints]
+    names = chosen_joints(robot, joints)
+    chosen = [one for one in robot.servo_bus.servos if one.joint in names]
     return sorted(chosen, key=lambda one: one.id, reverse=True)
 
 
