@@ -14,7 +14,6 @@ from vla_deploy.plans.knowledge import spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Place
 from vla_deploy.world import Body
-from vla_deploy.world.access import REACH_M
 
 # A thing is taken before the shoulder of the hand that takes it.
 SIDE_M: Final = 0.12
@@ -28,6 +27,7 @@ class Arms:
 
     def __init__(self, robot: RobotDescription) -> None:
         self._arms = {name: ArmKinematics(robot, name) for name in robot.hands}
+        self._distances_m = robot.parts.reach.distances_m if robot.parts.reach else ()
         self._seed = 0.5 * (robot.position_min + robot.position_max)
         self._answered = cache(self._reaches)
 
@@ -36,7 +36,7 @@ class Arms:
         return self._answered(hand, round(height_m / _HEIGHT_STEP_M))
 
     def _reaches(self, hand: str, step: int) -> bool:
-        return any(self._solves(hand, reach_m, step * _HEIGHT_STEP_M) for reach_m in REACH_M)
+        return any(self._solves(hand, one_m, step * _HEIGHT_STEP_M) for one_m in self._distances_m)
 
     def _solves(self, hand: str, reach_m: float, height_m: float) -> bool:
         aside_m = _SIGNS.get(hand, 0.0) * SIDE_M

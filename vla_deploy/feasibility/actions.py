@@ -88,7 +88,8 @@ def _navigate(parameters: Parameters, outlook: Outlook) -> None:
 def _approach(thing: Thing, outlook: Outlook) -> None:
     """Drive to the nearest free stand before a thing to which a way leads."""
     here = outlook.at or thing.xy_m
-    stands = stands_around(thing.position_m, outlook.abilities.planner.is_free)
+    abilities = outlook.abilities
+    stands = stands_around(thing.position_m, abilities.planner.is_free, abilities.body.reach)
     nearest = sorted(stands, key=lambda one: math.dist((one.x_m, one.y_m), here))[:MOST_STANDS]
     refusal = CannotBe(
         f"walls or furniture leave no place to stand before the {thing}", thing.confidence

@@ -37,6 +37,7 @@ GRASP_RULES: Mapping[str, GraspRule] = MappingProxyType(
         "can": GraspRule(depth_ratio=0.4, depth_max_m=0.045, effort_ratio=0.3, round=True),
         "bowl": GraspRule(depth_ratio=0.45, depth_max_m=0.04, effort_ratio=0.25, round=True),
         "remote": GraspRule(depth_ratio=0.7, depth_max_m=0.03, effort_ratio=0.3, round=False),
+        "block": GraspRule(depth_ratio=0.5, depth_max_m=0.03, effort_ratio=0.25, round=False),
         "object": GraspRule(depth_ratio=0.5, depth_max_m=0.04, effort_ratio=0.25, round=False),
     }
 )
@@ -121,12 +122,25 @@ def grasps_from_above(
     ]
 
 
-def hand_down(point_m: tuple[float, float, float], yaw_rad: float) -> NDArray[np.float64]:
-    """Return the grip frame pointing straight down: z down, y the closing axis, x at `yaw_rad`."""
+def hand_down(
+    point_m: tuple[float, float, float], yaw_rad: float, aside_m: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the grip frame pointing straight down: z down, y the closing axis, x at `yaw_rad`.
+
+    The point is `aside_m` along the closing axis from it: where a hand with one moving jaw has the
+    middle of a thing.
+    """
     cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
     pose = np.eye(4)
     pose[:3, 0] = (cosine, sine, 0.0)
     pose[:3, 1] = (sine, -cosine, 0.0)
     pose[:3, 2] = (0.0, 0.0, -1.0)
-    pose[:3, 3] = point_m
+    pose[:3, 3] = np.array(point_m) - aside_m * pose[:3, 1]
     return pose
+
+
+def raised(pose: NDArray[np.float64], height_m: float) -> NDArray[np.float64]:
+    """Return a pose that much higher."""
+    higher = pose.copy()
+    higher[2, 3] += height_m
+    return higher

@@ -19,6 +19,7 @@ from vla_deploy.perception.images.detector_worker import (
     load_detector,
 )
 from vla_deploy.perception.images.image_pipeline import ImagePipeline
+from vla_deploy.perception.mounted_pose import MountedPose
 from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.perception.sensors import Sensors
@@ -73,12 +74,17 @@ class PerceptionNode:
         rate_hz = profile.camera_rate_hz
         self._sensors = Sensors(robot, model, devices, context.clock, rate_hz)
         self._body = BodyState(robot, model)
-        self._pose_tracker = PoseTracker(robot, model, self._space)
+        self._drives = robot.parts.base is not None
+        self._pose_tracker: PoseTracker | MountedPose = (
+            PoseTracker(robot, model, self._space)
+            if self._drives
+            else MountedPose(robot.start_pose)
+        )
         executor = InlineExecutor() if executor is None else executor
         self._worker = DetectorWorker(executor, context.clock)
         furniture = furniture_points(robot.places)
-        localiser = self._pose_tracker.localiser
-        self._pipeline = ImagePipeline(self._body, localiser, self._worker, furniture)
+        localiser, floor_m = self._pose_tracker.localiser, 0.0 if self._drives else None
+        self._pipeline = ImagePipeline(self._body, localiser, self._worker, furniture, floor_m)
         self._restore_scene()
         self._rate_ratio = 1.0
         self._next_image_ns = 0
@@ -180,7 +186,7 @@ class PerceptionNode:
         self._next_image_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
         self._next_scene_ns = 0  # a scene for each image, whatever its use
-        if self._pipeline.process(frame):
+        if self._pipeline.process(frame) and self._drives:
             self._publish_obstacles(1.0 / rate_hz)
 
     def _publish_obstacles(self, period_s: float) -> None:

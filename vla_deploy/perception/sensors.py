@@ -3,6 +3,7 @@
 import logging
 import math
 from dataclasses import replace
+from typing import Any
 
 from drivers import registry
 from drivers.camera.base import Camera, RgbdFrame
@@ -19,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 class Sensors:
-    """Read each sensor; one that is away returns nothing, and the others go on."""
+    """Read each sensor there is; one that is away returns nothing, and the others go on."""
 
     def __init__(
         self,
@@ -35,8 +36,9 @@ class Sensors:
         self._clock = clock
         self._camera_rate_hz = camera_rate_hz
         self._has_logged_size = False
-        self._lidar = Reopening("lidar", self._open_lidar, clock)
-        self._imu = Reopening("imu", self._open_imu, clock)
+        parts = robot.parts
+        self._lidar = Reopening("lidar", self._open_lidar, clock) if parts.lidar else None
+        self._imu = Reopening("imu", self._open_imu, clock) if parts.imu else None
         self._camera = Reopening("camera", self._open_camera, clock)
 
     def open(self) -> None:
@@ -45,20 +47,28 @@ class Sensors:
         Raises:
             DriverError: a sensor is missing or busy.
         """
-        for slot in (self._lidar, self._imu, self._camera):
+        for slot in self._slots:
             slot.open()
 
     def close(self) -> None:
         """Release every sensor; closing twice is allowed."""
-        for slot in (self._lidar, self._imu, self._camera):
+        for slot in self._slots:
             slot.close()
+
+    @property
+    def _slots(self) -> list[Reopening[Any]]:
+        return [slot for slot in (self._lidar, self._imu, self._camera) if slot is not None]
 
     def scan(self) -> Scan | None:
         """Return a new scan of the lidar, if there is one."""
+        if self._lidar is None:
+            return None
         return self._lidar.poll(lambda lidar: lidar.poll(), None)
 
     def attitude(self) -> ImuSample | None:
         """Return the newest sample of the IMU, if there is a new one."""
+        if self._imu is None:
+            return None
         none: list[ImuSample] = []
         samples = self._imu.poll(lambda imu: imu.poll(), none)
         return samples[-1] if samples else None
@@ -83,12 +93,8 @@ class Sensors:
 
     def away(self) -> dict[str, str]:
         """Return which sensors are away at present, each with the reason."""
-        failures = {
-            "lidar": self._lidar.failure,
-            "imu": self._imu.failure,
-            "camera": self._camera.failure,
-        }
-        return {name: failure for name, failure in failures.items() if failure}
+        slots = {"lidar": self._lidar, "imu": self._imu, "camera": self._camera}
+        return {name: slot.failure for name, slot in slots.items() if slot and slot.failure}
 
     def _log_other_size(self, sent: Intrinsics, known: Intrinsics) -> None:
         """Log once that the calibration does not fit, so that the camera's own intrinsics count."""

@@ -67,7 +67,7 @@ class SkillSpec:
     """Describe one skill; `one_of` names parameter groups of which exactly one must be given.
 
     `resources` are what no two skills use at a time; "arm" is the arm that the action names, and
-    "device" the device.
+    "device" the device. A robot that has none of what it `may_lack` can do it, too.
     """
 
     summary: str
@@ -75,6 +75,7 @@ class SkillSpec:
     parameters: dict[str, SkillParameter]
     one_of: tuple[tuple[str, ...], ...] = ()
     resources: tuple[str, ...] = ()
+    may_lack: frozenset[str] = frozenset()
     own_timeout_s: float | None = None
     estimated_duration_s: float = 1.0
     retryable: bool = False
@@ -99,6 +100,8 @@ _OBJECT = SkillParameter(type=Type.OBJECT)
 _OBJECT_OR_ELSE = SkillParameter(type=Type.OBJECT, required=False)
 # Without it the base cruises as fast as its robot file lets it.
 _SPEED = _number(0.05, 2.0, required=False)
+# An arm on a table, under a camera that stands fast.
+_MOUNTED = frozenset({"base", "head"})
 
 SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
     {
@@ -149,6 +152,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             },
             one_of=(("object",), ("direction",)),
             resources=("head", "camera"),
+            may_lack=frozenset({"head"}),
             estimated_duration_s=2.0,
         ),
         "find_object": SkillSpec(
@@ -156,6 +160,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="look for an object, from here and then from each viewpoint",
             parameters={"object": _OBJECT},
             resources=("base", "head", "camera", "arms"),
+            may_lack=_MOUNTED,
             own_timeout_s=NAVIGATION_TIMEOUT_S,  # it drives from one viewpoint to the next
             estimated_duration_s=10.0,
             retryable=True,
@@ -165,6 +170,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="grasp an object within reach and verify the grasp",
             parameters={"object": _OBJECT, "arm": _ARM},
             resources=("base", "head", "camera", "arms"),
+            may_lack=_MOUNTED,
             estimated_duration_s=15.0,
             retryable=True,
         ),
@@ -177,6 +183,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 "arm": _ARM,
             },
             resources=("base", "head", "camera", "arms"),
+            may_lack=_MOUNTED,
             estimated_duration_s=12.0,
             retryable=True,
         ),
@@ -185,6 +192,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="give a person what a hand holds: it opens when it feels a pull",
             parameters={"arm": _ARM},
             resources=("base", "arms", "speaker"),
+            may_lack=_MOUNTED,
             estimated_duration_s=15.0,
         ),
         "open_gripper": SkillSpec(
@@ -239,6 +247,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="bring the base and the arms to rest",
             parameters={},
             resources=("base", "head", "arms"),
+            may_lack=frozenset({"base", "head", "arms"}),
             estimated_duration_s=1.0,
         ),
     }

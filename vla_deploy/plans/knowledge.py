@@ -14,6 +14,7 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import KeepOutZone, Place
 from vla_deploy.robots.home_devices import DeviceKind
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
+from vla_deploy.robots.reach import Reach
 from vla_deploy.world import Query, UnknownWord, parse_query
 from vla_deploy.world.access import IsFree
 from vla_deploy.world.query import FROM_A_VIEW
@@ -75,8 +76,9 @@ class World:
     `furniture` names the places that have something to put things on. `poses` are the robot file's
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
     known. `is_free` returns whether the base fits on a point of the map; None means that no map is
-    at hand. A gripper opens `opening_max_m` wide, None where that is not known. The robot charges
-    at the place `station`, where it has one. `skills` are those that its body is able to.
+    at hand. A gripper opens `opening_max_m` wide and takes things within `reach`; None where that
+    is not known. The robot charges at the place `station`, where it has one. `skills` are those
+    that its body is able to.
     """
 
     places: Mapping[str, str]
@@ -88,6 +90,7 @@ class World:
     footprint_radius_m: float = 0.0
     max_speed_m_s: float | None = None
     opening_max_m: float | None = None
+    reach: Reach | None = None
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
     station: str = ""
@@ -210,6 +213,7 @@ def world_of(
         footprint_radius_m=base.footprint_radius_m if base else 0.0,
         max_speed_m_s=base.max_speed_m_s if base else 0.0,
         opening_max_m=max(openings_m, default=None),
+        reach=robot.parts.reach,
         bounds=robot.planning,
         is_free=is_free,
         station="" if robot.battery is None else robot.battery.station,
@@ -221,7 +225,7 @@ def world_of(
 
 
 def _skills_of(robot: RobotDescription) -> frozenset[str]:
-    """Return the skills for which the robot has all parts; every robot can stop what it has."""
+    """Return the skills for which the robot has all parts that they cannot do without."""
     parts = {
         *robot.groups,
         "speaker",  # without one it shows what it would say
@@ -230,5 +234,5 @@ def _skills_of(robot: RobotDescription) -> frozenset[str]:
         *(("device",) if robot.devices else ()),
     }
     return frozenset(
-        name for name, spec in SKILLS.items() if name == "stop" or parts.issuperset(spec.resources)
+        name for name, spec in SKILLS.items() if parts.issuperset({*spec.resources} - spec.may_lack)
     )

@@ -248,6 +248,37 @@ def hands_name_groups(document: Document) -> Iterator[TableFault]:
             yield TableFault(key=f"hands.{name}.gripper", got=got, expected="a group of one joint")
 
 
+def hands_that_see_reach(document: Document) -> Iterator[TableFault]:
+    """Hands of a robot that sees take things: within its reach, each with a pose to travel in."""
+    hands, poses = subtables(document, "hands"), subtables(document, "poses")
+    takes = bool(hands) and "camera" in document
+    if takes and "reach" not in document:
+        yield TableFault(
+            key="reach", got="nothing", expected="a table: hands and a camera are to take things"
+        )
+    for name, row in hands.items():
+        key, pose = f"hands.{name}.travel_pose", row.get("travel_pose")
+        if pose is None and takes:
+            yield TableFault(key=key, got="nothing", expected="the pose in which its arm travels")
+        elif isinstance(pose, str) and pose not in poses:
+            yield unknown_name(key, pose, "a pose", poses)
+        elif isinstance(pose, str):
+            joints = texts(table(table(document, "groups"), row.get("arm")), "joints")
+            for joint in (one for one in joints if one not in poses[pose]):
+                yield TableFault(key=f"poses.{pose}", got=f"no {joint}", expected=f"it, for {key}")
+
+
+def head_turns_by_servos(document: Document) -> Iterator[TableFault]:
+    """The joints of the head are servos', and it has a camera to turn."""
+    head, joints = table(document, "head"), _joints(_servos(document))
+    if head and "camera" not in document:
+        yield TableFault(key="camera", got="nothing", expected="a table: [head] turns it")
+    for key in ("pan", "tilt"):
+        joint = head.get(key)
+        if isinstance(joint, str) and joint not in joints:
+            yield unknown_name(f"head.{key}", joint, "a servo's joint", joints)
+
+
 def poses_are_reachable(document: Document) -> Iterator[TableFault]:
     """A pose names servo joints and stays inside their limits."""
     limits, joints = table(document, "limits"), _joints(_servos(document))
@@ -307,6 +338,8 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     servos_reach,
     groups_cover_joints,
     hands_name_groups,
+    hands_that_see_reach,
+    head_turns_by_servos,
     poses_are_reachable,
     places_are_distinct,
     ros_is_on_where_needed,

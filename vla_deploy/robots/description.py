@@ -26,6 +26,7 @@ from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
+from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import UNUSED, RosSettings
 
 P = TypeVar("P")
@@ -81,7 +82,10 @@ class StopGroup:
 class Hand:
     """Tie an arm to its gripper.
 
-    The opening between the pads is opening_offset_m + opening_ratio * gripper joint.
+    The opening between the pads is opening_offset_m + opening_ratio * gripper joint. Of one with a
+    single moving jaw, `fixed_pad_m` is how far the fixed one's pad lies from the grip site, against
+    the closing axis; both move where it is None. An empty hand travels in the pose `travel_pose`,
+    a full one at `carry_point_m` of the base frame, pointing down, or like an empty one.
     """
 
     name: str
@@ -90,6 +94,16 @@ class Hand:
     grip_site: str
     opening_ratio: float
     opening_offset_m: float = 0.0
+    fixed_pad_m: float | None = None
+    travel_pose: str | None = None
+    carry_point_m: tuple[float, float, float] | None = None
+
+    def middle_m(self, width_m: float, gap_m: float = 0.0) -> float:
+        """Return how far along the closing axis from the grip site the middle of a held thing is.
+
+        It is `width_m` wide, and `gap_m` away from the pad that does not move, where there is one.
+        """
+        return 0.0 if self.fixed_pad_m is None else 0.5 * width_m + gap_m - self.fixed_pad_m
 
     def opening_m(self, position: float) -> float:
         """Return the opening between the pads at a position of the gripper's joint."""
@@ -98,6 +112,14 @@ class Hand:
     def position_at(self, opening_m: float) -> float:
         """Return the position of the gripper's joint at an opening between the pads."""
         return (opening_m - self.opening_offset_m) / self.opening_ratio
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head:
+    """Name the joints that turn the camera: `pan` left and `tilt` down where they are positive."""
+
+    pan: str
+    tilt: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,6 +164,8 @@ class RobotParts:
     imu: SerialSensor | None = None
     camera: CameraDescription | None = None
     home: Home | None = None
+    reach: Reach | None = None
+    head: Head | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,6 +250,24 @@ class RobotDescription:
             PartMissing: the robot file has none.
         """
         return self._part(self.parts.home, "home")
+
+    @property
+    def reach(self) -> Reach:
+        """Return where its hands take things.
+
+        Raises:
+            PartMissing: the robot file does not say.
+        """
+        return self._part(self.parts.reach, "reach")
+
+    @property
+    def head(self) -> Head:
+        """Return the joints that turn the camera.
+
+        Raises:
+            PartMissing: the robot has none.
+        """
+        return self._part(self.parts.head, "head")
 
     def _part(self, part: P | None, name: str) -> P:
         if part is None:

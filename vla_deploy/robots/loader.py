@@ -17,6 +17,7 @@ from vla_deploy.robots.consistency import CHECKS, missing_files, subtables
 from vla_deploy.robots.description import (
     BaseGeometry,
     Hand,
+    Head,
     Home,
     JointLimits,
     KeepOutZone,
@@ -38,6 +39,7 @@ from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
+from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import ROS, RosSettings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 
@@ -68,6 +70,8 @@ SHAPES: Mapping[str, Shape] = {
     "limits.*": schema.LIMITS,
     "groups.*": schema.GROUP,
     "hands.*": schema.HAND,
+    "reach": schema.REACH,
+    "head": schema.HEAD,
     "home": schema.HOME,
     "home.places.*": schema.PLACE,
     "home.places.*.viewpoints": schema.FLOOR_POSE,
@@ -210,7 +214,10 @@ def _build(
             name: build(StopGroup, {"name": name, **row})
             for name, row in document["groups"].items()
         },
-        hands={name: Hand(name=name, **row) for name, row in document.get("hands", {}).items()},
+        hands={
+            name: build(Hand, {"name": name, **row})
+            for name, row in document.get("hands", {}).items()
+        },
         poses=subtables(document, "poses"),
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
@@ -230,6 +237,8 @@ def _parts(document: Document, directory: Path, camera: CameraDescription | None
         imu=made("imu", lambda row: SerialSensor(**row)),
         camera=camera,
         home=made("home", lambda row: _home(row, directory)),
+        reach=made("reach", lambda row: build(Reach, row)),
+        head=made("head", lambda row: Head(**row)),
     )
 
 

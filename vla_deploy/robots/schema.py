@@ -24,6 +24,14 @@ POLYGON = ValueCheck(
         isinstance(value, list) and len(value) >= 3 and all(map(_POINT.holds, value))
     ),
 )
+DISTANCES = ValueCheck(
+    expected="a list of one or more distances above 0 in m, the best first",
+    holds=lambda value: isinstance(value, list) and bool(value) and all(map(POSITIVE.holds, value)),
+)
+NUMBERS = ValueCheck(
+    expected="a list of one or more numbers",
+    holds=lambda value: isinstance(value, list) and bool(value) and all(map(NUMBER.holds, value)),
+)
 
 ROBOT: Shape = {
     "name": TEXT,
@@ -46,6 +54,8 @@ ROBOT: Shape = {
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE.optional,
+    "reach": TABLE.optional,
+    "head": TABLE.optional,
     "poses": TABLE.optional,
     "home": TABLE.optional,
     "planning": TABLE.optional,
@@ -162,6 +172,22 @@ HAND: Shape = {
     "grip_site": TEXT,
     "opening_ratio": POSITIVE,
     "opening_offset_m": NUMBER.optional,
+    "fixed_pad_m": POSITIVE.optional,
+    "travel_pose": TEXT.optional,
+    "carry_point_m": numbers(3).optional,
+}
+HEAD: Shape = {"pan": TEXT, "tilt": TEXT}
+REACH: Shape = {
+    "distances_m": DISTANCES,
+    "least_ahead_m": NUMBER,
+    "most_aside_m": POSITIVE,
+    "grip_heights_m": numbers(2),
+    "clear_height_m": POSITIVE,
+    "out_m": NUMBER,
+    "above_m": POSITIVE,
+    "put_ahead_m": DISTANCES,
+    "put_aside_m": NUMBERS,
+    "apart_m": POSITIVE,
 }
 HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}

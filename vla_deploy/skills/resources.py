@@ -27,14 +27,14 @@ def body_of(robot: RobotDescription) -> dict[str, int]:
 def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
     """Return what an action needs, by the catalogue.
 
-    "arm" is the chosen one, or all of them; "device" is the one that the action names. To stop
-    needs what the robot has.
+    "arm" is the chosen one, or all of them; "device" is the one that the action names. Parts that
+    a robot may lack are needed where it has them.
     """
     needed: dict[str, int] = {}
-    for resource in SKILLS[action.skill].resources:
-        needed |= dict.fromkeys(_parts(resource, action, robot), 1)
-    if action.skill == "stop":
-        return {part: 1 for part in needed if part in robot.groups}
+    spec = SKILLS[action.skill]
+    for resource in spec.resources:
+        if resource in robot.groups or resource not in spec.may_lack:
+            needed |= dict.fromkeys(_parts(resource, action, robot), 1)
     posed = robot.poses.get(str(action.parameters.get("pose")), {})
     chosen = action.parameters.get("arm") is None
     return needed | dict.fromkeys(robot.groups_moving(posed) if chosen else (), 1)

@@ -12,17 +12,12 @@ from typing import Any, Final, Self
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import TIP_BEYOND_GRIP_M, Grasp, grasps_from_above
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.reach import Reach
 from vla_deploy.world.footprint import depth_inside_m
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.thing import Rest, Snapshot, Thing, Viewpoint
 
-# Distance from the base's centre to the thing: best first, all within the arms' reach.
-REACH_M: Final = (0.42, 0.46, 0.50, 0.54)
 DIRECTIONS: Final = 36
-LEAST_AHEAD_M: Final = 0.3
-MOST_ASIDE_M: Final = 0.2
-# Heights at which a hand that points down gets a grip, at some of these distances.
-GRIP_HEIGHTS_M: Final = (0.25, 0.85)
 
 # What of a hand goes down beside a thing: two fingers from below the grip, the palm from above it.
 FINGER_RADIUS_M: Final = 0.018
@@ -68,17 +63,13 @@ class Stand:
     step: int
 
 
-def is_in_reach(point_m: Sequence[float]) -> bool:
-    """Return whether the arms reach a point of the base frame from where the base stands."""
-    x_m, y_m = point_m[0], point_m[1]
-    return math.hypot(x_m, y_m) <= REACH_M[-1] and abs(y_m) <= MOST_ASIDE_M and x_m > LEAST_AHEAD_M
-
-
-def stands_around(position_m: Sequence[float], is_free: IsFree) -> Iterator[Stand]:
+def stands_around(
+    position_m: Sequence[float], is_free: IsFree, reach: Reach | None
+) -> Iterator[Stand]:
     """Yield for each direction the free stand from which a point of the map is best reached."""
     for step in range(DIRECTIONS):
         bearing_rad = 2.0 * math.pi * step / DIRECTIONS
-        for reach_m in REACH_M:
+        for reach_m in () if reach is None else reach.distances_m:
             x_m = position_m[0] - reach_m * math.cos(bearing_rad)
             y_m = position_m[1] - reach_m * math.sin(bearing_rad)
             if is_free(x_m, y_m):
@@ -105,6 +96,7 @@ class Body:
 
     opening_max_m: float
     hands: tuple[str, ...]
+    reach: Reach | None
     is_free: IsFree | None = None
 
     @classmethod
@@ -112,7 +104,10 @@ class Body:
         """Read a robot file: the widest opening of its hands, and their names."""
         openings_m = [robot.widest_m(hand) for hand in robot.hands]
         return cls(
-            opening_max_m=max(openings_m, default=0.0), hands=tuple(robot.hands), is_free=is_free
+            opening_max_m=max(openings_m, default=0.0),
+            hands=tuple(robot.hands),
+            reach=robot.parts.reach,
+            is_free=is_free,
         )
 
 
@@ -142,8 +137,8 @@ class GraspAccess:
 def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> GraspAccess:
     """Judge one thing; the obstacles are in the order in which one would clear them."""
     grasps, too_wide = _grasps(thing, body)
-    way = grasp_stand(thing, snapshot.robot, body.is_free)
-    found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps)]
+    way = grasp_stand(thing, snapshot.robot, body.is_free, body.reach)
+    found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps, body.reach)]
     found += _in_corridor(thing, grasps, snapshot) if grasps else []
     if way is GraspStand.NONE:
         found.append(Obstacle(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
@@ -174,23 +169,26 @@ def _grasps(thing: Thing, body: Body) -> tuple[list[Grasp], list[Obstacle]]:
         return [], [Obstacle(Bar.TOO_WIDE, "", str(error))]
 
 
-def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
-    low_m, high_m = GRIP_HEIGHTS_M
+def _height(grasps: list[Grasp], reach: Reach | None) -> Iterator[Obstacle]:
     for grasp in grasps[:1]:
         height_m = grasp.point_m[2]
-        bar = Bar.TOO_LOW if height_m < low_m else Bar.TOO_HIGH
-        if not low_m <= height_m <= high_m:
-            yield Obstacle(bar, "", f"the grip would be {height_m:.2f} m high; "
-                       f"hands that point down reach {low_m:g} to {high_m:g} m")  # fmt: skip
+        why = "" if reach is None else reach.height_refusal(height_m)
+        if reach is not None and why:
+            is_low = height_m < reach.grip_heights_m[0]
+            yield Obstacle(Bar.TOO_LOW if is_low else Bar.TOO_HIGH, "", why)
 
 
-def grasp_stand(thing: Thing, robot: Viewpoint | None, is_free: IsFree | None) -> GraspStand:
+def grasp_stand(
+    thing: Thing, robot: Viewpoint | None, is_free: IsFree | None, reach: Reach | None
+) -> GraspStand:
     """Return from where a thing can be taken; without a map, after driving."""
-    if robot is not None and is_in_reach(robot.local(thing.position_m)):
+    if reach is None:
+        return GraspStand.NONE
+    if robot is not None and reach.has(robot.local(thing.position_m)):
         return GraspStand.HERE
     if is_free is None:
         return GraspStand.AFTER_DRIVING
-    has_stand = next(stands_around(thing.position_m, is_free), None) is not None
+    has_stand = next(stands_around(thing.position_m, is_free, reach), None) is not None
     return GraspStand.AFTER_DRIVING if has_stand else GraspStand.NONE
 
 

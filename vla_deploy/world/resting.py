@@ -35,7 +35,6 @@ KEEP: Final = RelationBounds(inside_m=-0.03, sunk_m=-0.005, gap_m=0.045)
 LET_GO: Final = RelationBounds(inside_m=0.0, sunk_m=0.0, gap_m=0.07)
 # The bottom of a container is not below its outside, within what a sight is wrong.
 BELOW_CONTAINER_M: Final = 0.03
-FLOOR_HEIGHT_M: Final = 0.0
 
 
 def rest_of(
@@ -43,16 +42,18 @@ def rest_of(
     things: Iterable[Thing],
     surfaces: Sequence[Surface],
     begin: RelationBounds = BEGIN,
+    floor_m: float | None = 0.0,
 ) -> Rest | None:
     """Return what a thing rests in or on; `thing.rests` is what it was held to rest in before.
 
-    A container comes before what stands highest below the thing; the floor comes last.
+    A container comes before what stands highest below the thing; the floor comes last, and not at
+    all where `floor_m` is None.
     """
     others = [one for one in things if one.thing_id != thing.thing_id and not one.held_by]
     found = [
         (rank, height_m, rest)
         for rank, height_m, rest in (*_containers(thing, others, begin),
-                                     *_supports(thing, others, surfaces, begin))
+                                     *_supports(thing, others, surfaces, begin, floor_m))
     ]  # fmt: skip
     if not found:
         return None
@@ -76,7 +77,11 @@ def _containers(
 
 
 def _supports(
-    thing: Thing, others: Iterable[Thing], surfaces: Sequence[Surface], begin: RelationBounds
+    thing: Thing,
+    others: Iterable[Thing],
+    surfaces: Sequence[Surface],
+    begin: RelationBounds,
+    floor_m: float | None,
 ) -> Iterable[tuple[int, float, Rest]]:
     plates = [
         (one.thing_id, one.top_m, depth_inside_m(thing.position_m, one))
@@ -87,7 +92,8 @@ def _supports(
         (one.name, one.height_m, polygon_depth_m(thing.position_m, one.polygon_m))
         for one in surfaces
     ]
-    plates.append((FLOOR, FLOOR_HEIGHT_M, BEGIN.inside_m))
+    if floor_m is not None:
+        plates.append((FLOOR, floor_m, BEGIN.inside_m))
     for name, height_m, inside_m in plates:
         rest = Rest(ON, name)
         bounds = KEEP if thing.rests == rest else begin

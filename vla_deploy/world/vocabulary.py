@@ -7,7 +7,8 @@ from typing import Final
 from vla_deploy.world.thing import Thing
 
 OBJECT_CLASSES: Final = (
-    "cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote", "object",
+    "cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote", "block",
+    "object",
 )  # fmt: skip
 ANY_CLASS: Final = "object"
 COLOURS: Final = (
@@ -27,6 +28,7 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "key": "keys", "keyring": "keys",
     "controller": "remote", "zapper": "remote", "clicker": "remote",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
+    "cube": "block", "brick": "block",
     "thing": "object", "item": "object", "something": "object",
     "gray": "grey", "violet": "purple",
 })  # fmt: skip

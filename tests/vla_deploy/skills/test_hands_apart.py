@@ -16,7 +16,7 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.kinematics.model import full_positions
-from vla_deploy.skills.movements.carrying import CARRY_POINT_M, RESTARTS, TUCK
+from vla_deploy.skills.movements.carrying import RESTARTS
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def least_m(start: Floats, end: Floats) -> float:
 
 def postures_down(hand: str, points_m: list[tuple[float, float, float]]) -> Iterator[Floats]:
     """Yield postures in which one hand points down over furniture and the other is tucked."""
-    arm, tuck = ArmKinematics(BUTLER, hand), posture(TUCK)
+    arm, tuck = ArmKinematics(BUTLER, hand), posture("tuck")
     columns = [BUTLER.joint_index[name] for name in BUTLER.group(BUTLER.hands[hand].arm).joints]
     for point_m in points_m:
         for yaw_rad in np.arange(0.0, 2 * math.pi, math.pi / 3):
@@ -66,27 +66,29 @@ def postures_down(hand: str, points_m: list[tuple[float, float, float]]) -> Iter
 
 
 def test_both_arms_rise_from_the_base_side_by_side() -> None:
-    assert least_m(posture("rest"), posture(TUCK)) > APART_M
+    assert least_m(posture("rest"), posture("tuck")) > APART_M
 
 
 @pytest.mark.parametrize("hand", ["left", "right"])
 def test_a_hand_comes_home_from_wherever_it_grasps_and_carries(hand: str) -> None:
-    side = 1.0 if hand == "left" else -1.0
+    side, carry_point_m = 1.0 if hand == "left" else -1.0, BUTLER.hands[hand].carry_point_m
+    assert carry_point_m is not None
     points_m = [(x, side * y, z) for x in (0.36, 0.48) for y in (-0.05, 0.12) for z in (0.6, 0.8)]
-    points_m.append((CARRY_POINT_M[0], side * CARRY_POINT_M[1], CARRY_POINT_M[2]))
-    tuck = posture(TUCK)
+    points_m.append(carry_point_m)
+    tuck = posture("tuck")
     ways = [least_m(there, tuck) for there in postures_down(hand, points_m)]
     assert len(ways) > 10
     assert min(ways) > APART_M
 
 
 def test_both_hands_loaded_are_apart() -> None:
-    x, y, z = CARRY_POINT_M
+    points_m = {
+        name: [one.carry_point_m] for name, one in BUTLER.hands.items() if one.carry_point_m
+    }
     (left, *_), (right, *_) = (
-        list(postures_down(hand, [(x, side * y, z)]))
-        for hand, side in (("left", 1.0), ("right", -1.0))
+        list(postures_down(hand, points_m[hand])) for hand in ("left", "right")
     )
     both = left.copy()
     columns = [BUTLER.joint_index[name] for name in BUTLER.group("right_arm").joints]
     both[columns] = right[columns]
-    assert least_m(posture(TUCK), both) > APART_M
+    assert least_m(posture("tuck"), both) > APART_M

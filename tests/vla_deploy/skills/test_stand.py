@@ -7,7 +7,6 @@ from vla_deploy.skills.actions.navigate import reach
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.stand import SIDE_M, standing_poses
-from vla_deploy.world.access import REACH_M
 
 if TYPE_CHECKING:
     from conftest import StandingLink
@@ -22,7 +21,8 @@ def test_every_pose_is_free_and_has_the_object_within_reach(context: SkillContex
     for pose in poses:
         assert context.planner.is_free(pose.x_m, pose.y_m)
         distance_m = math.dist((pose.x_m, pose.y_m), ON_TABLE_M[:2])
-        assert REACH_M[0] - 1e-9 <= distance_m <= REACH_M[-1] + 1e-9
+        distances_m = context.robot.reach.distances_m
+        assert min(distances_m) - 1e-9 <= distance_m <= max(distances_m) + 1e-9
 
 
 def test_the_object_is_put_before_the_left_shoulder(context: SkillContext) -> None:

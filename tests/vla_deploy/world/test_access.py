@@ -2,12 +2,16 @@ from collections.abc import Callable
 
 import pytest
 
+from vla_deploy.robots import load_robot
 from vla_deploy.world import Body, Snapshot, Thing, Viewpoint, access_to
 from vla_deploy.world.access import Bar, GraspStand
 from vla_deploy.world.thing import Rest
 
 Make, MakeWorld = Callable[..., Thing], Callable[..., Snapshot]
-BODY = Body(opening_max_m=0.088, hands=("left", "right"), is_free=lambda x_m, y_m: True)
+REACH = load_robot("butler").reach
+BODY = Body(
+    opening_max_m=0.088, hands=("left", "right"), reach=REACH, is_free=lambda x_m, y_m: True
+)
 
 
 def bars(one: Thing, snapshot: Snapshot, body: Body = BODY) -> list[tuple[Bar, str]]:
@@ -28,7 +32,7 @@ def test_elsewhere_it_takes_a_drive(thing: Make, world: MakeWorld, x_m: float, y
 
 def test_where_nobody_can_stand_it_says_so(thing: Make, world: MakeWorld) -> None:
     cup = thing("cup", 2.0, 0.0)
-    walled = Body(opening_max_m=0.088, hands=("left",), is_free=lambda x_m, y_m: False)
+    walled = Body(opening_max_m=0.088, hands=("left",), reach=REACH, is_free=lambda x_m, y_m: False)
     found = access_to(cup, world(cup), walled)
     assert (found.way, bars(cup, world(cup), walled)) == (GraspStand.NONE, [(Bar.NO_STAND, "")])
 
@@ -116,7 +120,7 @@ def test_a_place_that_is_a_guess_must_be_looked_at_first(thing: Make, world: Mak
 
 def test_without_a_pose_or_a_map_it_still_judges_the_grasp(thing: Make, world: MakeWorld) -> None:
     cup = thing("cup", 0.45, 0.0)
-    blind = Body(opening_max_m=0.088, hands=("left",))
+    blind = Body(opening_max_m=0.088, hands=("left",), reach=REACH)
     assert access_to(cup, world(cup, robot=None), blind).way is GraspStand.AFTER_DRIVING
     seen = world(cup, robot=Viewpoint(x_m=0.0, y_m=0.0))
     assert access_to(cup, seen, blind).way is GraspStand.HERE

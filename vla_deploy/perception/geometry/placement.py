@@ -258,7 +258,7 @@ def _rectangle(target: _Target, base: Rectangle) -> _Spot:
     )
 
 
-NEVER_LIE = frozenset({"ball", "box", "bowl", "phone", "keys", "remote"})
+NEVER_LIE = frozenset({"ball", "box", "bowl", "phone", "keys", "remote", "block"})
 FORMS: dict[str, Callable[[_Target], _Spot]] = {
     "bottle": _upright,
     "can": _upright,

@@ -1,7 +1,7 @@
 """Find the horizontal surfaces that things may stand on: the floor and table tops of any height."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -31,6 +31,7 @@ class Support:
 
     plane: tuple[float, float, float]
     outline: Floats
+    is_floor: bool = False
 
     def height_m(self, x_m: float, y_m: float) -> float:
         """Return the surface's height above the floor at a point."""
@@ -43,12 +44,6 @@ class Support:
         above: Floats = cv2.transform(cloud.points, np.array([[-a, -b, 1.0, -c]], np.float32))
         return above
 
-    @property
-    def is_floor(self) -> bool:
-        """Return whether this is the floor that the robot stands on."""
-        middle = self.outline.mean(axis=0)
-        return abs(self.height_m(float(middle[0]), float(middle[1]))) < FLOOR_M
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KnownSurface:
@@ -58,8 +53,13 @@ class KnownSurface:
     outline: Floats
 
 
-def find_supports(cloud: Cloud, known: Sequence[KnownSurface] = ()) -> list[Support]:
-    """Return the surfaces in view, the highest first."""
+def find_supports(
+    cloud: Cloud, known: Sequence[KnownSurface] = (), floor_m: float | None = 0.0
+) -> list[Support]:
+    """Return the surfaces in view, the highest first.
+
+    The floor is `floor_m` high in the base frame, None where the robot does not stand on it.
+    """
     # Surfaces are large: every other pixel of every other row is plenty.
     area = upward_area(cloud, STRIDE) * np.float32(STRIDE**2)
     points = np.ascontiguousarray(cloud.points[::STRIDE, ::STRIDE])
@@ -74,9 +74,16 @@ def find_supports(cloud: Cloud, known: Sequence[KnownSurface] = ()) -> list[Supp
         plane = _fit_plane(points[layer], level)
         on_plane = left & (np.abs(_above(points, plane)) < LAYER_M)
         near = [one for one in known if abs(one.height_m - level) < SAME_LEVEL_M]
-        supports += _pieces(points, on_plane, area, plane, near)
+        pieces = _pieces(points, on_plane, area, plane, near)
+        supports += [_named_floor(one, floor_m) for one in pieces]
         left &= ~(on_plane | (np.abs(z - level) < LAYER_M))
     return sorted(supports, key=lambda s: -s.height_m(*map(float, s.outline.mean(axis=0))))
+
+
+def _named_floor(support: Support, floor_m: float | None) -> Support:
+    x, y = (float(value) for value in support.outline.mean(axis=0))
+    is_floor = floor_m is not None and abs(support.height_m(x, y) - floor_m) < FLOOR_M
+    return replace(support, is_floor=is_floor)
 
 
 def inside(outline: Floats, points: Floats, margin_m: float) -> Mask:

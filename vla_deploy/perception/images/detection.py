@@ -25,6 +25,7 @@ from vla_deploy.perception.images.network_view import NetworkView
 from vla_deploy.perception.naming.class_fusion import Name, NameSource, fuse_name, name_by_form
 from vla_deploy.perception.naming.classes import OTHER, Form, judge_form
 from vla_deploy.perception.naming.colour import dominant_colour
+from vla_deploy.world.vocabulary import CONTAINERS
 
 FEW_PIXELS = 60
 FLAT_SIGMAS = 4.0
@@ -101,7 +102,7 @@ def _is_bare_face(detection: Detection) -> bool:
 def _detections(cluster: Cluster, view: _View) -> list[Detection]:
     """Return one thing, or several that touch where each part by itself is a known one."""
     whole = _detection(cluster, view)
-    if whole.class_name == "box":
+    if whole.class_name in CONTAINERS:
         return [whole, *_contents(whole, cluster, view)]
     if whole.named_by in (NameSource.FORM, NameSource.BOTH):
         return [whole]

@@ -1,7 +1,7 @@
 """Process the camera's images: near obstacles at once, things once the detector has answered."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc.payloads.scene import RobotPlace, SceneDocument
-from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.images.detector_worker import DetectorWorker
@@ -19,6 +18,7 @@ from vla_deploy.perception.images.network_view import as_pinhole, to_camera_imag
 from vla_deploy.perception.objects.body_state import Array, BodyState
 from vla_deploy.perception.objects.near_obstacles import NearObstacles
 from vla_deploy.perception.objects.scene import Scene
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.kinematics.orientation import angle_rad
 from vla_deploy.world.surfaces import Point
 
@@ -27,17 +27,43 @@ STILL_WINDOW_NS: Final = 60_000_000
 MAX_CAMERA_TURN_RAD_S: Final = 0.35
 
 
+class BasePose(Protocol):
+    """Say where the base is and was, in the map and by dead reckoning, and what that is worth."""
+
+    @property
+    def pose(self) -> Pose2D:
+        """Return where the base is now, in the map."""
+
+    @property
+    def state(self) -> PlaceState:
+        """Return what the pose is worth."""
+
+    @property
+    def is_anchored(self) -> bool:
+        """Return whether the pose has been confirmed since the start."""
+
+    def pose_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the base was."""
+
+    def track_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the base was by dead reckoning alone."""
+
+
 class ImagePipeline:
-    """Turn images into obstacles and a scene; one image at a time waits for the detector."""
+    """Turn images into obstacles and a scene; one image at a time waits for the detector.
+
+    The floor is `floor_m` high in the base frame, None where the robot does not stand on it.
+    """
 
     def __init__(
         self,
         body: BodyState,
-        localiser: Localiser,
+        localiser: BasePose,
         worker: DetectorWorker,
         furniture: Mapping[str, Point],
+        floor_m: float | None = 0.0,
     ) -> None:
-        self.scene = Scene(furniture)
+        self.scene = Scene(furniture, floor_m)
         self.obstacles = NearObstacles()
         self._body = body
         self._localiser = localiser

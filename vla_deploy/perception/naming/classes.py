@@ -84,6 +84,18 @@ RULES: tuple[ClassRule, ...] = (
             "height_m": (0.05, 0.4),
         },
     ),
+    ClassRule(
+        "bowl",
+        {
+            "hole_m": (0.015, 0.1),
+            "rim_m": (0.08, 0.26),
+            "rim_share": (0.5, 1.0),
+            "height_m": (0.03, 0.11),
+            "across_m": (0.09, 0.26),
+            "slenderness": (0.2, 0.75),
+            "squareness": (0.85, 1.0),
+        },
+    ),
     ClassRule("ball", {"roundness": (1.0, 1.0), "across_m": (0.025, 0.3)}),
     ClassRule(
         "bottle",
@@ -101,6 +113,15 @@ RULES: tuple[ClassRule, ...] = (
             "across_m": (0.05, 0.13),
             "slenderness": (0.7, 1.9),
             "top_ratio": (0.5, 1.2),
+        },
+    ),
+    ClassRule(
+        "block",
+        {
+            "height_m": (0.015, 0.06),
+            "length_m": (0.015, 0.06),
+            "flatness": (0.7, 1.4),
+            "squareness": (0.75, 1.0),
         },
     ),
     ClassRule(
@@ -152,6 +173,7 @@ POSSIBLE: dict[str, dict[str, Range]] = {
     "bowl": {"height_m": (0.03, 0.16), "longest_m": (0.08, 0.36)},
     "can": {"height_m": (0.04, 0.2), "longest_m": (0.06, 0.22)},
     "remote": {"height_m": (0.004, 0.06), "longest_m": (0.08, 0.3)},
+    "block": {"height_m": (0.01, 0.08), "longest_m": (0.01, 0.1)},
 }
 BYSTANDERS: frozenset[str] = frozenset({"person", "chair"})
 """Obstacles that are never things to take: no thing's form is possible for them."""

@@ -49,9 +49,15 @@ THROUGH_RATIO = 0.25
 
 
 class Scene:
-    """Hold the known things around the robot; `furniture` names points of the home's surfaces."""
+    """Hold the known things around the robot; `furniture` names points of the home's surfaces.
 
-    def __init__(self, furniture: Mapping[str, Point] | None = None) -> None:
+    The floor is `floor_m` high in the base frame; None for a robot that is mounted on a table.
+    """
+
+    def __init__(
+        self, furniture: Mapping[str, Point] | None = None, floor_m: float | None = 0.0
+    ) -> None:
+        self._floor_m = floor_m
         self._tracker = Tracker()
         self._book = SurfaceBook(furniture)
         self.stamp_ns = 0
@@ -79,7 +85,8 @@ class Scene:
             image.body,
             image.aim_sigma_rad,
         )
-        supports = find_supports(cloud, [_known(one, base) for one in self._book.surfaces])
+        known = [_known(one, base) for one in self._book.surfaces]
+        supports = find_supports(cloud, known, self._floor_m)
         self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)
         sightings = [_sighting(detection, base, stamp_ns) for detection in found]
@@ -129,7 +136,7 @@ class Scene:
 
     def _rest_of(self, track: Track, begin: RelationBounds) -> Rest | None:
         things = [one.thing for one in self._tracker.objects]
-        return rest_of(track.thing, things, self._book.surfaces, begin)
+        return rest_of(track.thing, things, self._book.surfaces, begin, self._floor_m)
 
     def _surface(self, support: Support, base: Pose2D) -> SurfaceDocument:
         """Return a surface for the scene topic: the part in view, in the map frame."""

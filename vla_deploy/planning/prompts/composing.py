@@ -17,7 +17,6 @@ from vla_deploy.planning.understanding import ConversationTurn
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.knowledge import World
 from vla_deploy.world import Snapshot, Thing, Viewpoint
-from vla_deploy.world.access import GRIP_HEIGHTS_M, REACH_M
 from vla_deploy.world.vocabulary import OBJECT_CLASSES, size_word
 
 TEMPLATES: Final = Path(__file__).parent
@@ -81,10 +80,11 @@ def limits(world: World) -> Iterator[str]:
         yield f"a hand carries at most {world.bounds.payload_kg:g} kg"
     if world.opening_max_m is not None:
         yield f"a hand opens {world.opening_max_m:.2f} m wide; what is wider cannot be taken"
-        low_m, high_m = GRIP_HEIGHTS_M
+    if world.reach is not None:
+        low_m, high_m = world.reach.grip_heights_m
         yield (
-            f"its hands reach {max(REACH_M):g} m in front of its middle, {low_m:g} to {high_m:g} m "
-            "above the floor"
+            f"its hands reach {max(world.reach.distances_m):g} m in front of its middle, {low_m:g} "
+            f"to {high_m:g} m above the {'floor' if 'move' in world.skills else 'table'}"
         )
     if world.poses:
         yield f"poses of the arms: {', '.join(sorted(map(plain, world.poses)))}"

@@ -129,7 +129,8 @@ def _suits(thing: Thing, use: ThingUse, query: Query, context: CommandContext) -
     match use:
         case ThingUse.ONTO:
             moved = [one.thing_id for one in context.mentions if one.role is MentionRole.OBJECT]
-            stand = grasp_stand(thing, context.view, context.request.world.is_free)
+            world = context.request.world
+            stand = grasp_stand(thing, context.view, world.is_free, world.reach)
             is_meant = bool(query.thing_id) or stand is not GraspStand.NONE
             return not thing.held_by and thing.thing_id not in moved and is_meant
         case ThingUse.TAKE:

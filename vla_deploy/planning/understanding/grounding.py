@@ -314,7 +314,8 @@ def _missing(action: Action, state: SymbolicState, request: PlanRequest) -> Step
     name = action.parameters.get("object", action.parameters.get("destination"))
     if subject is not None and is_known(state, setting) != MET:
         return "find_object", {"object": name}
-    if action.skill in FROM_CLOSE and is_before(state, setting) != MET:
+    can_drive = "navigate_to" in request.world.skills
+    if action.skill in FROM_CLOSE and can_drive and is_before(state, setting) != MET:
         return "navigate_to", {"object" if subject is not None else "place": name}
     return None
 

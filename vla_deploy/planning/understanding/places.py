@@ -12,9 +12,9 @@ from vla_deploy.planning.understanding.questions import which_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
 from vla_deploy.plans.errors import UnknownObject, UnknownPlace
 from vla_deploy.plans.knowledge import match_place, words_of
-from vla_deploy.plans.symbolic.conditions import PUT_INTO
 from vla_deploy.plans.symbolic.state import Pose, SymbolicState
 from vla_deploy.world.relations import NEXT_TO
+from vla_deploy.world.vocabulary import CONTAINERS
 
 Parameters = Mapping[str, Any]
 # That near to where one stands for a place, one is there.
@@ -102,7 +102,7 @@ def destination_of(given: Parameters, resolver: Resolver, state: SymbolicState) 
         return {"destination": table, "relation": "on"}
     thing = thing_unless_place(text, resolver, ThingUse.ONTO, into=relation == "in")
     if thing is not None:
-        default = "in" if thing.kind in PUT_INTO else "on"
+        default = "in" if thing.kind in CONTAINERS else "on"
         return {"destination": thing.name, "relation": relation or default}
     if relation == NEXT_TO:
         raise NotAble(f"I put things next to things and on furniture, not next to {text}")
@@ -168,6 +168,6 @@ def _spoken_there(resolver: Resolver, use: ThingUse, *, into: bool) -> Mention |
         is_moved = one in context.mentions and one.role is MentionRole.OBJECT
         if one.role is MentionRole.PLACE and not into:
             return one
-        if not is_moved and (one.role is MentionRole.DESTINATION or one.kind in PUT_INTO):
+        if not is_moved and (one.role is MentionRole.DESTINATION or one.kind in CONTAINERS):
             return one
     return None

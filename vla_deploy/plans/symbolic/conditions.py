@@ -13,12 +13,14 @@ from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, grasps_from_above
 from vla_deploy.plans.knowledge import World, match_place
 from vla_deploy.plans.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.world import Snapshot
-from vla_deploy.world.access import GRIP_HEIGHTS_M, IsFree, stands_around
+from vla_deploy.world.access import IsFree, stands_around
 from vla_deploy.world.footprint import polygon_depth_m
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.thing import FLOOR, Rest
+from vla_deploy.world.vocabulary import CONTAINERS
 
 # Farther than that from where it stands, the robot is surely not before a thing.
 SURELY_AWAY_M: Final = 1.6
@@ -26,7 +28,6 @@ SURELY_AWAY_M: Final = 1.6
 SMALL_MOVE_M: Final = 0.1
 # How far apart the points are at which a straight way is judged.
 STEP_M: Final = 0.1
-PUT_INTO: Final = frozenset({"box"})
 
 MET: Final = ""
 
@@ -72,6 +73,8 @@ def is_before(state: SymbolicState, setting: Setting) -> Answer:
     what = at if place is not None or subject is None else subject.words
     if not at or state.at == at:
         return MET
+    if "navigate_to" not in setting.world.skills:
+        return _within_reach(state, setting, subject)
     spot = None
     if place is not None:
         spot = (sites[place].pose.x_m, sites[place].pose.y_m) if place in sites else None
@@ -85,6 +88,16 @@ def is_before(state: SymbolicState, setting: Setting) -> Answer:
     if distance_m <= SURELY_AWAY_M:
         return None
     return f"the {what} is {distance_m:.1f} m away; navigate_to it first"
+
+
+def _within_reach(state: SymbolicState, setting: Setting, subject: Subject | None) -> Answer:
+    """Is a thing within reach of a robot that cannot drive there?"""
+    thing, reach = None if subject is None else subject.thing, setting.world.reach
+    if subject is None or thing is None or reach is None or state.pose is None:
+        return MET
+    if reach.has(Pose2D(*state.pose).local(thing.position_m)):
+        return MET
+    return f"the {subject.words} is out of reach, and the robot cannot drive"
 
 
 def has_free_hand(state: SymbolicState, setting: Setting) -> Answer:
@@ -137,11 +150,8 @@ def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
         )
     except TooWide as error:
         return str(error)
-    low_m, high_m = GRIP_HEIGHTS_M
-    height_m = grasps[0].point_m[2]
-    if low_m <= height_m <= high_m:
-        return MET
-    return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
+    reach = setting.world.reach
+    return None if reach is None else reach.height_refusal(grasps[0].point_m[2]) or MET
 
 
 def is_light_enough(_: SymbolicState, setting: Setting) -> Answer:
@@ -164,8 +174,8 @@ def takes_things(state: SymbolicState, setting: Setting) -> Answer:
             return f"nothing is put in the {place}, only on it"
         bare = setting.world.furniture and place not in setting.world.furniture
         return f"there is nothing at the {place} to put things on" if bare else MET
-    if relation == IN and subject is not None and subject.kind not in PUT_INTO:
-        return f"a {subject.kind} is no container; things go into: {', '.join(sorted(PUT_INTO))}"
+    if relation == IN and subject is not None and subject.kind not in CONTAINERS:
+        return f"a {subject.kind} is no container; things go into: {', '.join(sorted(CONTAINERS))}"
     return MET
 
 
@@ -291,7 +301,9 @@ def _zone_around(position_m: tuple[float, float, float], world: World) -> KeepOu
     near = _zone_at(position_m[:2], world)
     if near is None:
         return None
-    stands = stands_around(position_m, lambda x_m, y_m: _zone_at((x_m, y_m), world) is None)
+    stands = stands_around(
+        position_m, lambda x_m, y_m: _zone_at((x_m, y_m), world) is None, world.reach
+    )
     return near if next(stands, None) is None else None
 
 

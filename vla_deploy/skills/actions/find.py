@@ -69,6 +69,8 @@ def _search(context: SkillContext, query: Query) -> Skill:
 
 def _look_around(context: SkillContext, query: Query, left: dict[Pose2D, None]) -> Skill:
     """Look ahead, then at the furniture in sight; drop the viewpoints that this makes needless."""
+    if context.robot.parts.head is None:
+        yield from carry(context)  # out of the view of a camera that stands fast
     yield from _sweep(context, query, (GLANCE,))
     for distance_m, viewpoint in sorted(_in_sight(context, left), key=lambda one: one[0]):
         if remembered(context, query) is not None:

@@ -73,6 +73,10 @@ def reach(
     for place in () if scene is None else scene.below(known["id"]):
         if place in context.keeps_out:
             raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
+    if context.robot.parts.base is None:
+        if anew or not context.robot.reach.has(to_base(context.link.pose, known["position_m"])):
+            raise OutOfReach(f"the {query} is out of my reach, and I cannot drive")
+        return
     reasons = []
     for goal in standing_poses(context, known["position_m"], anew=anew):
         try:
@@ -112,7 +116,7 @@ def _see_past_hands(context: SkillContext, query: Query) -> Skill:
         yield from see(context, query)
     except TryAgain:
         known, full = remembered(context, query), _full_hands(context)
-        if known is None or not full:
+        if known is None or not full or context.robot.parts.base is None:
             raise
         x_m, y_m, _ = to_base(context.link.pose, known["position_m"])
         yield from turn_by(context, math.atan2(y_m, x_m) + PAST_HAND_RAD[full])

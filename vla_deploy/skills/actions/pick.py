@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
-from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
+from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down, raised
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.actions.navigate import solve_near
 from vla_deploy.skills.context import Held, Skill, SkillContext
@@ -23,19 +23,20 @@ from vla_deploy.skills.movements.arms import (
     set_opening,
 )
 from vla_deploy.skills.movements.carrying import RESTARTS, carry, or_carry
-from vla_deploy.skills.movements.frames import to_base
+from vla_deploy.skills.movements.frames import side_of, to_base
 from vla_deploy.skills.movements.gaze import kept_in_sight
 from vla_deploy.skills.movements.motion import pause
 from vla_deploy.skills.movements.neighbours import crowding_m
 from vla_deploy.skills.movements.swing import heights_above
 from vla_deploy.world import Query
 
-PREGRASP_M = 0.12
 FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
 STRAIGHT_SPEED_RATIO = 0.35
 # The fingers are sent this much past the surface they should meet.
 SQUEEZE_M = 0.012
+# Between a jaw that does not move and the side of the thing: more than the thing's place is wrong.
+FIXED_JAW_GAP_M = 0.008
 MOST_TOUCHES = 3
 # The sine of the angle from which on fingers close along another line.
 ANOTHER_LINE = math.sin(math.radians(40.0))
@@ -95,9 +96,8 @@ def _approach(context: SkillContext, choice: GraspChoice) -> Skill:
     grasp, hand = choice.grasp, choice.hand
     yield from set_opening(context, hand, grasp.opening_m)
     yield from move_to_posture(context, hand, choice.above, APPROACH_SPEED_RATIO)
-    target = hand_down(grasp.point_m, grasp.yaw_rad)
     try:
-        yield from feel_way(context, hand, target)
+        yield from feel_way(context, hand, _hand_at(context, hand, grasp))
     except Touched:
         yield from move_to_posture(context, hand, choice.above, STRAIGHT_SPEED_RATIO)
         raise
@@ -168,7 +168,7 @@ def _choose(
     centre = to_base(pose, seen["position_m"])
     yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad
     reasons: list[str] = []
-    nearer_first = sorted(hands, key=lambda name: (name == "left") != (centre[1] >= 0.0))
+    nearer_first = sorted(hands, key=lambda name: side_of(context, name) * centre[1] < 0.0)
     for hand in nearer_first:
         widest_m = context.robot.widest_m(hand)
         size_m = tuple(float(side) for side in seen["size_m"])
@@ -226,14 +226,20 @@ def _above(
     context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]
 ) -> tuple[NDArray[np.float64], float] | None:
     """Return a posture above a grasp from which the hand can go straight down, and how high."""
-    arm, (x_m, y_m, z_m) = context.arms[hand], grasp.point_m
-    for above_m in heights_above(context, grasp.point_m, FINGER_TIPS_M, PREGRASP_M):
+    arm, low = context.arms[hand], _hand_at(context, hand, grasp)
+    least_m = context.robot.reach.above_m
+    for above_m in heights_above(context, grasp.point_m, FINGER_TIPS_M, least_m):
         try:
-            high = hand_down((x_m, y_m, z_m + above_m), grasp.yaw_rad)
-            above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
-            arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
+            above = arm.solve(raised(low, above_m), context.link.setpoints, restarts=RESTARTS)
+            arm.straight_line(above.positions, low)
         except ManipulationError as error:
             reasons.append(str(error))
             continue  # lower, the arm may get there
-        return above, above_m
+        return above.positions, above_m
     return None
+
+
+def _hand_at(context: SkillContext, hand: str, grasp: Grasp) -> NDArray[np.float64]:
+    """Return where the grip is for a grasp; a jaw that does not move is beside the thing."""
+    aside_m = context.robot.hands[hand].middle_m(grasp.width_m, FIXED_JAW_GAP_M)
+    return hand_down(grasp.point_m, grasp.yaw_rad, aside_m)

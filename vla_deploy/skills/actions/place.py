@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
-from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.manipulation.grasps import hand_down, raised
 from vla_deploy.plans.errors import UnknownObject
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.actions.navigate import solve_near
@@ -31,8 +31,9 @@ from vla_deploy.skills.movements.surfaces import Spot, free_spots, spots_beside
 from vla_deploy.skills.movements.swing import heights_above
 from vla_deploy.world import Query
 from vla_deploy.world.relations import NEXT_TO
+from vla_deploy.world.resting import IN
+from vla_deploy.world.vocabulary import CONTAINERS
 
-ABOVE_M = 0.10
 # A thing put into a container is let go this far below the rim: less where the container is low,
 # or where others lie in it, which it must not be pressed on. One put on something: just above.
 BELOW_RIM_M = 0.03
@@ -55,7 +56,7 @@ UNKNOWN = "object"
 class Release:
     """Hold where the grip lets go, in the base frame, and the joint positions above it."""
 
-    point_m: tuple[float, float, float]
+    grip: NDArray[np.float64]
     above: NDArray[np.float64]
     above_m: float
 
@@ -100,12 +101,10 @@ def _lower(context: SkillContext, hand: str, held: Held, release: Release) -> Sk
         Touched: something is in the way high above that; the hand is over it again.
     """
     arm = context.arms[hand]
-    down = arm.forward(context.link.setpoints)
-    down[:3, 3] = release.point_m
     try:
-        yield from feel_way(context, hand, down)
+        yield from feel_way(context, hand, release.grip)
     except Touched:
-        left_m = float(arm.forward(context.link.positions)[2, 3]) - release.point_m[2]
+        left_m = float(arm.forward(context.link.positions)[2, 3] - release.grip[2, 3])
         if left_m > (EARLY_UNKNOWN_M if held.kind == UNKNOWN else EARLY_M):
             yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
             raise
@@ -180,9 +179,10 @@ def _over_object(
     seen = kept_in_sight(context, query)
     x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])
     top_m = z_m + float(seen["size_m"][2]) / 2
-    if relation == "in" and seen["class"] != "box":
-        raise NotPossible(f"a {seen['class']} is no container; put things in a box")
-    lower_m = below_rim_m(context, seen, held) if relation == "in" else -ABOVE_SURFACE_M
+    if relation == IN and seen["class"] not in CONTAINERS:
+        known = " or a ".join(sorted(CONTAINERS))
+        raise NotPossible(f"a {seen['class']} is no container; put things in a {known}")
+    lower_m = below_rim_m(context, seen, held) if relation == IN else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
     return _solve_above(context, hand, point_m, held)
 
@@ -220,15 +220,18 @@ def _solve_above(
         OutOfReach: no yaw of the hand gets there.
     """
     now, reasons = context.link.setpoints, [""]
-    for above_m in heights_above(context, release_m, held.below_grip_m, ABOVE_M):
+    aside_m = context.robot.hands[hand].middle_m(held.width_m)
+    grips = [hand_down(release_m, yaw_rad, aside_m) for yaw_rad in YAWS_RAD]
+    for above_m in heights_above(
+        context, release_m, held.below_grip_m, context.robot.reach.above_m
+    ):
         found = [
-            above
-            for yaw_rad in YAWS_RAD
-            if (above := _descent(context, hand, release_m, above_m, yaw_rad, reasons)) is not None
+            Release(grip=grip, above=above, above_m=above_m)
+            for grip in grips
+            if (above := _descent(context, hand, grip, above_m, reasons)) is not None
         ]
         if found:
-            least = min(found, key=lambda positions: float(np.abs(positions - now).max()))
-            return Release(point_m=release_m, above=least, above_m=above_m)
+            return min(found, key=lambda one: float(np.abs(one.above - now).max()))
     x_m, y_m, z_m = release_m
     raise OutOfReach(
         f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reasons[-1]}"
@@ -236,19 +239,14 @@ def _solve_above(
 
 
 def _descent(
-    context: SkillContext,
-    hand: str,
-    release_m: tuple[float, float, float],
-    above_m: float,
-    yaw_rad: float,
-    reasons: list[str],
+    context: SkillContext, hand: str, grip: NDArray[np.float64], above_m: float, reasons: list[str]
 ) -> NDArray[np.float64] | None:
-    arm, (x_m, y_m, z_m) = context.arms[hand], release_m
+    """Return a posture above a grip from which the hand can go straight down to it."""
+    arm = context.arms[hand]
     try:
-        high = hand_down((x_m, y_m, z_m + above_m), yaw_rad)
-        above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
-        arm.straight_line(above, hand_down(release_m, yaw_rad))
+        above = arm.solve(raised(grip, above_m), context.link.setpoints, restarts=RESTARTS)
+        arm.straight_line(above.positions, grip)
     except ManipulationError as error:
         reasons.append(str(error))
         return None
-    return above
+    return above.positions

@@ -171,6 +171,8 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
 def feel_way(context: SkillContext, hand: str, target: Any) -> Skill:
     """Move a hand slowly along a straight line until it is there, or meets something.
 
+    A robot whose file has no limits of contact feels nothing on its way.
+
     Raises:
         OutOfReach: the arm cannot follow the line.
         Touched: the arm has met something on it, and rests there.

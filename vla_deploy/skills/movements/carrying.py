@@ -10,26 +10,19 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.movements.arms import arm_joints, arm_targets, lift
-from vla_deploy.skills.movements.frames import side_of
 from vla_deploy.skills.movements.motion import move_joints, settle
 from vla_deploy.skills.movements.underside import leave_underside
 
 AT_POSE_RAD = 0.05
 LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
-# In the base frame: the hand is over furniture, and above what stands on it.
-OUT_IN_FRONT_M = 0.3
-CLEAR_HEIGHT_M = 0.6
-TUCK = "tuck"
 FOLDING_STEPS = 12
-# Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
-CARRY_POINT_M = (0.27, 0.16, 0.72)
 CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
 # One yaw out of reach is no loss: another is tried at once.
 RESTARTS = 2
 
 
 def carry(context: SkillContext, hands: Sequence[str] | None = None) -> Skill:
-    """Bring arms, all or some, to where they may travel: tucked, or close in front when loaded.
+    """Bring arms, all or some, to where they may travel, full hands to where they carry things.
 
     A hand that is low over furniture is raised first: the way to its chest is no straight line. An
     arm under furniture is drawn out before.
@@ -58,9 +51,10 @@ def carry(context: SkillContext, hands: Sequence[str] | None = None) -> Skill:
 
 def _raise_clear(context: SkillContext, hand: str) -> Skill:
     """Raise a hand that is out in front to a height from which it may swing."""
+    reach = context.robot.parts.reach
     point_m = context.arms[hand].forward(context.link.setpoints)[:3, 3]
-    missing_m = CLEAR_HEIGHT_M - float(point_m[2])
-    if point_m[0] < OUT_IN_FRONT_M or missing_m <= 0.0:
+    missing_m = reach.clear_height_m - float(point_m[2]) if reach else 0.0
+    if reach is None or point_m[0] < reach.out_m or missing_m <= 0.0:
         return
     for share in (1.0, 0.5, 0.25):
         try:
@@ -68,28 +62,31 @@ def _raise_clear(context: SkillContext, hand: str) -> Skill:
         except OutOfReach:
             continue  # the arm may be near its limits: less is better than nothing
         return
-    yield from _fold_up(context, hand)
+    yield from _fold_up(context, hand, reach.clear_height_m)
 
 
-def _fold_up(context: SkillContext, hand: str) -> Skill:
-    """Raise a hand by the one joint that raises it most on its way to where it is tucked.
+def _fold_up(context: SkillContext, hand: str, clear_height_m: float) -> Skill:
+    """Raise a hand by the one joint that raises it most on its way to where it travels empty.
 
     An arm that sank without power lies so twisted that it follows no straight line; with all of
     its joints at once its hand would sweep over what stands there.
     """
-    ways = {joint: _way_to_tuck(context, hand, joint) for joint in arm_joints(context, hand)}
+    targets = _empty_targets(context, hand)
+    ways = {joint: _way_to(context, hand, joint, target) for joint, target in targets.items()}
     joint, way = max(ways.items(), key=lambda item: max(item[1]))
-    enough = (one for one in way if one[0] >= CLEAR_HEIGHT_M)
+    enough = (one for one in way if one[0] >= clear_height_m)
     _, position = next(enough, max(way))
     yield from move_joints(context, {joint: position}, EMPTY_SPEED_RATIO)
     yield from settle(context, (joint,))
 
 
-def _way_to_tuck(context: SkillContext, hand: str, joint: str) -> list[tuple[float, float]]:
-    """Return the hand's height at positions of one joint on its way to where it is tucked."""
+def _way_to(
+    context: SkillContext, hand: str, joint: str, target: float
+) -> list[tuple[float, float]]:
+    """Return the hand's height at positions of one joint on its way to a target."""
     posture, index = context.link.setpoints.copy(), context.robot.joint_index[joint]
     found = []
-    for position in np.linspace(posture[index], context.robot.poses[TUCK][joint], FOLDING_STEPS):
+    for position in np.linspace(posture[index], target, FOLDING_STEPS):
         posture[index] = position
         height_m = float(context.arms[hand].forward(posture)[2, 3])
         found.append((height_m, float(position)))
@@ -97,25 +94,34 @@ def _way_to_tuck(context: SkillContext, hand: str, joint: str) -> list[tuple[flo
 
 
 def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
-    if context.hands.get(hand) is not None:
-        return _carry_targets(context, hand)
-    pose = context.robot.poses[TUCK]
-    return {name: pose[name] for name in arm_joints(context, hand)}
+    point_m = context.robot.hands[hand].carry_point_m
+    if context.hands.get(hand) is not None and point_m is not None:
+        return _carry_targets(context, hand, point_m)
+    return _empty_targets(context, hand)
 
 
-def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
+def _empty_targets(context: SkillContext, hand: str) -> dict[str, float]:
+    """Return where the arm of an empty hand travels; one of no such pose stays where it is."""
+    pose, joints = context.robot.hands[hand].travel_pose, arm_joints(context, hand)
+    if pose is None:
+        return arm_targets(context, hand, context.link.setpoints)
+    return {name: context.robot.poses[pose][name] for name in joints}
+
+
+def _carry_targets(
+    context: SkillContext, hand: str, point_m: tuple[float, float, float]
+) -> dict[str, float]:
     """Return the carry posture nearest to the present one."""
     arm = context.arms[hand]
-    point = (CARRY_POINT_M[0], side_of(hand) * CARRY_POINT_M[1], CARRY_POINT_M[2])
     now = context.link.setpoints
     found = []
     for yaw_rad in CARRY_YAWS_RAD:
         try:
-            found.append(arm.solve(hand_down(point, yaw_rad), now, restarts=RESTARTS).positions)
+            found.append(arm.solve(hand_down(point_m, yaw_rad), now, restarts=RESTARTS).positions)
         except ManipulationError:
             continue  # not every yaw is within the wrist's range
     if not found:
-        raise NotPossible(f"the {hand} hand cannot reach its carry pose {point}")
+        raise NotPossible(f"the {hand} hand cannot reach its carry point {point_m}")
     best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
     return arm_targets(context, hand, best)
 

@@ -8,13 +8,11 @@ from typing import Any
 from drivers.clock import NS_PER_S
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.errors import TryAgain
+from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.motion import move_joints, settle, wait_until
 from vla_deploy.world import Query, Viewpoint, read_snapshot
 
-PAN, TILT = "head_pan", "head_tilt"
-HEAD_JOINTS = (PAN, TILT)
 DIRECTIONS: Mapping[str, tuple[float, float]] = {
     "ahead": (0.0, 0.2),
     "left": (1.2, 0.2),
@@ -37,8 +35,15 @@ OUT_OF_REACH_S = 120.0
 
 
 def look_at(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
-    """Look at a known object or in a named direction."""
+    """Look at a known object or in a named direction.
+
+    Raises:
+        NotPossible: the camera stands fast, and a direction is asked for.
+        TryAgain: the object has not been seen.
+    """
     if "direction" in parameters:
+        if context.robot.parts.head is None:
+            raise NotPossible("my camera stands fast: I have no head to turn")
         yield from turn_head(context, *DIRECTIONS[parameters["direction"]])
         return
     query = parse_object(parameters["object"])
@@ -49,14 +54,17 @@ def look_at(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def turn_head(context: SkillContext, pan_rad: float, tilt_rad: float) -> Skill:
-    """Turn the head as far towards a direction as its joints allow."""
+    """Turn the head as far towards a direction as its joints allow; without one, do nothing."""
+    head = context.robot.parts.head
+    if head is None:
+        return
     limits = context.robot.limits
     targets = {
         name: min(max(angle, limits[name].min), limits[name].max)
-        for name, angle in ((PAN, pan_rad), (TILT, tilt_rad))
+        for name, angle in ((head.pan, pan_rad), (head.tilt, tilt_rad))
     }
     yield from move_joints(context, targets, HEAD_SPEED_RATIO)
-    yield from settle(context, HEAD_JOINTS)
+    yield from settle(context, tuple(targets))
 
 
 def gaze_at(context: SkillContext, position_m: Any) -> Skill:

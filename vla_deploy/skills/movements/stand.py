@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from vla_deploy.robots.floor_pose import Pose2D, wrap_angle
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.movements.frames import to_base
-from vla_deploy.world.access import REACH_M, Stand, is_in_reach, stands_around
+from vla_deploy.world.access import Stand, stands_around
 
 # The object goes before one shoulder rather than between them.
 SIDE_M = 0.12
@@ -17,15 +17,17 @@ def standing_poses(
 ) -> list[Pose2D]:
     """Return free poses facing an object, the one quickest to reach first.
 
-    The present pose alone, where it will do, unless they are wanted `anew`.
+    The present pose alone, where it will do, unless they are wanted `anew`; none anew of a robot
+    that does not drive.
     """
-    pose = context.link.pose
-    if not anew and is_in_reach(to_base(pose, position_m)):
+    pose, reach = context.link.pose, context.robot.reach
+    if not anew and reach.has(to_base(pose, position_m)):
         return [pose]
     candidates = []
-    for stand in stands_around(position_m, context.planner.is_free):
+    for stand in stands_around(position_m, context.planner.is_free, reach):
         goal = _facing(context, stand)
-        candidates.append((_effort(pose, goal) + 2.0 * (stand.reach_m - REACH_M[0]), stand, goal))
+        further_m = stand.reach_m - reach.distances_m[0]
+        candidates.append((_effort(pose, goal) + 2.0 * further_m, stand, goal))
     return [goal for _, _, goal in sorted(candidates, key=lambda one: (one[0], one[1].step))][:6]
 
 

@@ -8,8 +8,8 @@ from vla_deploy.skills.movements.frames import to_base
 AROUND_M = 0.4
 # Nearer than this it is the thing itself that is reached for.
 SAME_M = 0.06
-# In the base frame: what is nearer than this is in a hand, not on furniture.
-ON_FURNITURE_X_M = 0.33
+# What is no further in front of hands that are out is in a hand, not on furniture.
+OUT_MARGIN_M = 0.03
 MARGIN_M = 0.03
 # Most of what is not recognised is a part of larger furniture, out of the way.
 UNKNOWN = "object"
@@ -27,7 +27,7 @@ def heights_above(
     for one in context.link.objects:
         x_m, y_m, z_m = to_base(context.link.pose, one["position_m"])
         gap_m = math.hypot(x_m - point_m[0], y_m - point_m[1])
-        stands = one["class"] != UNKNOWN and x_m > ON_FURNITURE_X_M
+        stands = one["class"] != UNKNOWN and x_m > context.robot.reach.out_m + OUT_MARGIN_M
         if stands and SAME_M < gap_m < AROUND_M:
             tops.append(z_m + float(one["size_m"][2]) / 2)
     wanted_m = max(tops, default=0.0) + MARGIN_M + below_m - point_m[2]
