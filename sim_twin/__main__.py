@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--robot", default="butler", help="robot name (default: butler)")
-    parser.add_argument("--world", default="flat", help="world name (default: flat)")
+    parser.add_argument("--world", default="", help="world name (default: the robot file's)")
     parser.add_argument("--seed", type=int, default=0, help="seed of object poses and noise")
     parser.add_argument("--run-dir", type=Path, required=True, help="folder of this run")
     parser.add_argument("--no-camera", action="store_true", help="serve no camera: no OpenGL")

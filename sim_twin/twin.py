@@ -45,17 +45,19 @@ class Twin:
     def __init__(
         self,
         robot: RobotDescription,
-        world: str = "flat",
+        world: str = "",
         seed: int = 0,
         servo_timing: WireTiming | None = None,
     ) -> None:
-        """Build the robot in its world; without `servo_timing` the servo bus takes no time.
+        """Build the robot in a world, "" for that of its file.
+
+        Without `servo_timing` the servo bus takes no time.
 
         Raises:
             ModelMismatch: there is no such world, or robot and world do not fit together.
         """
         self.robot = robot
-        self.engine = load_engine(robot, world, seed)
+        self.engine = load_engine(robot, world or robot.twin.world, seed)
         self.person = WorldPerson(self.engine)
         shafts = self.engine.servos
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)

@@ -224,7 +224,7 @@ class Lockstep(Schedule):
     def __init__(
         self,
         robot: str = "butler",
-        world: str = "flat",
+        world: str = "",
         seed: int = 0,
         profile: str = "desktop",
         *,

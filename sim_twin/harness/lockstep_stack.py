@@ -63,7 +63,7 @@ class LockstepControl(RobotUnderTest):
         profile: str = "desktop",
         *,
         robot: str = "butler",
-        world: str = "flat",
+        world: str = "",
     ) -> None:
         self.lockstep = Lockstep(robot, world, seed, profile, tmp_path=tmp_path)
         self.robot = self.lockstep.robot
@@ -183,7 +183,7 @@ class LockstepStack(LockstepControl):
         profile: str = "desktop",
         *,
         robot: str = "butler",
-        world: str = "flat",
+        world: str = "",
         speech: bool = False,
         memory: Path | None = None,
     ) -> None:

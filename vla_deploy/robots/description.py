@@ -28,6 +28,7 @@ from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import UNUSED, RosSettings
+from vla_deploy.robots.twin_settings import USUAL_TWIN, TwinSettings
 
 P = TypeVar("P")
 
@@ -194,6 +195,7 @@ class RobotDescription:
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
     broker: MqttBroker | None = None
+    twin: TwinSettings = USUAL_TWIN
     devices: Mapping[str, HomeDevice] = field(default_factory=dict)
     """What the robot switches in its home, by name."""
 

@@ -41,6 +41,7 @@ from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import ROS, RosSettings
+from vla_deploy.robots.twin_settings import TwinSettings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 
 P = TypeVar("P")
@@ -66,6 +67,7 @@ SHAPES: Mapping[str, Shape] = {
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
     "ros": ROS,
+    "twin": schema.TWIN,
     "battery": BATTERY,
     "limits.*": schema.LIMITS,
     "groups.*": schema.GROUP,
@@ -221,6 +223,7 @@ def _build(
         poses=subtables(document, "poses"),
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
+        twin=TwinSettings(**document.get("twin", {})),
         broker=_broker(document.get("mqtt"), directory),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},
     )

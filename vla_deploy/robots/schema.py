@@ -48,6 +48,7 @@ ROBOT: Shape = {
     "speaker": TABLE.optional,
     "voice": TABLE.optional,
     "ros": TABLE.optional,
+    "twin": TABLE.optional,
     "battery": TABLE.optional,
     "mqtt": TABLE.optional,
     "devices": TABLES.optional,
@@ -176,6 +177,7 @@ HAND: Shape = {
     "travel_pose": TEXT.optional,
     "carry_point_m": numbers(3).optional,
 }
+TWIN: Shape = {"world": TEXT.optional, "demo": TEXT.optional}
 HEAD: Shape = {"pan": TEXT, "tilt": TEXT}
 REACH: Shape = {
     "distances_m": DISTANCES,

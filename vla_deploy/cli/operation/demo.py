@@ -35,14 +35,15 @@ from vla_deploy.ipc import topics
 from vla_deploy.ipc.payloads.supervision import ProcessTable
 from vla_deploy.ipc.payloads.tasks import TaskEvent
 from vla_deploy.plans.knowledge import parse_object
+from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
 
-COMMAND = "pick up the red cup and put it in the box"
 EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
   vla-deploy demo --command "put the blue ball in the box" --voice en-us+f4 --snr 10
   vla-deploy demo --typed --fast
+  vla-deploy demo --robot so101           an arm on a table: a red block into a bowl
   vla-deploy demo --viewer                the twin in a window
 """
 SETTLE_S = 1.0
@@ -60,7 +61,7 @@ def register(commands: Any) -> None:
         twin="as always: the demo is of the twin",
         headless="make no film and open no window, whatever there is",
     )
-    demo.add_argument("--command", dest="order", default=COMMAND, help=f'default: "{COMMAND}"')
+    demo.add_argument("--command", dest="order", help="what to say (default: the robot file's)")
     demo.add_argument("--voice", default=DEFAULT_VOICE, help="who says it, a voice of eSpeak NG")
     demo.add_argument("--snr", type=float, metavar="DB", help="over noise, this much louder")
     demo.add_argument("--typed", action="store_true", help="give the command as text, say nothing")
@@ -111,6 +112,7 @@ class Demo:
     def run(self) -> dict[str, Any]:
         """Start everything, give the command, follow it, ask the referee, stop everything."""
         self._print(f"starting the twin of {self._options.robot} (seed {self._options.seed})")
+        self._order = self._arguments.order or load_robot(self._options.robot).twin.demo
         with Supervisor(self._options) as supervisor:
             supervisor.start()
             clock = SteppingClock(supervisor)
@@ -140,7 +142,7 @@ class Demo:
         self, session: RobotSession, clock: SteppingClock
     ) -> Iterator[TaskEvent | HeardLine]:
         """Return the events of the command: spoken, or as text where no speech is understood."""
-        order = self._arguments.order
+        order = self._order
         self._why_typed = self._why_typed or wait_until_listening(session)
         if self._why_typed:
             self._print(f'command as text: "{order}" (not spoken: {self._why_typed})')
@@ -228,7 +230,7 @@ class Demo:
             "took_s": round(took_s, 2),
             "wall_s": round(wall_s, 2),
             "seed": self._options.seed,
-            "command": self._arguments.order,
+            "command": self._order,
             "spoken": self._spoken.document() if self._spoken else None,
             "why_typed": self._why_typed or None,
             "actions": self._last.get("actions", []),

@@ -76,7 +76,7 @@ def add_robot_arguments(command: argparse.ArgumentParser) -> None:
         default="desktop",
         help="platform profile (run takes the chosen or detected one)",
     )
-    command.add_argument("--world", default="flat", help="the twin's world")
+    command.add_argument("--world", default="", help="the twin's world (default: the robot file's)")
     command.add_argument("--seed", type=whole_number(0), default=0, help="where the objects lie")
 
 

@@ -82,7 +82,8 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def _grasp(context: SkillContext, choice: GraspChoice, query: Query) -> Skill:
-    context.note(f"with the {choice.hand} hand")
+    if len(context.robot.hands) > 1:
+        context.note(f"with the {choice.hand} hand")
     yield from _approach(context, choice)
     yield from _take(context, choice, query)
 

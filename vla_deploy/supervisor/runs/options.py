@@ -10,8 +10,9 @@ from drivers.twin_page import TwinPace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """Choose robot, profile and world; `arm` arms the robot once everything is ready.
+    """Choose robot, profile and world, "" for that of the robot file.
 
+    `arm` arms the robot once everything is ready.
     `profile_fault` is why the profile is not the one that was chosen.
     `viewer` shows the twin in a window; `paced` gives the bytes on its buses their time; `pace`
     chooses its time.
@@ -29,7 +30,7 @@ class RunOptions:
     paced: bool = False
     pace: TwinPace = TwinPace.REAL
     seed: int = 0
-    world: str = "flat"
+    world: str = ""
     devices_dir: Path | None = None
     runtime_base: Path | None = None
     arm: bool = False
