@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import load, missions, soak
+from sim_twin.campaigns import demos, load, missions, soak
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
@@ -20,6 +20,7 @@ from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_numb
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
 ] = {
+    "demos": demos.run,
     "faults": fault_matrix.run,
     "kills": kills.run,
     "load": load.run,
@@ -31,7 +32,8 @@ CAMPAIGNS: Final[
 _EXAMPLES: Final = """examples:
   vla-deploy validate faults --junit out/faults.xml
   vla-deploy validate faults --only servo_bus --json
-  vla-deploy validate kills --count 20"""
+  vla-deploy validate kills --count 20
+  vla-deploy validate demos --robot so101"""
 _EXIT_INTERRUPTED: Final = 130
 
 
@@ -83,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
         "--hours", type=number_above_zero("hours"), default=1.0, help="how long to soak"
     )
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--robot", default="butler", help="of demos and load")
     parser.add_argument(
         "--workers", type=whole_number(), default=2, help="how many cases at a time"
     )

@@ -1,45 +1,39 @@
 """Do the main job beside busy loops: it may take longer, and nothing else may change."""
 
 import argparse
-import json
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
+from sim_twin.campaigns.demos import Outcome, faults_of, play_demo
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
-from sim_twin.harness.robot import VLA_DEPLOY
 
 BUSY_LOOPS: Final = 8
 COUNT: Final = 10
 MOST_APART_M: Final = 0.001
 _SPIN: Final = "while True: pass"
-_LONGEST_S: Final = 3600.0
-_NONE_OF: Final = ("late_ticks", "bus_timeouts")
-
-Outcome = Mapping[str, Any]
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Do the job once alone, then `options.count` times beside busy loops, 10 unless given."""
     count = COUNT if options.count is None else options.count
-    alone = _demo(options.seed)
+    alone = play_demo(options.seed, options.robot)
     cases = [told(judge("alone", alone, alone), tell)]
     with _busy_loops(BUSY_LOOPS):
         for number in range(count):
-            case = judge(f"beside_{BUSY_LOOPS}_loops/{number}", _demo(options.seed), alone)
+            case = judge(
+                f"beside_{BUSY_LOOPS}_loops/{number}", play_demo(options.seed, options.robot), alone
+            )
             cases.append(told(case, tell))
     return CampaignReport(campaign="load", cases=tuple(cases), summary=_summary(cases[1:]))
 
 
 def judge(name: str, outcome: Outcome, alone: Outcome) -> CampaignCase:
     """Return the verdict on one run by the one that had the computer for itself."""
-    failures = [] if outcome["success"] else [f"failed: {outcome['error'] or outcome['refused']}"]
-    failures += [f"{what}: {outcome[what]}, expected 0" for what in _NONE_OF if outcome.get(what)]
+    failures = faults_of(outcome)
     if _skills(outcome) != _skills(alone):
         failures.append(f"did {_skills(outcome)}, alone {_skills(alone)}")
     apart_m = _apart_m(outcome, alone)
@@ -72,26 +66,6 @@ def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
         "median_real_time_ratio": median(ratios) if ratios else None,
         "least_real_time_ratio": min(ratios, default=None),
     }
-
-
-def _demo(seed: int) -> Outcome:
-    """Run `vla-deploy demo` as a new user does, on a runtime directory that remembers nothing."""
-    with tempfile.TemporaryDirectory(prefix="vla-load-") as folder:
-        base, out = Path(folder) / "base", Path(folder) / "out"
-        words = ["--runtime-base", str(base), "demo", "--json", "--seed", str(seed)]
-        done = subprocess.run(
-            [*VLA_DEPLOY, *words, "--out", str(out)],
-            capture_output=True,
-            text=True,
-            timeout=_LONGEST_S,
-            check=False,
-        )
-    try:
-        outcome: Outcome = json.loads(done.stdout)
-    except json.JSONDecodeError:
-        error = done.stderr.strip() or f"exit code {done.returncode}"
-        return {"success": False, "error": error, "actions": [], "placement_error_m": None}
-    return outcome
 
 
 @contextmanager

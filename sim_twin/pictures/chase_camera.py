@@ -12,6 +12,8 @@ ANGLE_COST_DEG = {125.0: 0.0, -125.0: 0.0, 45.0: 15.0, -45.0: 15.0}
 ELEVATIONS_DEG = (28.0, 34.0, 40.0, 46.0, 52.0, 58.0, 64.0, 70.0)
 WATCHED_M = ((0.0, 0.45), (0.0, 0.95), (0.45, 0.62))
 """Points to keep in sight: how far ahead of the base, how high; the last is where hands work."""
+MOUNTED_SCALE = 0.36
+"""Of these lengths, for an arm that is mounted on a table."""
 HIDDEN_COST_DEG = 40.0
 SWITCH_COST_DEG = 10.0
 FOLLOW_SHARE = 0.12
@@ -26,10 +28,11 @@ class ChaseCamera:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self.view = mujoco.MjvCamera()
         self.view.type = mujoco.mjtCamera.mjCAMERA_FREE.value
-        self.view.distance = DISTANCE_M
         self._model = model
         self._data = data
         self._root = model.body(ROBOT_ROOT).id
+        self._scale = 1.0 if model.body_dofnum[self._root] else MOUNTED_SCALE
+        self.view.distance = self._scale * DISTANCE_M
         self._angle_deg = next(iter(ANGLE_COST_DEG))
         self._move(share=1.0)
 
@@ -55,7 +58,7 @@ class ChaseCamera:
         azimuth, elevation = np.radians([self._azimuth_deg(angle_deg), elevation_deg])
         level = np.cos(elevation)
         back = np.array([-level * np.cos(azimuth), -level * np.sin(azimuth), np.sin(elevation)])
-        eye = target + DISTANCE_M * back
+        eye = target + self.view.distance * back
         hidden = sum(self._is_hidden(self._point(*watched), eye) for watched in WATCHED_M)
         switch = SWITCH_COST_DEG * (angle_deg != self._angle_deg)
         return elevation_deg + HIDDEN_COST_DEG * hidden + ANGLE_COST_DEG[angle_deg] + switch
@@ -69,7 +72,8 @@ class ChaseCamera:
     def _point(self, ahead_m: float, height_m: float) -> Point:
         matrix = self._data.xmat[self._root]
         ahead = np.array([matrix[0], matrix[3], 0.0])
-        point: Point = self._data.xpos[self._root] + ahead_m * ahead + [0.0, 0.0, height_m]
+        offset_m = self._scale * (ahead_m * ahead + [0.0, 0.0, height_m])
+        point: Point = self._data.xpos[self._root] + offset_m
         return point
 
     def _azimuth_deg(self, angle_deg: float) -> float:

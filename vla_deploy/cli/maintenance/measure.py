@@ -29,6 +29,7 @@ BENCHMARKS: Final = {
     "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
 }
 CAMPAIGNS: Final = {
+    "demos": "the job of `demo` in one random scene after the other; --robot, --count, --seed",
     "faults": "every fault in every phase of the work, on the lock-step twin",
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
     "load": "the main job repeatedly, with eight busy loops: only its duration may change",
@@ -38,10 +39,11 @@ CAMPAIGNS: Final = {
     "soak": "hours of work in lock-step: memory, files and threads must not grow",
 }
 _BENCH_EXAMPLES: Final = "  vla-deploy bench bus --family feetech --json\n  vla-deploy bench twin\n"
-_VALIDATE_EXAMPLES: Final = """  vla-deploy validate faults --only servo_bus --json
+_VALIDATE_EXAMPLES: Final = """  vla-deploy validate demos --robot so101
+  vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20 --junit out/kills.xml
 """
-_PASSED_ON: Final = ("only", "count", "hours", "seed", "workers", "junit")
+_PASSED_ON: Final = ("only", "count", "hours", "seed", "workers", "junit", "robot")
 
 
 def register(commands: Any) -> None:
@@ -68,6 +70,7 @@ def register(commands: Any) -> None:
     validate.add_argument(
         "--workers", type=whole_number(), help="how many cases at a time (default: 2)"
     )
+    validate.add_argument("--robot", help="of demos and load (default: butler)")
     validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
     validate.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
 
