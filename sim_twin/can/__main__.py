@@ -28,6 +28,7 @@ from sim_twin.ports.pty_line import PtyLine
 
 _NODE_IDS: Final = {"cia402": (1, 126), "odrive": (0, 62)}
 _BESIDE_THE_SOCKET: Final = Path()
+_TERMINALS: Final = Path("/dev/pts")
 
 
 def serve(
@@ -39,11 +40,11 @@ def serve(
 ) -> None:
     """Carry frames as they come and turn the wheels every 2 ms, until interrupted."""
     step_at_ns = clock.now_ns()
-    lines = [] if line is None else [line]
+    terminals = [] if line is None else [line.fileno()]
     while True:
         due_ns = min(step_at_ns, wire.next_due_ns() or step_at_ns)
         wait_s = max(0.0, (due_ns - clock.now_ns()) / NS_PER_S)
-        ready = select.select([*hub.filenos(), *lines], [], [], wait_s)[0]
+        ready = select.select([*hub.filenos(), *terminals], [], [], wait_s)[0]
         wire.poll(clock.now_ns())
         if ready:
             hub.poll_once()
@@ -122,8 +123,12 @@ def _parse() -> argparse.Namespace:
 def _place_slcan(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     if options.slcan is _BESIDE_THE_SOCKET:
         options.slcan = options.socket.with_name(f"{options.socket.name}.tty")
-    if options.slcan.exists() and not options.slcan.is_symlink():
-        parser.error(f"--slcan: {options.slcan} is there and no link to a terminal; choose another")
+    path: Path = options.slcan
+    left_behind = path.is_symlink() and path.readlink().parent == _TERMINALS
+    if not left_behind and (path.is_symlink() or path.exists()):
+        parser.error(
+            f"--slcan: {path} is there already and no link to a pseudo-terminal; choose another"
+        )
     if options.bitrate not in BITRATES.values():
         parser.error(
             f"--slcan: expected a bit rate of slcan ({', '.join(map(str, BITRATES.values()))}), "

@@ -33,7 +33,7 @@ from drivers.odrive.endpoints import (
     read_endpoints,
 )
 from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, MotorMounting
-from sim_twin.can.odrive.calibration import CALIBRATIONS, Calibration
+from sim_twin.can.odrive.calibration import CALIBRATIONS, AxisCalibration
 from sim_twin.can.odrive.controller import ODriveController
 from sim_twin.can.odrive.inputs import INPUTS, refuse_nan
 from sim_twin.can.odrive.meters import METERS, ODriveMeters
@@ -107,7 +107,7 @@ class ODriveAxis(EmulatedDrive):
         self._errors = AxisError(0)
         self._disarm_reason = AxisError(0)
         self._procedure_result = ProcedureResult.SUCCESS
-        self._calibration: Calibration | None = None
+        self._calibration: AxisCalibration | None = None
         self._meters.forget()
         self._fed_ns = self._now_ns or 0
         self._due_ns = {HEARTBEAT_RATE: 0, ENCODER_RATE: 0}
@@ -258,7 +258,7 @@ class ODriveAxis(EmulatedDrive):
     def _start_calibration(self, wanted: AxisState) -> None:
         if self._may_start():
             now_ns = self._now_ns or 0
-            self._calibration = Calibration(wanted, now_ns)
+            self._calibration = AxisCalibration(wanted, now_ns)
             self._state = self._calibration.state(now_ns)
             self._procedure_result = ProcedureResult.BUSY
 

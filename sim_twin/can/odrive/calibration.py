@@ -29,7 +29,7 @@ CALIBRATIONS: Final[Mapping[int, tuple[AxisState, ...]]] = {
 """What Set_Axis_State may ask for, with the states that the heartbeat then shows, in order."""
 
 
-class Calibration:
+class AxisCalibration:
     """Follow one calibration; the emulated motor and encoder need none, so each succeeds."""
 
     def __init__(self, wanted: AxisState, start_ns: int) -> None:

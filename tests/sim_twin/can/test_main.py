@@ -21,7 +21,8 @@ COMMAND = [sys.executable, "-m", "sim_twin.can", "--socket"]
         (["--nodes", "999"], "got [999]"),
         (["--nodes", "63", "--protocol", "odrive"], "0..62 for odrive"),
         (["--slcan", "--bitrate", "800000"], "expected a bit rate of slcan (10000, "),
-        (["--slcan", __file__], "no link to a terminal"),
+        (["--slcan", "/proc/self/exe"], "no link to a pseudo-terminal"),
+        (["--slcan", __file__], "no link to a pseudo-terminal"),
     ],
 )
 def test_options_that_cannot_be_are_refused(
