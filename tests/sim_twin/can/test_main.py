@@ -8,6 +8,7 @@ import can
 import pytest
 
 from drivers.odrive.codec import OdriveCommand
+from sim_twin.can.__main__ import main
 from sim_twin.can.bus.wire import DEFAULT_BITRATE as BITRATE
 from sim_twin.can.odrive.axis import PROTOCOL_VERSION
 
@@ -26,12 +27,17 @@ COMMAND = [sys.executable, "-m", "sim_twin.can", "--socket"]
     ],
 )
 def test_options_that_cannot_be_are_refused(
-    tmp_path: Path, words: list[str], complaint: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    complaint: str,
 ) -> None:
-    command = [*COMMAND, str(tmp_path / "can"), *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
-    assert done.returncode == 2
-    assert complaint in done.stderr
+    monkeypatch.setattr(sys, "argv", ["sim_twin.can", "--socket", str(tmp_path / "can"), *words])
+    with pytest.raises(SystemExit) as refusal:
+        main()
+    assert refusal.value.code == 2
+    assert complaint in capsys.readouterr().err
 
 
 @pytest.mark.stack
