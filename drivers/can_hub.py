@@ -2,12 +2,16 @@
 
 One SOCK_SEQPACKET packet is one frame: ordered, reliable, and the socket can be polled. The hub at
 the other end passes each frame to all others, as a bus does; it never sends a frame back.
+
+Received frames carry the seconds since the epoch at which they were read, as python-can's loggers
+take them. The drivers pass over that stamp: their time is that of the clock they are given.
 """
 
 import select
 import socket
 import struct
-import time
+from collections.abc import Callable
+from datetime import UTC, datetime
 from typing import Final
 
 import can
@@ -38,8 +42,13 @@ def encode_frame(message: can.Message) -> bytes:
     return _WIRE.pack(message.arbitration_id, flags, message.dlc, bytes(message.data))
 
 
-def decode_frame(packet: bytes) -> can.Message:
-    """Unpack one packet into a frame stamped with monotonic seconds.
+def epoch_s() -> float:
+    """Return the seconds since the epoch, by the wall clock."""
+    return datetime.now(UTC).timestamp()
+
+
+def decode_frame(packet: bytes, stamp_s: float = 0.0) -> can.Message:
+    """Unpack one packet into a frame.
 
     Raises:
         ProtocolError: the packet is not one frame.
@@ -51,7 +60,7 @@ def decode_frame(packet: bytes) -> can.Message:
     if dlc > limit_bytes:
         raise ProtocolError(f"CAN hub frame claims {dlc} data bytes, at most {limit_bytes} fit")
     return can.Message(
-        timestamp=time.monotonic(),
+        timestamp=stamp_s,
         arbitration_id=arbitration_id,
         is_extended_id=bool(flags & _EXTENDED),
         is_remote_frame=bool(flags & _REMOTE),
@@ -67,13 +76,21 @@ def decode_frame(packet: bytes) -> can.Message:
 class HubBus(can.BusABC):  # type: ignore[misc]
     """Speak to the CAN hub that listens at the socket path `channel`."""
 
-    def __init__(self, channel: str, can_filters: object = None, **kwargs: object) -> None:
-        """Connect to the hub.
+    def __init__(
+        self,
+        channel: str,
+        can_filters: object = None,
+        *,
+        now_s: Callable[[], float] = epoch_s,
+        **kwargs: object,
+    ) -> None:
+        """Connect to the hub; `now_s` stamps what is received.
 
         Raises:
             can.CanInitializationError: nothing listens at `channel`.
         """
         self.channel_info = f"CAN hub {channel}"
+        self._now_s = now_s
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             self._socket.connect(str(channel))
@@ -118,7 +135,7 @@ class HubBus(can.BusABC):  # type: ignore[misc]
         if packet is None and (timeout is None or timeout > 0.0):
             select.select([self._socket], [], [], timeout)
             packet = self._receive()
-        return (None if packet is None else decode_frame(packet)), False
+        return (None if packet is None else decode_frame(packet, self._now_s())), False
 
     def _receive(self) -> bytes | None:
         try:

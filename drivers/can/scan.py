@@ -36,7 +36,8 @@ LISTEN_NS: Final = NS_PER_S // 2
 ANSWER_NS: Final = 200_000_000
 NODES_AT_ONCE: Final = 8  # a SocketCAN transmit queue holds ten frames
 MAX_CANOPEN_NODE: Final = 127
-_HEARTBEAT_SIZES: Final = (MESSAGES[OdriveCommand.HEARTBEAT].wire.size, 8)
+_HEARTBEAT: Final = MESSAGES[OdriveCommand.HEARTBEAT]
+_HEARTBEAT_SIZES: Final = (_HEARTBEAT.least_bytes, _HEARTBEAT.wire.size)
 
 
 @dataclass(slots=True, kw_only=True)

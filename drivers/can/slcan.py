@@ -57,6 +57,15 @@ def parse_line(line: str) -> can.Message | None:
     )
 
 
+def format_line(frame: can.Message) -> str:
+    """Return the line of a classic frame, without its end."""
+    kind, digits = ("r" if frame.is_remote_frame else "t"), 3
+    if frame.is_extended_id:
+        kind, digits = kind.upper(), 8
+    data = "" if frame.is_remote_frame else bytes(frame.data).hex().upper()
+    return f"{kind}{frame.arbitration_id:0{digits}X}{frame.dlc:d}{data}"
+
+
 class SerialCanBus(slcanBus):  # type: ignore[misc]
     """Be python-can's slcan bus with a receiving half fit for a control loop.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final
 
 import can
@@ -28,7 +29,9 @@ from drivers.odrive.codec import (
     ControlMode,
     InputMode,
     OdriveCommand,
+    ProcedureResult,
     decode,
+    is_request,
     split_id,
 )
 
@@ -42,7 +45,7 @@ class Words:
     text: str
 
 
-def _named(kind: type[NmtCommand | NmtState | AxisState | ControlMode | InputMode], n: int) -> str:
+def _named(kind: type[IntEnum], n: int) -> str:
     return kind(n).name if n in set(kind) else f"unknown {n}"
 
 
@@ -142,10 +145,13 @@ def describe_odrive(frame: can.Message) -> Words:
     if number not in set(OdriveCommand):
         return Words(kind=f"command 0x{number:02X}", node=node, text="")
     command = OdriveCommand(number)
+    data = bytes(frame.data)
     if frame.is_remote_frame:
         text = "asked for by a remote frame"
+    elif is_request(command, remote=False, data=data):
+        text = "asked for by an empty frame"
     else:
-        text = _told(lambda data: _signals(command, data), bytes(frame.data))
+        text = _told(lambda data: _signals(command, data), data)
     return Words(kind=MESSAGES[command].name, node=node, text=text)
 
 
@@ -160,6 +166,7 @@ def _outside_classic(frame: can.Message) -> Words | None:
 _SIGNAL_WORDS: Final[Mapping[str, Callable[[int], str]]] = {
     "Axis_State": lambda n: _named(AxisState, n),
     "Axis_Requested_State": lambda n: _named(AxisState, n),
+    "Procedure_Result": lambda n: _named(ProcedureResult, n),
     "Control_Mode": lambda n: _named(ControlMode, n),
     "Input_Mode": lambda n: _named(InputMode, n),
     "Axis_Error": lambda n: _errors(n),

@@ -1,7 +1,8 @@
 """Name and pack the messages of ODrive's CANSimple protocol: firmware 0.6, classic 11-bit frames.
 
 A frame's identifier is `node_id << 5 | command`. An axis sends some messages by itself at rates of
-its configuration; any `Get_…` is also sent in answer to a remote frame of the same identifier.
+its configuration. It sends those of `REQUESTABLE` also in answer to a frame of the same identifier
+that is remote or has no data.
 """
 
 import struct
@@ -67,6 +68,31 @@ class AxisState(IntEnum):
     HOMING = 11
     ENCODER_HALL_POLARITY_CALIBRATION = 12
     ENCODER_HALL_PHASE_CALIBRATION = 13
+    ANTICOGGING_CALIBRATION = 14
+    HARMONIC_CALIBRATION = 15
+    HARMONIC_CALIBRATION_COMMUTATION = 16
+
+
+class ProcedureResult(IntEnum):
+    """Name how the last procedure ended, as shown by the heartbeat (`odrive.enums` 0.6.11)."""
+
+    SUCCESS = 0
+    BUSY = 1
+    CANCELLED = 2
+    DISARMED = 3
+    NO_RESPONSE = 4
+    POLE_PAIR_CPR_MISMATCH = 5
+    PHASE_RESISTANCE_OUT_OF_RANGE = 6
+    PHASE_INDUCTANCE_OUT_OF_RANGE = 7
+    UNBALANCED_PHASES = 8
+    INVALID_MOTOR_TYPE = 9
+    ILLEGAL_HALL_STATE = 10
+    TIMEOUT = 11
+    HOMING_WITHOUT_ENDSTOP = 12
+    INVALID_STATE = 13
+    NOT_CALIBRATED = 14
+    NOT_CONVERGING = 15
+    REQUESTED_CURRENT_TOO_HIGH = 16
 
 
 class ControlMode(IntEnum):
@@ -125,15 +151,23 @@ class AxisError(IntFlag):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdriveMessage:
-    """Describe one message: its vendor's name, its packing and its signals in order."""
+    """Describe one message: its vendor's name, its packing and its signals in order.
+
+    `least_bytes` are those that a receiver needs; what is left out behind them counts as zero.
+    """
 
     name: str
     wire: struct.Struct
-    signals: tuple[str, ...] = ()
+    signals: tuple[str, ...]
+    least_bytes: int
 
 
-def _message(name: str, layout: str, *signals: str) -> OdriveMessage:
-    return OdriveMessage(name=name, wire=struct.Struct(f"<{layout}"), signals=signals)
+def _message(
+    name: str, layout: str, *signals: str, least_bytes: int | None = None
+) -> OdriveMessage:
+    wire = struct.Struct(f"<{layout}")
+    least_bytes = wire.size if least_bytes is None else least_bytes
+    return OdriveMessage(name=name, wire=wire, signals=signals, least_bytes=least_bytes)
 
 
 _C = OdriveCommand
@@ -151,14 +185,25 @@ MESSAGES: Final[dict[OdriveCommand, OdriveMessage]] = {
         "Fw_Version_Revision",
         "Fw_Version_Unreleased",
     ),
+    # The vendor's DBC file ends it after seven bytes; its ROS node takes no less than eight.
     _C.HEARTBEAT: _message(
-        "Heartbeat", "IBBB", "Axis_Error", "Axis_State", "Procedure_Result", "Trajectory_Done_Flag"
+        "Heartbeat",
+        "IBBBx",
+        "Axis_Error",
+        "Axis_State",
+        "Procedure_Result",
+        "Trajectory_Done_Flag",
+        least_bytes=7,
     ),
     _C.ESTOP: _message("Estop", ""),
     _C.GET_ERROR: _message("Get_Error", "II", "Active_Errors", "Disarm_Reason"),
-    _C.RX_SDO: _message("RxSdo", "BHx4s", "Opcode", "Endpoint_ID", "Value"),
+    # The vendor's examples end it after the header (read) or after the value's own bytes (write).
+    _C.RX_SDO: _message("RxSdo", "BHx4s", "Opcode", "Endpoint_ID", "Value", least_bytes=4),
     _C.TX_SDO: _message("TxSdo", "xHx4s", "Endpoint_ID", "Value"),
-    _C.ADDRESS: _message("Address", "B6sB", "Node_ID", "Serial_Number", "Connection_ID"),
+    # Hosts of firmware before 0.6.11 send no connection id.
+    _C.ADDRESS: _message(
+        "Address", "B6sB", "Node_ID", "Serial_Number", "Connection_ID", least_bytes=7
+    ),
     _C.SET_AXIS_STATE: _message("Set_Axis_State", "I", "Axis_Requested_State"),
     _C.GET_ENCODER_ESTIMATES: _message(
         "Get_Encoder_Estimates", "ff", "Pos_Estimate", "Vel_Estimate"
@@ -188,6 +233,21 @@ MESSAGES: Final[dict[OdriveCommand, OdriveMessage]] = {
     _C.ENTER_DFU_MODE: _message("Enter_DFU_Mode", ""),
 }
 
+REQUESTABLE: Final = frozenset(
+    {
+        _C.GET_VERSION,
+        _C.HEARTBEAT,
+        _C.GET_ERROR,
+        _C.ADDRESS,
+        _C.GET_ENCODER_ESTIMATES,
+        _C.GET_IQ,
+        _C.GET_TEMPERATURE,
+        _C.GET_BUS_VOLTAGE_CURRENT,
+        _C.GET_TORQUES,
+        _C.GET_POWERS,
+    }
+)
+
 
 def can_id(node_id: int, command: OdriveCommand) -> int:
     """Return the identifier of a command to, or of a message from, an axis."""
@@ -210,11 +270,17 @@ def decode(command: OdriveCommand, data: bytes) -> tuple[int | float | bytes, ..
     A frame may be padded up to eight bytes, as the vendor's DBC file declares most messages.
 
     Raises:
-        ProtocolError: the frame is shorter than its signals or longer than a classic frame.
+        ProtocolError: the frame is shorter than it may be or longer than a classic frame.
     """
     message = MESSAGES[command]
-    if not message.wire.size <= len(data) <= MAX_DATA_BYTES:
+    least = message.least_bytes
+    if not least <= len(data) <= MAX_DATA_BYTES:
         raise ProtocolError(
-            f"{message.name} has {len(data)} bytes, expected {message.wire.size}..{MAX_DATA_BYTES}"
+            f"{message.name} has {len(data)} bytes, expected {least}..{MAX_DATA_BYTES}"
         )
-    return message.wire.unpack_from(data)
+    return message.wire.unpack_from(data.ljust(message.wire.size, b"\0"))
+
+
+def is_request(command: OdriveCommand, *, remote: bool, data: bytes) -> bool:
+    """Return whether a frame asks the axis for its message."""
+    return command in REQUESTABLE and (remote or not data)

@@ -86,7 +86,7 @@ def test_odrive_messages_survive_their_own_packing(count: int) -> None:
         data = source.randbytes(MESSAGES[command].wire.size)
         values = decode(command, data)
         again = encode(command, *values)
-        padding = {OdriveCommand.RX_SDO, OdriveCommand.TX_SDO}
+        padding = {OdriveCommand.RX_SDO, OdriveCommand.TX_SDO, OdriveCommand.HEARTBEAT}
         if command in padding or any(value != value for value in values):
             assert struct.calcsize(MESSAGES[command].wire.format) == len(again)
         else:

@@ -1,5 +1,6 @@
 import threading
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import can
@@ -88,6 +89,34 @@ def test_the_plug_in_is_found_by_its_name(hub: CanHub, path: Path) -> None:
     with can.Bus(interface="vla_hub", channel=str(path)) as bus:
         assert isinstance(bus, HubBus)
         assert bus.fileno() >= 0
+
+
+NOVEMBER_2023_S = 1_700_000_000.25
+
+
+@pytest.mark.parametrize("suffix", [".log", ".blf"])
+def test_loggers_keep_the_epoch_that_a_received_frame_is_stamped_with(
+    hub: CanHub, path: Path, suffix: str
+) -> None:
+    file = path.with_suffix(suffix)
+    with opened(hub, path) as sender, HubBus(str(path), now_s=lambda: NOVEMBER_2023_S) as bus:
+        hub.poll_once()
+        sender.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=b"abc"))
+        hub.poll_once()
+        with can.Logger(file) as logger:
+            logger(bus.recv(timeout=0.0))
+    with can.LogReader(file) as frames:
+        assert [frame.timestamp for frame in frames] == [pytest.approx(NOVEMBER_2023_S, abs=1e-3)]
+
+
+def test_stamps_are_the_wall_clocks_unless_told_otherwise(hub: CanHub, path: Path) -> None:
+    with opened(hub, path) as sender, opened(hub, path) as receiver:
+        before_s = datetime.now(UTC).timestamp()
+        sender.send(can.Message(arbitration_id=1, is_extended_id=False))
+        hub.poll_once()
+        frame = receiver.recv(timeout=0.0)
+        assert frame is not None
+        assert before_s <= frame.timestamp <= datetime.now(UTC).timestamp()
 
 
 def test_filters_hide_other_frames(hub: CanHub, path: Path) -> None:

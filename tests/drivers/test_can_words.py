@@ -48,6 +48,7 @@ def test_canopen_frames(can_id_: int, data: str, kind: str, node: int | None, te
         (OdriveCommand.SET_INPUT_VEL, (1.5, 0.0), "Input_Vel 1.5, Input_Torque_FF 0"),
         (OdriveCommand.GET_ERROR, (0, 0x100_0000), "Disarm_Reason WATCHDOG_TIMER_EXPIRED"),
         (OdriveCommand.HEARTBEAT, (0, 99, 0, 0), "Axis_State unknown 99"),
+        (OdriveCommand.HEARTBEAT, (0, 4, 1, 0), "MOTOR_CALIBRATION, Procedure_Result BUSY"),
         (OdriveCommand.ESTOP, (), ""),
     ],
 )
@@ -60,5 +61,8 @@ def test_odrive_frames(command: OdriveCommand, values: tuple[float, ...], text: 
 def test_requests_by_remote_frame_and_unknown_commands_are_described() -> None:
     asked = describe_odrive(frame(can_id(5, OdriveCommand.GET_IQ), remote=True))
     assert asked == Words(kind="Get_Iq", node=5, text="asked for by a remote frame")
+    assert describe_odrive(frame(can_id(5, OdriveCommand.GET_IQ))).text == (
+        "asked for by an empty frame"
+    )
     assert describe_odrive(frame(5 << 5 | 0x08)).kind == "command 0x08"
     assert describe_odrive(frame(0x3F << 5 | OdriveCommand.ESTOP)).node is None

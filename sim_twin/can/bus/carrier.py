@@ -76,6 +76,11 @@ class FrameCarrier:
         self._timed = timed
         self._sound = False  # the next `poll` finds out whether it is
 
+    @property
+    def now_ns(self) -> int:
+        """Return the time that the wire has reached."""
+        return self._now_ns
+
     def poll(self, now_ns: int) -> None:
         """Carry what is due at `now_ns`; time never goes back."""
         if self._sound:

@@ -14,10 +14,12 @@ from drivers.odrive.codec import (
     AxisError,
     AxisState,
     OdriveCommand,
+    ProcedureResult,
     SdoOpcode,
     can_id,
     decode,
     encode,
+    is_request,
     split_id,
 )
 from drivers.odrive.endpoints import (
@@ -31,6 +33,7 @@ from drivers.odrive.endpoints import (
     read_endpoints,
 )
 from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, MotorMounting
+from sim_twin.can.odrive.calibration import CALIBRATIONS, AxisCalibration
 from sim_twin.can.odrive.controller import ODriveController
 from sim_twin.can.odrive.inputs import INPUTS, refuse_nan
 from sim_twin.can.odrive.meters import METERS, ODriveMeters
@@ -48,7 +51,6 @@ TRIP_ERRORS: Final = {
     Trip.OVER_TEMPERATURE: AxisError.MOTOR_OVER_TEMP,
     Trip.OVERLOAD: AxisError.CURRENT_LIMIT_VIOLATION,
 }
-SUCCESS, CANCELLED, DISARMED = 0, 2, 3
 RESTART, SAVE_CONFIGURATION, ERASE_CONFIGURATION = range(3)
 
 
@@ -104,7 +106,8 @@ class ODriveAxis(EmulatedDrive):
         self._state = AxisState.IDLE
         self._errors = AxisError(0)
         self._disarm_reason = AxisError(0)
-        self._procedure_result = SUCCESS
+        self._procedure_result = ProcedureResult.SUCCESS
+        self._calibration: AxisCalibration | None = None
         self._meters.forget()
         self._fed_ns = self._now_ns or 0
         self._due_ns = {HEARTBEAT_RATE: 0, ENCODER_RATE: 0}
@@ -126,7 +129,11 @@ class ODriveAxis(EmulatedDrive):
 
     @property
     def armed(self) -> bool:
-        """Return whether the axis is in closed loop control."""
+        """Return whether the power stage is on: in closed loop control and while calibrating."""
+        return self._state is not AxisState.IDLE
+
+    @property
+    def _regulating(self) -> bool:
         return self._state is AxisState.CLOSED_LOOP_CONTROL
 
     @property
@@ -139,8 +146,7 @@ class ODriveAxis(EmulatedDrive):
         self._errors |= AxisError(code)
         if self.armed:
             self._disarm_reason |= AxisError(code)
-            self._procedure_result = DISARMED
-            self._state = AxisState.IDLE
+            self._rest(ProcedureResult.DISARMED)
         self._tell(OdriveCommand.HEARTBEAT)
 
     def _trip(self, cause: Trip) -> None:
@@ -152,11 +158,12 @@ class ODriveAxis(EmulatedDrive):
 
     def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
         self._watch(now_ns)
+        self._calibrate(now_ns)
         velocity_rev_s = velocity_rad_s / math.tau
-        if self.armed and self._controller.overspeed(velocity_rev_s):
+        if self._regulating and self._controller.overspeed(velocity_rev_s):
             self.raise_fault(AxisError.VELOCITY_LIMIT_VIOLATION)
         torque_nm = 0.0
-        if self.armed:
+        if self._regulating:
             torque_nm = self._controller.torque_nm(dt_s, self._meters.position_rev, velocity_rev_s)
         self._meters.note_torque(torque_nm)
         self._speak(now_ns)
@@ -169,6 +176,23 @@ class ODriveAxis(EmulatedDrive):
         expired = now_ns - self._fed_ns > limit_ns
         if expired and AxisError.WATCHDOG_TIMER_EXPIRED not in self._errors:
             self.raise_fault(AxisError.WATCHDOG_TIMER_EXPIRED)
+
+    def _calibrate(self, now_ns: int) -> None:
+        """Show the step that the calibration has reached; after the last one the axis is idle."""
+        if self._calibration is None:
+            return
+        state = self._calibration.state(now_ns)
+        if state is AxisState.IDLE:
+            self._rest(ProcedureResult.SUCCESS)
+        elif state is self._state:
+            return
+        self._state = state
+        self._tell(OdriveCommand.HEARTBEAT)
+
+    def _rest(self, result: ProcedureResult) -> None:
+        self._state = AxisState.IDLE
+        self._calibration = None
+        self._procedure_result = result
 
     def _speak(self, now_ns: int) -> None:
         """Send what is due by itself; a rate of 0 ms is off."""
@@ -188,10 +212,11 @@ class ODriveAxis(EmulatedDrive):
             self._fed_ns = self._now_ns
         try:
             command = OdriveCommand(number)
-            if frame.is_remote_frame:
+            data = bytes(frame.data)
+            if is_request(command, remote=frame.is_remote_frame, data=data):
                 self._tell(command)
-            else:
-                self._react(command, bytes(frame.data))
+            elif not frame.is_remote_frame:
+                self._react(command, data)
         except (ValueError, ProtocolError):
             # CANSimple has no way to refuse: what does not fit changes nothing.
             return
@@ -203,44 +228,54 @@ class ODriveAxis(EmulatedDrive):
             _REACTIONS[command](self, *decode(command, data))
 
     def _tell(self, command: OdriveCommand) -> None:
-        told: tuple[Any, ...]
         if command in METERS:
-            told = METERS[command](self._meters)
-        elif command in _TOLD:
-            told = _TOLD[command](self)
+            told: tuple[Any, ...] = METERS[command](self._meters)
         else:
-            return
+            told = _TOLD[command](self)
         self._transmit(can_id(self.node_id, command), encode(command, *told))
 
     def _on_axis_state(self, wanted: int) -> None:
-        if wanted == AxisState.IDLE:
-            self._state = AxisState.IDLE
-            self._procedure_result = SUCCESS
-        elif wanted == AxisState.CLOSED_LOOP_CONTROL:
+        if wanted == AxisState.CLOSED_LOOP_CONTROL:
             self._arm()
-        else:
-            self._procedure_result = CANCELLED  # calibrations: the emulated motor needs none
+        elif wanted in _RESTING:
+            cancelled = self._calibration is not None
+            self._rest(ProcedureResult.CANCELLED if cancelled else ProcedureResult.SUCCESS)
+        elif wanted in CALIBRATIONS:
+            self._start_calibration(AxisState(wanted))
+        elif self._calibration is None:
+            self._procedure_result = _REFUSALS.get(wanted, ProcedureResult.INVALID_STATE)
         self._tell(OdriveCommand.HEARTBEAT)
 
     def _arm(self) -> None:
-        if self.armed:
+        if self._regulating:
             return
         if not self._controller.supported:
             self._errors |= AxisError.BAD_CONFIG
-        if self._errors:
-            self._procedure_result = DISARMED
-            return
-        self._disarm_reason = AxisError(0)
-        self._procedure_result = SUCCESS
-        self._controller.arm(*self._meters.estimates())
-        self._state = AxisState.CLOSED_LOOP_CONTROL
+        if self._may_start():
+            self._controller.arm(*self._meters.estimates())
+            self._state = AxisState.CLOSED_LOOP_CONTROL
+
+    def _start_calibration(self, wanted: AxisState) -> None:
+        if self._may_start():
+            now_ns = self._now_ns or 0
+            self._calibration = AxisCalibration(wanted, now_ns)
+            self._state = self._calibration.state(now_ns)
+            self._procedure_result = ProcedureResult.BUSY
+
+    def _may_start(self) -> bool:
+        """End what the axis does, and tell whether no error keeps it from the next."""
+        self._rest(ProcedureResult.DISARMED if self._errors else ProcedureResult.SUCCESS)
+        if not self._errors:
+            self._disarm_reason = AxisError(0)
+        return not self._errors
 
     def _on_estop(self) -> None:
         self.raise_fault(AxisError.ESTOP_REQUESTED)
 
     def _on_clear_errors(self, _identify: int) -> None:
         self._errors = self._disarm_reason = AxisError(0)
-        self._procedure_result = SUCCESS
+        if self._calibration is None:
+            self._procedure_result = ProcedureResult.SUCCESS
 
     def _on_reboot(self, action: int) -> None:
         if action == SAVE_CONFIGURATION:
@@ -274,6 +309,11 @@ class ODriveAxis(EmulatedDrive):
         return self._errors | self._disarm_reason, self._state, self._procedure_result, arrived
 
 
+# No start-up flag is set, so the start-up sequence has no step before idle.
+_RESTING: Final = frozenset({AxisState.IDLE, AxisState.STARTUP_SEQUENCE})
+_REFUSALS: Final[Mapping[int, ProcedureResult]] = {
+    AxisState.HOMING: ProcedureResult.HOMING_WITHOUT_ENDSTOP,
+}
 _CYCLIC: Final = {
     HEARTBEAT_RATE: OdriveCommand.HEARTBEAT,
     ENCODER_RATE: OdriveCommand.GET_ENCODER_ESTIMATES,

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.errors import DeviceMissing, NoReply, ProtocolError, WrongDevice
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
+from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.codec import (
     MESSAGES,
     AxisError,
@@ -28,7 +29,7 @@ from drivers.odrive.endpoints import (
     read_endpoints,
 )
 from drivers.odrive.faults import AxisFault
-from drivers.wheel_drives.bus import ResetRule
+from drivers.wheel_drives.bus import PowerState, ResetRule
 from sim_twin.can import MemoryBus
 from sim_twin.can.odrive.axis import _REACTIONS
 from sim_twin.can.odrive.meters import ODriveMeters
@@ -114,6 +115,31 @@ def test_an_axis_that_was_never_calibrated_says_what_to_do(
     monkeypatch.setattr(ODriveMeters, "position_rev", property(lambda meters: math.nan))
     with pytest.raises(WrongDevice, match="calibrate"):
         odrive.bus.connect()
+
+
+def test_an_axis_that_calibrates_is_cancelled_by_connecting_and_not_ready_in_operation(
+    odrive: Any,
+) -> None:
+    calibrate = encode(OdriveCommand.SET_AXIS_STATE, AxisState.FULL_CALIBRATION_SEQUENCE)
+    odrive.axes[0]._react(OdriveCommand.SET_AXIS_STATE, calibrate)
+    odrive.bus.connect()
+    assert odrive.powered() == [False, False]
+    odrive.run(0.1)
+    odrive.axes[0]._react(OdriveCommand.SET_AXIS_STATE, calibrate)
+    odrive.pause(0.03)
+    state = odrive.bus.cycle(None)
+    assert state.power_state == (PowerState.NOT_READY, PowerState.SWITCH_ON_DISABLED)
+    state = odrive.run(0.2)
+    assert state.power_state[0] is PowerState.SWITCH_ON_DISABLED
+    assert state.healthy
+
+
+@pytest.mark.parametrize("size", [7, 8])
+def test_heartbeats_of_seven_and_of_eight_bytes_are_read(size: int) -> None:
+    port = AxisPort(AxisSpec(node_id=0, joint="left"), 100_000_000)
+    values = (AxisError.ESTOP_REQUESTED, AxisState.ANTICOGGING_CALIBRATION, 1, 1)
+    port.take(OdriveCommand.HEARTBEAT, encode(OdriveCommand.HEARTBEAT, *values)[:size], 0)
+    assert (port.errors, port.axis_state) == values[:2]
 
 
 def test_an_axis_without_an_sdo_answer_is_never_enabled(

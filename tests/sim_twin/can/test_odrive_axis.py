@@ -1,5 +1,5 @@
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import can
@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from drivers.odrive.codec import (
     MESSAGES,
+    REQUESTABLE,
     AxisError,
     AxisState,
     ControlMode,
     InputMode,
     OdriveCommand,
+    ProcedureResult,
     SdoOpcode,
 )
 from drivers.odrive.endpoints import (
@@ -30,18 +32,6 @@ from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 
 NODE_ID = 3
 ENDPOINTS = read_endpoints(EMULATED_ENDPOINTS).endpoints
-REPORTED = (
-    OdriveCommand.GET_VERSION,
-    OdriveCommand.HEARTBEAT,
-    OdriveCommand.GET_ERROR,
-    OdriveCommand.ADDRESS,
-    OdriveCommand.GET_ENCODER_ESTIMATES,
-    OdriveCommand.GET_IQ,
-    OdriveCommand.GET_TEMPERATURE,
-    OdriveCommand.GET_BUS_VOLTAGE_CURRENT,
-    OdriveCommand.GET_TORQUES,
-    OdriveCommand.GET_POWERS,
-)
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +81,27 @@ class Host:
         ]
         return [dict(wanted.decode(bytes(frame.data))) for frame in frames]
 
-    def request(self, name: str) -> dict[str, float]:
+    def next_data(self) -> bytes:
+        """Return the data of the frame that came first."""
+        frame = self.bus.recv()
+        assert frame is not None
+        return bytes(frame.data)
+
+    def request(self, name: str, *, remote: bool = True) -> dict[str, float]:
         self.received(name)
-        self.send(self.dbc.get_message_by_name(name).frame_id, remote=True)
+        self.send(self.dbc.get_message_by_name(name).frame_id, remote=remote)
         (answer,) = self.received(name)
         return answer
+
+    def ask_for(self, state: AxisState) -> None:
+        self.command("Set_Axis_State", Axis_Requested_State=state)
+
+    def states(self) -> list[tuple[float, float]]:
+        """Return the different pairs of state and result that the latest heartbeats showed."""
+        shown = [
+            (beat["Axis_State"], beat["Procedure_Result"]) for beat in self.received("Heartbeat")
+        ]
+        return list(dict.fromkeys(shown))
 
     def write(self, name: str, value: float) -> None:
         endpoint = ENDPOINTS[name]
@@ -119,13 +125,104 @@ def host(dbc: Database) -> Iterator[Host]:
     host.bus.shutdown()
 
 
-@pytest.mark.parametrize("command", REPORTED)
-def test_every_message_of_the_axis_decodes_by_the_dbc(host: Host, command: OdriveCommand) -> None:
+@pytest.mark.parametrize("command", sorted(REQUESTABLE))
+def test_every_message_is_asked_for_by_a_remote_or_an_empty_frame_and_decodes_by_the_dbc(
+    host: Host, command: OdriveCommand
+) -> None:
     host.enable(1.0)
     host.pass_time(0.3)
     answer = host.request(MESSAGES[command].name)
     assert set(answer) == set(MESSAGES[command].signals)
     assert all(math.isfinite(value) for value in answer.values())
+    assert host.request(MESSAGES[command].name, remote=False) == answer
+
+
+@pytest.mark.parametrize("command", sorted(set(OdriveCommand) - REQUESTABLE))
+def test_an_empty_frame_asks_for_nothing_else(host: Host, command: OdriveCommand) -> None:
+    host.received("Heartbeat")
+    host.send(command)
+    answers = {frame.arbitration_id & 0x1F for frame in iter(host.bus.recv, None)}
+    assert answers <= ({OdriveCommand.HEARTBEAT} if command == OdriveCommand.ESTOP else set())
+
+
+def test_a_heartbeat_has_eight_bytes_as_the_vendors_ros_node_asks(host: Host) -> None:
+    host.received("Heartbeat")
+    host.send(OdriveCommand.HEARTBEAT, remote=True)
+    assert len(host.next_data()) == 8
+
+
+OFFSET, MOTOR = AxisState.ENCODER_OFFSET_CALIBRATION, AxisState.MOTOR_CALIBRATION
+
+
+@pytest.mark.parametrize(
+    ("wanted", "steps", "duration_s"),
+    [
+        (AxisState.FULL_CALIBRATION_SEQUENCE, (MOTOR, OFFSET), 13.25),
+        (MOTOR, (MOTOR,), 4.25),
+        (OFFSET, (OFFSET,), 9.0),
+    ],
+)
+def test_a_calibration_shows_its_steps_as_busy_and_ends_idle(
+    host: Host, wanted: AxisState, steps: tuple[AxisState, ...], duration_s: float
+) -> None:
+    host.enable(1.0)
+    host.received("Heartbeat")
+    host.ask_for(wanted)
+    assert host.axis.armed
+    host.pass_time(duration_s - 0.1)
+    assert host.states() == [(step, ProcedureResult.BUSY) for step in steps]
+    assert host.speed_rev_s == pytest.approx(0.0, abs=0.1)
+    host.pass_time(0.3)
+    assert host.states()[-1] == (AxisState.IDLE, ProcedureResult.SUCCESS)
+    host.enable(1.0)
+
+
+def _fault(host: Host) -> None:
+    host.axis.raise_fault(AxisError.DRV_FAULT)
+
+
+CALIBRATION_ENDS: list[tuple[Callable[[Host], None], AxisState, ProcedureResult]] = [
+    (lambda host: host.ask_for(AxisState.IDLE), AxisState.IDLE, ProcedureResult.CANCELLED),
+    (lambda host: host.command("Estop"), AxisState.IDLE, ProcedureResult.DISARMED),
+    (_fault, AxisState.IDLE, ProcedureResult.DISARMED),
+    (lambda host: host.enable(), AxisState.CLOSED_LOOP_CONTROL, ProcedureResult.SUCCESS),
+    (lambda host: host.command("Clear_Errors", Identify=0), MOTOR, ProcedureResult.BUSY),
+    (lambda host: host.ask_for(AxisState.HOMING), MOTOR, ProcedureResult.BUSY),
+]
+
+
+@pytest.mark.parametrize(("act", "state", "result"), CALIBRATION_ENDS)
+def test_a_calibration_is_ended_by_a_new_request_and_by_an_error(
+    host: Host, act: Callable[[Host], None], state: AxisState, result: ProcedureResult
+) -> None:
+    host.ask_for(AxisState.FULL_CALIBRATION_SEQUENCE)
+    host.pass_time(1.0)
+    act(host)
+    host.received("Heartbeat")
+    host.pass_time(0.3)
+    assert host.states() == [(state, result)]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "result"),
+    [
+        (AxisState.HOMING, ProcedureResult.HOMING_WITHOUT_ENDSTOP),
+        (AxisState.LOCKIN_SPIN, ProcedureResult.INVALID_STATE),
+        (99, ProcedureResult.INVALID_STATE),
+        (AxisState.STARTUP_SEQUENCE, ProcedureResult.SUCCESS),
+    ],
+)
+def test_what_the_axis_cannot_do_is_a_result(
+    host: Host, wanted: AxisState, result: ProcedureResult
+) -> None:
+    host.ask_for(wanted)
+    assert host.states()[-1] == (AxisState.IDLE, result)
+
+
+def test_an_axis_with_an_error_does_not_calibrate(host: Host) -> None:
+    _fault(host)
+    host.ask_for(MOTOR)
+    assert host.states()[-1] == (AxisState.IDLE, ProcedureResult.DISARMED)
 
 
 def test_our_message_table_has_the_names_of_the_dbc(dbc: Database) -> None:
@@ -261,6 +358,16 @@ def test_a_reboot_disarms_and_forgets_what_was_not_saved(host: Host) -> None:
     assert ENDPOINTS[WATCHDOG_TIMEOUT].decode(answer[4:]) == 3.0
 
 
+def test_properties_are_reached_by_frames_without_padding_as_the_vendors_examples_send(
+    host: Host,
+) -> None:
+    number = ENDPOINTS[ENABLE_WATCHDOG].number.to_bytes(2, "little") + b"\0"
+    host.received("Heartbeat")
+    host.send(OdriveCommand.RX_SDO, b"\1" + number + b"\1")
+    host.send(OdriveCommand.RX_SDO, b"\0" + number)
+    assert host.next_data() == b"\0" + number + b"\1\0\0\0"
+
+
 def test_reading_an_unknown_endpoint_stays_unanswered(host: Host) -> None:
     host.received("Heartbeat")
     host.send(OdriveCommand.RX_SDO, b"\0" + (0xFFFF).to_bytes(2, "little") + bytes(5))
@@ -277,6 +384,12 @@ def test_a_stored_address_is_changed_by_serial_number_only(host: Host) -> None:
     host.command("Address", Node_ID=9, Serial_Number=serial + 1, Connection_ID=0)
     assert host.axis.node_id == NODE_ID
     host.command("Address", Node_ID=9, Serial_Number=serial, Connection_ID=0)
+    assert host.axis.node_id == 9
+
+
+def test_an_address_without_connection_id_is_taken(host: Host) -> None:
+    serial = int(host.request("Address")["Serial_Number"])
+    host.send(OdriveCommand.ADDRESS, b"\x09" + serial.to_bytes(6, "little"))
     assert host.axis.node_id == 9
 
 
