@@ -62,6 +62,8 @@ class ArmKinematics:
         self._columns = [robot.joint_index[name] for name in self._names]
         self._low = robot.position_min[self._columns]
         self._high = robot.position_max[self._columns]
+        self.shoulder_m: Array = self.points(np.zeros(len(robot.joint_names)))[0]
+        """The arm's first joint in the base frame."""
 
     def forward(self, positions: Array) -> Array:
         """Return the grip frame in the base frame."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
+from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription, load_robot
@@ -112,6 +114,13 @@ def standing() -> StandingLink:
     return StandingLink(pose=at(1.0, 2.0))
 
 
+@cache
+def butler_arms() -> dict[str, ArmKinematics]:
+    """Return the kinematics of both arms."""
+    butler = load_robot("butler")
+    return {name: ArmKinematics(butler, name) for name in butler.hands}
+
+
 @pytest.fixture
 def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
     """A 6 x 4 m room with a table of 1.0 x 0.4 m around (3.0, 1.0)."""
@@ -124,7 +133,7 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
         robot=load_robot("butler"),
         link=cast("SkillLink", standing),
         planner=PathPlanner(grid, BODY_RADIUS_M),
-        arms={},
+        arms=butler_arms(),
         say=lambda _: None,
         voice=Announcer(space, "speak", MonotonicClock()),
         claims=ClaimBook(space, MonotonicClock()),

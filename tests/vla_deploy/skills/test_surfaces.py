@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.movements.surfaces import APART_M, EDGE_M, free_spots, spots_beside
+from vla_deploy.skills.movements.surfaces import EDGE_M, free_spots, spots_beside
 from vla_deploy.world.document import read_thing
 from vla_deploy.world.relations import is_next_to
 
@@ -46,7 +46,7 @@ def test_spots_keep_apart_from_the_outlines_of_things(
     assert spots
     for x_m, y_m, _ in spots:
         spot = standing.pose.outward(x_m, y_m)
-        assert math.dist(spot, (1.44, 2.10)) > size_m / 2 + APART_M
+        assert math.dist(spot, (1.44, 2.10)) > size_m / 2 + context.robot.reach.apart_m
 
 
 def test_what_a_hand_holds_takes_no_room(context: SkillContext, standing: "StandingLink") -> None:
@@ -93,7 +93,7 @@ def test_beside_means_on_the_same_surface_and_apart_from_others(
     standing.objects.append(other)
     for x_m, y_m, _ in spots_beside(context, "left", standing.objects[0]):
         spot = standing.pose.outward(x_m, y_m)
-        assert math.dist(spot, (1.44, 2.28)) > 0.04 + APART_M
+        assert math.dist(spot, (1.44, 2.28)) > 0.04 + context.robot.reach.apart_m
 
 
 def test_a_hand_begins_beside_a_thing_where_it_reaches_best(

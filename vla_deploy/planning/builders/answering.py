@@ -23,7 +23,7 @@ READY = "I am ready for a command."
 ABILITIES: Final = (
     ("navigate_to", "go to places"),
     ("find_object", "look for things and tell you what I see"),
-    ("pick_up", "pick things up and put them in the box or on a table"),
+    ("pick_up", "pick things up and put them in a box or on a table"),
     ("hand_over", "bring them to you"),
     ("place", "tidy up"),
     ("move_arm", "bring my arm to a pose"),

@@ -10,8 +10,7 @@ ON_MIDDLE_M = 0.01
 
 def side_of(context: SkillContext, hand: str) -> float:
     """Return 1 for a hand whose arm is left of, or on, the middle, and -1 for one to the right."""
-    shoulder_m = context.arms[hand].points(context.link.positions)[0]
-    return 1.0 if shoulder_m[1] >= -ON_MIDDLE_M else -1.0
+    return 1.0 if context.arms[hand].shoulder_m[1] > -ON_MIDDLE_M else -1.0
 
 
 def to_base(pose: Pose2D, point_m: Sequence[float]) -> tuple[float, float, float]:

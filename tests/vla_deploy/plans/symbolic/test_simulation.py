@@ -127,7 +127,7 @@ def test_not_everything_has_room_beside_it(butler: World, rests: Rest, why: str)
         (
             [*FETCH, ("navigate_to", {"object": "ball"}),
              ("place", {"destination": "ball", "relation": "in"})],
-            '"destination takes things": a ball is no container; things go into: box',
+            '"destination takes things": a ball is no container; things go into: bowl, box',
         ),
         (
             [*FETCH, ("place", INTO_BOX)],
