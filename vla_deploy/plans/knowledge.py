@@ -78,7 +78,7 @@ class World:
     known. `is_free` returns whether the base fits on a point of the map; None means that no map is
     at hand. A gripper opens `opening_max_m` wide and takes things within `reach`; None where that
     is not known. The robot charges at the place `station`, where it has one. `skills` are those
-    that its body is able to.
+    that its body is able to; `lacks` says of each other one which parts it would need.
     """
 
     places: Mapping[str, str]
@@ -97,7 +97,12 @@ class World:
     devices: Mapping[str, str] = field(default_factory=dict)
     devices_on: Mapping[str, bool] = field(default_factory=dict)
     device_kinds: Mapping[str, DeviceKind] = field(default_factory=dict)
-    skills: frozenset[str] = frozenset(SKILLS)
+    lacks: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def skills(self) -> frozenset[str]:
+        """Return the skills for which the robot has all parts."""
+        return frozenset(SKILLS).difference(self.lacks)
 
     def is_surface(self, name: str) -> bool:
         """Return whether one stands before furniture at a place, not elsewhere in the room."""
@@ -220,12 +225,12 @@ def world_of(
         devices=spoken_devices(robot),
         devices_on=devices_on,
         device_kinds={name: one.kind for name, one in robot.devices.items()},
-        skills=_skills_of(robot),
+        lacks=_lacks_of(robot),
     )
 
 
-def _skills_of(robot: RobotDescription) -> frozenset[str]:
-    """Return the skills for which the robot has all parts that they cannot do without."""
+def _lacks_of(robot: RobotDescription) -> dict[str, str]:
+    """Return why the robot cannot do a skill, for each of which it lacks a part."""
     parts = {
         *robot.groups,
         "speaker",  # without one it shows what it would say
@@ -233,6 +238,12 @@ def _skills_of(robot: RobotDescription) -> frozenset[str]:
         *(("arm", "arms") if robot.hands else ()),
         *(("device",) if robot.devices else ()),
     }
-    return frozenset(
-        name for name, spec in SKILLS.items() if parts.issuperset({*spec.resources} - spec.may_lack)
-    )
+    missing = {
+        name: [part for part in spec.resources if part not in parts | spec.may_lack]
+        for name, spec in SKILLS.items()
+    }
+    return {
+        name: f"{robot.name} has no {' and no '.join(lacked)}"
+        for name, lacked in missing.items()
+        if lacked
+    }

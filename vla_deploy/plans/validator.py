@@ -62,6 +62,8 @@ def action_faults(action: Action, world: World) -> list[str]:
     spec = SKILLS.get(action.skill)
     if spec is None:
         return [f'unknown skill "{action.skill}"; known: {", ".join(SKILLS)}']
+    if action.skill in world.lacks:
+        return [world.lacks[action.skill]]
     taken = ", ".join(spec.parameters) or "none"
     faults = [
         f'{action.skill} has no parameter "{name}"; it takes: {taken}'

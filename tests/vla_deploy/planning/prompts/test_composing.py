@@ -140,7 +140,7 @@ def test_instructions_tell_the_robots_own_limits(ask):
 
 def test_devices_are_offered_where_there_are_any(ask):
     request = ask("go")
-    world = replace(request.world, devices={}, skills=request.world.skills - SWITCHING)
+    world = replace(request.world, devices={}, lacks=dict.fromkeys(SWITCHING, "no device"))
     without = replace(request, world=world)
     told = (
         chat_for(request, "butler").system,
