@@ -42,7 +42,7 @@ class Machine(RemoteReferee):
         Raises:
             TwinError: it ended, or is not ready in time.
         """
-        self.run_dir = run_dir
+        self.run_dir, self.robot = run_dir, robot
         command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed), "--pace", TwinPace.REAL]
         command += ["--run-dir", str(run_dir), "--parent-pid", str(os.getpid())]
         self._process = subprocess.Popen([sys.executable, *command], start_new_session=True)
@@ -94,13 +94,14 @@ class RobotService(RunningRobot):
     poll_s = 0.05
     status_age_limit_s = 0.5
 
-    def __init__(self, base: Path, devices_dir: Path, clock: Clock) -> None:
+    def __init__(self, base: Path, devices_dir: Path, clock: Clock, robot: str = "butler") -> None:
         """Start the service; it restarts and is watched for ever."""
         base.mkdir(parents=True, exist_ok=True)
         self.base = base
         self.clock = clock
         self._session: RobotSession | None = None
         self._devices_dir = devices_dir
+        self._robot = robot
         self._runner = self._started()
 
     def make_ready(self) -> None:
@@ -180,7 +181,8 @@ class RobotService(RunningRobot):
         return strays(self._runner.members(), "" if owner is None else owner.run_id, rows)
 
     def _started(self) -> ServiceRunner:
-        words = ("--runtime-base", str(self.base), "run", "--devices-dir", str(self._devices_dir))
+        words = ("--runtime-base", str(self.base), "run", "--robot", self._robot)
+        words += ("--devices-dir", str(self._devices_dir))
         rules = ServiceRules(watchdog_s=watchdog_s(), restart_s=RESTART_S)
         runner = ServiceRunner([*VLA_DEPLOY, *words], os.environ, rules, self.clock)
         runner.start()

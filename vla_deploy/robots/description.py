@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import TypeVar
+from types import MappingProxyType
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +132,17 @@ class Place:
     pose: Pose2D
     aliases: tuple[str, ...]
     viewpoints: tuple[Pose2D, ...]
+
+
+_HERE: Final = Pose2D(x_m=0.0, y_m=0.0, yaw_rad=0.0)
+MOUNT: Final[Mapping[str, Place]] = MappingProxyType(
+    {
+        "table": Place(
+            name="table", pose=_HERE, aliases=("desk", "workbench", "bench"), viewpoints=(_HERE,)
+        )
+    }
+)
+"""What a robot without a base stands on, whatever people call it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -296,14 +308,14 @@ class RobotDescription:
 
     @property
     def places(self) -> Mapping[str, Place]:
-        """Return the named places, none where the robot has no home."""
-        return self.parts.home.places if self.parts.home else {}
+        """Return the named places: those of its home, or what it is mounted on."""
+        return self.parts.home.places if self.parts.home else MOUNT
 
     @property
     def start_pose(self) -> Pose2D:
         """Return the pose in which the robot is switched on, the map's origin without a home."""
         home = self.parts.home
-        return home.places[home.start].pose if home else Pose2D(x_m=0.0, y_m=0.0, yaw_rad=0.0)
+        return home.places[home.start].pose if home else _HERE
 
     @property
     def position_min(self) -> NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """Remember the surfaces of the home: the same table has the same name whichever part is in view."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
@@ -41,10 +42,16 @@ def furniture_points(places: Mapping[str, Place]) -> dict[str, Point]:
 
 
 class SurfaceBook:
-    """Hold every surface seen so far, by name; `furniture` names points of those that have one."""
+    """Hold every surface seen so far, by name; `furniture` names points of those that have one.
 
-    def __init__(self, furniture: Mapping[str, Point] | None = None) -> None:
+    The floor, which is `floor_m` high, and what is little higher have none.
+    """
+
+    def __init__(
+        self, furniture: Mapping[str, Point] | None = None, floor_m: float | None = 0.0
+    ) -> None:
         self._furniture = furniture or {}
+        self._least_m = -math.inf if floor_m is None else floor_m + LEAST_HEIGHT_M
         self._known: dict[str, Surface] = {}
         self._count = 0
 
@@ -74,7 +81,7 @@ class SurfaceBook:
             if name not in self._known
         ]
         gap_m, name = min(near, default=(NAMED_GAP_M, ""))
-        if gap_m < NAMED_GAP_M and part.height_m > LEAST_HEIGHT_M:
+        if gap_m < NAMED_GAP_M and part.height_m > self._least_m:
             return name
         self._count += 1
         return f"surface_{self._count}"

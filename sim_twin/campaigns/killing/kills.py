@@ -23,6 +23,7 @@ from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.robot import RobotFailed
 from sim_twin.harness.service import Machine, RobotService
+from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.table import RestartPolicy
 
 INJECTIONS: Final = 200
@@ -39,7 +40,8 @@ class KillCampaign:
         self._machine = Machine(folder / "machine", robot=robot, seed=seed)
         self._clock = self._machine.clock
         try:
-            self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
+            devices = self._machine.devices_dir
+            self._robot = RobotService(folder / "run", devices, self._clock, robot)
         except BaseException:
             self._machine.close()
             raise
@@ -125,19 +127,27 @@ class KillCampaign:
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Do `options.count` injections, 200 unless told otherwise."""
     count = INJECTIONS if options.count is None else options.count
-    drawn = injections(count, options.seed)
+    described = load_robot(options.robot)
+    without = () if described.microphone or described.speaker else ("speech",)
+    drawn = injections(count, options.seed, without=without)
     drawn = chosen(drawn, options.only, lambda each: each.name)
-    return inject_all(drawn, options.seed, tell, options.workers)
+    return inject_all(drawn, options.seed, tell, options.workers, options.robot)
 
 
 def inject_all(
-    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None], workers: int = 1
+    drawn: Sequence[Injection],
+    seed: int,
+    tell: Callable[[str], None],
+    workers: int = 1,
+    robot: str = "butler",
 ) -> CampaignReport:
     """Do injections on so many machines at a time, on each one after the other."""
     shares = [drawn[first::workers] for first in range(min(workers, len(drawn)))]
     is_over = Event()
     with ThreadPoolExecutor(max(1, len(shares))) as pool:
-        done = pool.map(lambda share: _inject_on_one_machine(share, seed, tell, is_over), shares)
+        done = pool.map(
+            lambda share: _inject_on_one_machine(share, seed, robot, tell, is_over), shares
+        )
         try:
             cases = [case for share in done for case in share]
         finally:
@@ -146,11 +156,15 @@ def inject_all(
 
 
 def _inject_on_one_machine(
-    drawn: Sequence[Injection], seed: int, tell: Callable[[str], None], is_over: Event
+    drawn: Sequence[Injection],
+    seed: int,
+    robot: str,
+    tell: Callable[[str], None],
+    is_over: Event,
 ) -> list[CampaignCase]:
     with (
         tempfile.TemporaryDirectory(prefix="vla-kill-") as folder,
-        contextlib.closing(KillCampaign(Path(folder), seed)) as campaign,
+        contextlib.closing(KillCampaign(Path(folder), seed, robot)) as campaign,
     ):
         return [
             told(_injected(campaign, injection), tell)

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from sim_twin.campaigns.killing.rules import COMMANDS, PUT_DOWN, Injection, KillMoment
+from sim_twin.campaigns.killing.jobs import jobs_of
+from sim_twin.campaigns.killing.rules import Injection, KillMoment
 from sim_twin.harness.service import Machine, RobotService
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotDescription, load_robot
 
 MOVING_RAD_S: Final = 0.1
 """The base or an arm that is slower is about to start or to end a motion."""
@@ -16,7 +17,6 @@ _POLL_S: Final = 0.02
 _LONGEST_S: Final = 120.0
 """A command that waits longer than this waits for what the kill took with it."""
 _WITHIN_S: Final[Mapping[KillMoment, float]] = {KillMoment.MOVING: 10.0, KillMoment.CARRYING: 60.0}
-_WHEELS: Final = ("left_wheel", "right_wheel")
 
 
 class Work:
@@ -32,18 +32,20 @@ class Work:
         self._job: subprocess.Popen[str] | None = None
         self._job_ns = 0
         self._has_put_down = False
-        self._put_down = itertools.cycle(PUT_DOWN)
-        described = load_robot("butler")
+        described = load_robot(machine.robot)
+        self._jobs = jobs_of(described)
+        self._put_down = itertools.cycle(self._jobs.put_down)
         arms = [described.group(hand.arm).joints for hand in described.hands.values()]
-        self._parts = (*itertools.chain.from_iterable(arms), *_WHEELS)
+        self._parts = (*itertools.chain.from_iterable(arms), *_wheels(described))
 
     def meet(self, injection: Injection) -> dict[str, Any]:
         """Work until the injection's time and moment, and return what the robot is at then.
 
         A moment that does not come within its time is missed: the figures say so.
         """
-        first = COMMANDS.index(injection.command)
-        commands = itertools.cycle((*COMMANDS[first:], *COMMANDS[:first]))
+        every = self._jobs.commands
+        first = injection.number % len(every)
+        commands = itertools.cycle((*every[first:], *every[:first]))
         due_ns = self._clock.now_ns() + round(injection.after_s * NS_PER_S)
         end_ns = due_ns + round(_WITHIN_S[injection.moment] * NS_PER_S)
         while True:
@@ -88,3 +90,8 @@ class Work:
             "held": truth["held"],
             "skill": self._robot.skill(),
         }
+
+
+def _wheels(robot: RobotDescription) -> tuple[str, ...]:
+    bus = robot.parts.can_bus
+    return tuple(drive.joint for drive in bus.drives) if bus else ()

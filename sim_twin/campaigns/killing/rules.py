@@ -3,7 +3,7 @@
 import random
 import signal
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -12,20 +12,6 @@ from sim_twin.physics.truth import STANDSTILL_RAD_S
 
 _Pair = tuple[str, signal.Signals]
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
-COMMANDS: Final = (
-    "pick up the nearest red cup and put it on the coffee table",
-    "pick up the nearest blue ball and put it on the coffee table",
-    "pick up the nearest red cup and put it in the box",
-    "pick up the nearest blue ball and put it on the coffee table",
-)
-"""All are picking and placing, most of it where the robot stands; the box is some metres away.
-
-They ask for no answer: a thing that was seen from a wrong place may be remembered twice."""
-PUT_DOWN: Final = tuple(f"put down the thing in your {hand} hand" for hand in ("left", "right"))
-"""What a person says in turn to a robot that a kill has left with something in its hands.
-
-It may know no more than that there is something.
-"""
 _EARLIEST_S, _LATEST_S = 0.5, 10.0
 """A job takes 20 to 40 seconds, and goes on through most kills."""
 
@@ -117,7 +103,7 @@ class KillMoment(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection:
-    """Name who gets which signal, how long after the robot was ready, and at which command.
+    """Name who gets which signal, and how long after the robot was ready.
 
     It then waits a while for the moment. A command that still goes on is not given again.
     """
@@ -126,7 +112,6 @@ class Injection:
     process: str
     signal: signal.Signals
     after_s: float
-    command: str
     moment: KillMoment = KillMoment.MOVING
 
     @property
@@ -135,15 +120,18 @@ class Injection:
         return f"{self.number:03d}/{self.process}/{self.signal.name}@{self.after_s:.1f}s"
 
 
-def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injection]:
+def injections(
+    count: int, seed: int, latest_s: float = _LATEST_S, without: Collection[str] = ()
+) -> list[Injection]:
     """Return every pair of process and signal about equally often, in random order and time.
 
-    Where there are fewer than there are pairs, the gravest are among them, while carrying.
+    Where there are fewer than there are pairs, the gravest are among them, while carrying. The
+    robot runs `without` some processes.
     """
     draw = random.Random(seed)
     pairs: list[_Pair] = []
     while len(pairs) < count:
-        pairs += _round(draw, count - len(pairs))
+        pairs += _round(draw, count - len(pairs), without)
     short = count < len(RULES)
     return [
         Injection(
@@ -151,7 +139,6 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
             process=process,
             signal=what,
             after_s=draw.uniform(_EARLIEST_S, latest_s),
-            command=COMMANDS[number % len(COMMANDS)],
             moment=KillMoment.CARRYING
             if short and (process, what) in WITH_A_FULL_HAND
             else KillMoment.MOVING,
@@ -160,9 +147,9 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
     ]
 
 
-def _round(draw: random.Random, most: int) -> list[_Pair]:
+def _round(draw: random.Random, most: int, without: Collection[str]) -> list[_Pair]:
     """Return every pair once, or `most` of them with the gravest, in random order."""
-    pairs = list(RULES)
+    pairs = [pair for pair in RULES if pair[0] not in without]
     draw.shuffle(pairs)
     chosen = sorted(pairs, key=lambda pair: pair not in GRAVEST)[:most]
     draw.shuffle(chosen)

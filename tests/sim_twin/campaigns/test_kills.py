@@ -6,11 +6,10 @@ from collections import Counter
 
 import pytest
 
+from sim_twin.campaigns.killing.jobs import jobs_of
 from sim_twin.campaigns.killing.rest import STILL_RAD, RestWatch
 from sim_twin.campaigns.killing.rules import (
-    COMMANDS,
     GRAVEST,
-    PUT_DOWN,
     RULES,
     SIGNALS,
     WITH_A_FULL_HAND,
@@ -59,14 +58,19 @@ def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
     assert max(one.after_s for one in drawn) <= 3.0
 
 
-@pytest.mark.parametrize(
-    ("text", "skill", "held"),
-    [(text, "pick_up", None) for text in COMMANDS]
-    + [(text, "place", "object") for text in PUT_DOWN],
-)
-def test_every_command_of_the_campaign_is_planned_by_patterns_alone(text, skill, held):
-    world = world_of(load_robot("butler"), {"left": held, "right": held})
-    assert skill in [action.skill for action in plan_command(text, world).actions]
+@pytest.mark.parametrize("name", ["butler", "so101"])
+def test_every_command_of_the_campaign_is_planned_by_patterns_alone(name: str) -> None:
+    robot = load_robot(name)
+    jobs = jobs_of(robot)
+    asked = [(text, "pick_up", None) for text in jobs.commands]
+    for text, skill, held in (*asked, *((text, "place", "object") for text in jobs.put_down)):
+        world = world_of(robot, dict.fromkeys(robot.hands, held))
+        assert skill in [action.skill for action in plan_command(text, world).actions], text
+
+
+def test_processes_that_the_robot_does_not_have_are_not_hit() -> None:
+    drawn = injections(len(RULES), 0, without=("speech",))
+    assert {one.process for one in drawn} == {process for process, _ in RULES} - {"speech"}
 
 
 KILLED = RULES["control", signal.SIGKILL]

@@ -59,7 +59,7 @@ class Scene:
     ) -> None:
         self._floor_m = floor_m
         self._tracker = Tracker()
-        self._book = SurfaceBook(furniture)
+        self._book = SurfaceBook(furniture, floor_m)
         self.stamp_ns = 0
         self._surfaces: list[SurfaceDocument] = []
         self._bystanders: list[Bystander] = []
