@@ -181,8 +181,8 @@ class RobotService(RunningRobot):
         return strays(self._runner.members(), "" if owner is None else owner.run_id, rows)
 
     def _started(self) -> ServiceRunner:
-        words = ("--runtime-base", str(self.base), "run", "--robot", self._robot)
-        words += ("--devices-dir", str(self._devices_dir))
+        words = ["--runtime-base", str(self.base), "run", "--robot", self._robot]
+        words += ["--devices-dir", str(self._devices_dir)]
         rules = ServiceRules(watchdog_s=watchdog_s(), restart_s=RESTART_S)
         runner = ServiceRunner([*VLA_DEPLOY, *words], os.environ, rules, self.clock)
         runner.start()
