@@ -73,6 +73,9 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     faults = _unknown_keys(raw, effect, rhythmic=rhythmic)
     timing = _timing(raw, faults, rhythmic=rhythmic)
     values = {each.name: _value(each, raw, faults) for each in effect.parameters}
+    supplies = max(1, len(robot.servo_bus.supplies))
+    if values.get("supply", 0) > supplies:
+        faults.append(f"supply: expected 0..{supplies} of this robot; got {values['supply']:g}")
     if faults:
         raise FaultRefused(f"{component.value} {fault.value}: {'; '.join(faults)}")
     return FaultRequest(

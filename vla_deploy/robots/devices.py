@@ -32,6 +32,15 @@ class Servo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ServoSupply:
+    """Describe a power supply; `servos` are the ids of those that it feeds."""
+
+    name: str
+    voltage_v: float
+    servos: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ServoBus:
     """Describe the serial bus that carries every servo; their order is the joint order."""
 
@@ -41,6 +50,12 @@ class ServoBus:
     protocol: int = 2
     """Of Dynamixels, which is the only one that is spoken; others leave it out."""
     servos: tuple[Servo, ...]
+    supplies: tuple[ServoSupply, ...] = ()
+    """Each servo hangs on one of them; none are declared where one supply feeds all."""
+
+    def supply_of(self, servo_id: int) -> ServoSupply | None:
+        """Return the declared supply that feeds a servo."""
+        return next((one for one in self.supplies if servo_id in one.servos), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

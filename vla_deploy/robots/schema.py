@@ -24,6 +24,10 @@ POLYGON = ValueCheck(
         isinstance(value, list) and len(value) >= 3 and all(map(_POINT.holds, value))
     ),
 )
+_IDS = ValueCheck(
+    expected="a list of servo ids, such as [1, 2]",
+    holds=lambda value: isinstance(value, list) and all(map(integer(0, 253).holds, value)),
+)
 
 ROBOT: Shape = {
     "name": TEXT,
@@ -61,7 +65,9 @@ SERVO_BUS: Shape = {
     "baud": integer(1),
     "protocol": one_of(2).optional,
     "servos": TABLES,
+    "supplies": TABLES.optional,
 }
+SUPPLY: Shape = {"name": TEXT, "voltage_v": POSITIVE, "servos": _IDS}
 SERVO: Shape = {
     "id": integer(0, 253),
     "model": TEXT,
