@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drivers.dynamixel.tables.control_table import BAUD_RATES, MODELS
+from drivers.dynamixel.tables.control_table import BAUD_RATES
 from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS
+from drivers.servo.family import family_of
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.feetech import EmulatedFeetechSpec, FeetechBank
 from sim_twin.servos.firmware.coupling import Coupling
@@ -50,8 +51,7 @@ def supply_volts(bus: ServoBus) -> dict[str, float]:
     if bus.supplies:
         return {supply.name: supply.voltage_v for supply in bus.supplies}
     model = bus.servos[0].model
-    sheet = FEETECH_MODELS[model] if model in FEETECH_MODELS else MODELS[model]
-    return {MAIN_SUPPLY: sheet.voltage_v}
+    return {MAIN_SUPPLY: family_of(model).facts(model).nominal_v}
 
 
 def _code(rates: Mapping[int, int], baud: int) -> int:

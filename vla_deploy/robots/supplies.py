@@ -1,10 +1,11 @@
 """Judge what feeds the servos of a bus: in the robot file, and by what the servos measure."""
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import Final
 
 from drivers.errors import UnknownModel
-from drivers.servo.family import family_of
+from drivers.servo.family import ServoFacts, family_of
 from vla_deploy.robots.consistency import Document, repeats, rows, table
 from vla_deploy.robots.devices import Servo, ServoBus
 from vla_deploy.runtime.table_schema import TableFault, is_number
@@ -37,32 +38,38 @@ def supplies_feed_each_servo(document: Document) -> Iterator[TableFault]:
 
 
 def supplies_suit_servos(document: Document) -> Iterator[TableFault]:
-    """A supply's voltage is one that its servos stand; without supplies, one suits all servos."""
-    bus = table(document, "servo_bus")
-    limits = _limits_v(document)
+    """Servos stand their supply; where none is declared, that is what the first servo needs."""
+    bus, facts = table(document, "servo_bus"), _facts(document)
     for i, row in enumerate(rows(bus, "supplies")):
         volts = row.get("voltage_v")
         for one in _ids(row.get("servos")):
-            model, low, high = limits.get(one, ("", 0.0, 0.0))
-            if model and is_number(volts) and not low <= volts <= high:
+            if one in facts and is_number(volts) and not _stands(facts[one][1], volts):
                 yield TableFault(
                     key=f"servo_bus.supplies[{i}].voltage_v",
                     got=f"{volts:g} V",
-                    expected=f"{low:g}..{high:g} V, which servo {one} ({model}) stands",
+                    expected=f"what {_needs(one, *facts[one])}",
                 )
-    if limits and "supplies" not in bus:
-        least = max(limits, key=lambda one: limits[one][1])
-        most = min(limits, key=lambda one: limits[one][2])
-        if limits[least][1] > limits[most][2]:
-            needs = " and ".join(
-                f"servo {one} ({limits[one][0]}) with {limits[one][1]:g}..{limits[one][2]:g} V"
-                for one in (least, most)
-            )
-            yield TableFault(
-                key="servo_bus.supplies",
-                got="nothing",
-                expected=f"tables: no voltage suits {needs}",
-            )
+    if facts and "supplies" not in bus:
+        first = next(iter(facts))
+        volts = facts[first][1].nominal_v
+        for one, (model, needed) in facts.items():
+            if not _stands(needed, volts):
+                yield TableFault(
+                    key="servo_bus.supplies",
+                    got=f"nothing, so {volts:g} V for all, as servo {first} needs",
+                    expected=f"a table for each supply: {_needs(one, model, needed)}",
+                )
+                return
+
+
+def _stands(facts: ServoFacts, volts: float) -> bool:
+    low, high = facts.voltage_limits_v
+    return low <= volts <= high
+
+
+def _needs(servo_id: int, model: str, facts: ServoFacts) -> str:
+    low, high = facts.voltage_limits_v
+    return f"servo {servo_id} ({model}) stands: {low:g}..{high:g} V"
 
 
 CHECKS: Final[tuple[Callable[[Document], Iterator[TableFault]], ...]] = (
@@ -103,15 +110,12 @@ def _ids(value: object) -> list[int]:
     return [one for one in value if isinstance(one, int)] if isinstance(value, list) else []
 
 
-def _limits_v(document: Document) -> dict[int, tuple[str, float, float]]:
-    """Return model, lowest and highest voltage of each servo by its id, of those that are known."""
-    found: dict[int, tuple[str, float, float]] = {}
+def _facts(document: Document) -> dict[int, tuple[str, ServoFacts]]:
+    """Return model and facts of each servo by its id; unknown models are another check's."""
+    found: dict[int, tuple[str, ServoFacts]] = {}
     for row in rows(table(document, "servo_bus"), "servos"):
         servo_id, model = row.get("id"), row.get("model")
         if isinstance(servo_id, int) and isinstance(model, str):
-            try:
-                low, high = family_of(model).facts(model).voltage_limits_v
-            except UnknownModel:
-                continue  # named by another check
-            found[servo_id] = (model, low, high)
+            with suppress(UnknownModel):
+                found[servo_id] = (model, family_of(model).facts(model))
     return found

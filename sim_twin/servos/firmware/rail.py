@@ -51,8 +51,7 @@ class Rails:
 
     def _summed(self, values: Floats) -> Floats:
         """Return the sums over the motors of each supply."""
-        sums: Floats = np.bincount(self._feeds, values, self._count)
-        return sums
+        return np.bincount(self._feeds, values, self._count).astype(np.float64, copy=False)
 
     def nominal_ratio(self, volts: Floats) -> Floats:
         """Return voltages as shares of each motor's nominal one."""
