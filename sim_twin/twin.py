@@ -228,7 +228,7 @@ class Twin:
 
     def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
         """Let a servo measure its shaft further off than it does, as after a blow."""
-        ids = [servo.id for servo in self.robot.servo_bus.servos]
+        ids = [servo.id for servo in self.robot.servo_bus.all_servos]
         self.engine.servos.slip(ids.index(servo_id), offset_rad)
         self.servos.couple_anew()
 

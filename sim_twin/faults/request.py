@@ -104,7 +104,7 @@ def instances_of(component: Component, robot: RobotDescription) -> dict[str, int
     """Return names and ids of what there is several of; empty where there is but one."""
     match component:
         case Component.SERVO:
-            return {servo.joint: servo.id for servo in robot.servo_bus.servos}
+            return {servo.joint: servo.id for servo in robot.servo_bus.all_servos}
         case Component.DRIVE:
             can_bus = robot.parts.can_bus
             return {one.joint: one.node_id for one in (can_bus.drives if can_bus else ())}

@@ -51,7 +51,7 @@ def _mistune(target: Target, on: bool) -> None:
 
 
 def _mistune_all(target: Target, on: bool) -> None:
-    for servo in target.twin.robot.servo_bus.servos:
+    for servo in target.twin.robot.servo_bus.all_servos:
         target.twin.servos.set_wrong_baud(servo.id, on)
 
 

@@ -24,9 +24,9 @@ def robot_bank(bus: ServoBus, timing: WireTiming | None, coupling: Coupling) -> 
     Raises:
         ValueError: a model is of another family than the first one.
     """
-    models = {servo.id: servo.model for servo in bus.servos}
+    models = {servo.id: servo.model for servo in bus.all_servos}
     names = list(supply_volts(bus))
-    fed_by = [bus.supply_of(servo.id) for servo in bus.servos]
+    fed_by = [bus.supply_of(servo.id) for servo in bus.all_servos]
     feeds = [names.index(supply.name) if supply else 0 for supply in fed_by]
     if bus.servos[0].model in FEETECH_MODELS:
         code = _code(FEETECH_BAUD_RATES, bus.baud)

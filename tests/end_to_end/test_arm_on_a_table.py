@@ -16,7 +16,7 @@ from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import load_robot
 from vla_deploy.skills.node import ExecutorNode
 
-DYNAMIXEL_ARMS = ("koch_v1_1", "omx")
+DYNAMIXEL_ARMS = ("koch_v1_1", "omx", "wx250s")
 
 
 @pytest.fixture

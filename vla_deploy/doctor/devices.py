@@ -101,7 +101,7 @@ def servo_supplies(context: DoctorContext) -> Iterator[DoctorFinding]:
     bench = family_of(bus.servos[0].model).bench(transport, context.clock, bus.baud)
     try:
         bench.detect_echo()
-        volts = read_voltages(bench, [servo.id for servo in bus.servos])
+        volts = read_voltages(bench, [servo.id for servo in bus.all_servos])
     finally:
         bench.close()
     remedy = f"vla-deploy servo scan --robot {context.robot.name}"

@@ -52,6 +52,7 @@ Document = Mapping[str, Any]
 SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
     "servo_bus.servos": schema.SERVO,
+    "servo_bus.shadows": schema.SERVO,
     "servo_bus.supplies": schema.SUPPLY,
     "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,

@@ -65,6 +65,7 @@ SERVO_BUS: Shape = {
     "baud": integer(1),
     "protocol": one_of(2).optional,
     "servos": TABLES,
+    "shadows": TABLES.optional,
     "supplies": TABLES.optional,
 }
 SUPPLY: Shape = {"name": TEXT, "voltage_v": POSITIVE, "servos": _IDS}

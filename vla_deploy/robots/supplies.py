@@ -28,7 +28,7 @@ def supplies_feed_each_servo(document: Document) -> Iterator[TableFault]:
         fed += [(f"servo_bus.supplies[{i}].servos", one) for one in _ids(ids)]
     names = [(f"servo_bus.supplies[{i}].name", row.get("name")) for i, row in enumerate(declared)]
     yield from repeats([*names, *fed])
-    known = {row["id"] for row in rows(bus, "servos") if isinstance(row.get("id"), int)}
+    known = {row["id"] for row in _servo_rows(bus) if isinstance(row.get("id"), int)}
     for key, one in fed:
         if one not in known:
             yield TableFault(key=key, got=repr(one), expected="ids of the servos of this bus")
@@ -94,7 +94,7 @@ def voltage_range_v(bus: ServoBus, servo: Servo, margin_v: float = 0.0) -> tuple
 def voltage_mismatches(bus: ServoBus, volts: Mapping[int, float]) -> list[str]:
     """Return a line for each supply whose servos measure what it cannot give; ids name servos."""
     found: dict[str, list[str]] = {}
-    for servo in bus.servos:
+    for servo in bus.all_servos:
         low, high = voltage_range_v(bus, servo)
         if servo.id in volts and not low <= volts[servo.id] <= high:
             supply = bus.supply_of(servo.id)
@@ -106,6 +106,10 @@ def voltage_mismatches(bus: ServoBus, volts: Mapping[int, float]) -> list[str]:
     return [f"{supply}: {'; '.join(servos)}" for supply, servos in found.items()]
 
 
+def _servo_rows(bus: Document) -> list[Document]:
+    return [*rows(bus, "servos"), *rows(bus, "shadows")]
+
+
 def _ids(value: object) -> list[int]:
     return [one for one in value if isinstance(one, int)] if isinstance(value, list) else []
 
@@ -113,7 +117,7 @@ def _ids(value: object) -> list[int]:
 def _facts(document: Document) -> dict[int, tuple[str, ServoFacts]]:
     """Return model and facts of each servo by its id; unknown models are another check's."""
     found: dict[int, tuple[str, ServoFacts]] = {}
-    for row in rows(table(document, "servo_bus"), "servos"):
+    for row in _servo_rows(table(document, "servo_bus")):
         servo_id, model = row.get("id"), row.get("model")
         if isinstance(servo_id, int) and isinstance(model, str):
             with suppress(UnknownModel):

@@ -2,9 +2,9 @@
 robot files fit them.
 
 Each row of `ARMS` holds what is published. Of so101 that is google-deepmind/mujoco_menagerie's
-robotstudio_so101, of koch_v1_1 its low_cost_robot_arm, turned to point along +x, of omx
-ROBOTIS-GIT/robotis_mujoco_menagerie's robotis_omx; world positions at zero were computed from their
-frames.
+robotstudio_so101, of koch_v1_1 its low_cost_robot_arm, turned to point along +x, of wx250s its
+trossen_wx250s, of omx ROBOTIS-GIT/robotis_mujoco_menagerie's robotis_omx; world positions at zero
+were computed from their frames.
 """
 
 import tomllib
@@ -24,7 +24,6 @@ from sim_twin.worlds import load_world
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
 
-JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 Vector = tuple[float, float, float]
 Document = Mapping[str, dict[str, dict[str, float]]]
 FORWARD, LEFT, UP = np.eye(3)
@@ -42,7 +41,8 @@ class PublishedJoint:
 
 @dataclass(frozen=True, kw_only=True)
 class PublishedArm:
-    """What is published of an arm; `masses_kg` are those of its bodies.
+    """What is published of an arm; `masses_kg` are those of its bodies, the last joint is the
+    gripper's.
 
     `pads` are the outermost ones with the axis along which each looks at the other; `openings_m` is
     between them, by the gripper's joint. `sinks_rad` is how far a joint gives way at rest without
@@ -142,6 +142,35 @@ ARMS = {
         ready_m=(0.18875, -0.0016, 0.08),
         ready_closing=LEFT,
     ),
+    # The vendor's 30 mm to 74 mm are between the fingers' frames; their tips are 9.6 mm further in.
+    "wx250s": PublishedArm(
+        joints={
+            "waist": joint((0.0, 0.0, 0.072), (0, 0, 1), -3.14158, 3.14158),
+            "shoulder": joint((0.0, 0.0, 0.11065), (0, 1, 0), -1.88496, 1.98968),
+            "elbow": joint((0.04975, 0.0, 0.36065), (0, 1, 0), -2.14675, 1.6057),
+            "forearm_roll": joint((0.22475, 0.0, 0.36065), (1, 0, 0), -3.14158, 3.14158),
+            "wrist_angle": joint((0.29975, 0.0, 0.36065), (0, 1, 0), -1.74533, 2.14675),
+            "wrist_rotate": joint((0.36475, 0.0, 0.36065), (1, 0, 0), -3.14158, 3.14158),
+            "gripper": joint((0.43075, 0.0, 0.36065), (0, 1, 0), 0.015, 0.037),
+        },
+        tip_m=(0.458325, 0.0, 0.36065),
+        masses_kg={
+            "base": 0.538736,
+            "shoulder_link": 0.480879,
+            "upper_arm": 0.430811,
+            "upper_forearm": 0.234589,
+            "lower_forearm": 0.220991,
+            "wrist": 0.084957,
+            "hand": 0.110084,
+            "left_finger": 0.016246,
+            "right_finger": 0.016246,
+        },
+        pads=(("right_finger_pad", (0, 1, 0)), ("left_finger_pad", (0, -1, 0))),
+        openings_m={0.015: 0.0108, 0.02: 0.0208, 0.037: 0.0548},
+        sinks_rad=0.09,
+        ready_m=(0.3, 0.0, 0.12),
+        ready_closing=LEFT,
+    ),
 }
 arms = pytest.mark.parametrize("name", ARMS)
 
@@ -179,11 +208,12 @@ def pad_faces(name: str, data: mujoco.MjData) -> list[NDArray[np.float64]]:
 
 
 def servo_models(name: str) -> Iterable[tuple[str, Mapping[str, float]]]:
-    """Return each joint with the datasheet of its servo."""
+    """Return each servo's actuator with its datasheet."""
     document = document_of(name)
     return [
-        (str(servo["joint"]), document["servo_models"][str(servo["model"])])
-        for servo in document["servo_bus"]["servos"]
+        (f"{servo['joint']}{suffix}", document["servo_models"][str(servo["model"])])
+        for kind, suffix in (("servos", ""), ("shadows", "_shadow"))
+        for servo in document["servo_bus"].get(kind, ())
     ]
 
 
@@ -192,7 +222,6 @@ def test_joints_and_tip_are_where_the_published_arm_has_them(name: str) -> None:
     model, arm = model_of(name), ARMS[name]
     data = posed(model, {})
 
-    assert tuple(arm.joints) == JOINTS
     for joint_name, published in arm.joints.items():
         measured = data.joint(joint_name)
         assert measured.xanchor == pytest.approx(published.place_m, abs=1e-3), joint_name
@@ -236,9 +265,10 @@ def test_the_hand_of_the_robot_file_opens_as_its_jaws(name: str) -> None:
 
 @arms
 def test_the_grip_points_along_the_fingers_and_closes_along_y(name: str) -> None:
-    data = posed(model_of(name), {"gripper": 0.2})
+    data = posed(model_of(name), {"gripper": load_robot(name).poses["ready"]["gripper"]})
     grip = data.site("grip").xmat.reshape(3, 3)
-    hub, tip = data.joint("wrist_roll").xanchor, data.site("tip").xpos
+    roll = list(ARMS[name].joints)[-2]
+    hub, tip = data.joint(roll).xanchor, data.site("tip").xpos
     one, other = pad_faces(name, data)
     across = grip.T @ (other - one)
     from_grip = [grip.T @ (face - data.site("grip").xpos) for face in (one, other)]
@@ -295,7 +325,7 @@ def test_the_limp_arm_stays_at_rest_on_the_table(name: str) -> None:
     for joint_name, value in rest.items():
         found, within = data.joint(joint_name).qpos[0], ARMS[name].sinks_rad
         assert found == pytest.approx(value, abs=within), joint_name
-    assert np.abs(data.qvel[-len(JOINTS) :]).max() < 0.001
+    assert np.abs(data.qvel[-len(rest) :]).max() < 0.001
 
 
 @arms
@@ -312,12 +342,12 @@ def test_the_ready_hand_points_straight_down_over_the_table(name: str) -> None:
 def test_the_robot_file_fits_the_mjcf(name: str) -> None:
     robot = load_robot(name)
 
-    assert robot.joint_names == JOINTS
+    assert robot.joint_names == tuple(ARMS[name].joints)
     for servo in robot.servo_bus.servos:
         low, high = ARMS[name].joints[servo.joint].range
-        limits = robot.limits[servo.joint]
+        limits, slack = robot.limits[servo.joint], 0.029 * servo.travel_per_rad
         # A gripper may close on itself.
-        slack = 0.029 if servo.joint != "gripper" else -0.001
-        assert low + slack < limits.min < limits.max < high - 0.029
-        assert max(abs(low - servo.offset), abs(high - servo.offset)) < pi
+        least = low if servo.joint == "gripper" else low + slack
+        assert least <= limits.min < limits.max < high - slack
+        assert max(abs(low - servo.offset), abs(high - servo.offset)) < pi * servo.travel_per_rad
     assert robot.hands["hand"].grip_site == "grip"

@@ -98,7 +98,7 @@ def _mismatches(link: ServoBench, bus: ServoBusPort, report: SpeedReport) -> lis
     found = {one.servo_id: one.model_name for one in report.servos}
     ids = [
         servo.id
-        for servo in bus.robot.servo_bus.servos
+        for servo in bus.robot.servo_bus.all_servos
         if servo.id in found and is_model(found[servo.id], servo.model)
     ]
     return voltage_mismatches(bus.robot.servo_bus, read_voltages(link, ids))

@@ -1,4 +1,4 @@
-"""What feeds the servos: judged in the robot file, and by what the servos measure."""
+"""Supplies and second servos of a robot: judged in its file, and by what the servos measure."""
 
 import shutil
 from pathlib import Path
@@ -11,6 +11,7 @@ from vla_deploy.robots.loader import ROBOTS_DIR
 from vla_deploy.robots.supplies import voltage_mismatches
 
 KOCH = load_robot("koch_v1_1")
+SHADOW = 'id = 3, model = "XM430-W350", joint = "shoulder"'
 ARM = "voltage_v = 5.0, servos = [3, 4, 5, 6]"
 FAULTS = {
     "a supply that its servos do not stand": (
@@ -33,6 +34,18 @@ FAULTS = {
         ('name = "arm"', 'name = "shoulder"'),
         "servo_bus.supplies[1].name: got 'shoulder', expected a value not used by",
     ),
+    "two servos of one id": (
+        (SHADOW, SHADOW.replace("3", "4", 1)),
+        "servo_bus.shadows[0].id: got 4, expected a value not used by servo_bus.servos[2].id",
+    ),
+    "a shadow of nothing": (
+        (SHADOW, SHADOW.replace("shoulder", "hip")),
+        "servo_bus.shadows[0].joint: got 'hip', expected a servo's joint: elbow, forearm_roll",
+    ),
+    "a shadow of another model": (
+        (SHADOW, SHADOW.replace("XM430-W350", "XL430-W250")),
+        "servo_bus.shadows[0].model: got 'XL430-W250', expected XM430-W350, as the servo that it",
+    ),
     "no supplies where no voltage suits all": (
         ("supplies = [", "[servo_bus.unused]\nlist = ["),
         "servo_bus.supplies: got nothing, so 12 V for all, as servo 1 needs, "
@@ -44,8 +57,8 @@ FAULTS = {
 @pytest.mark.parametrize("case", FAULTS)
 def test_the_robot_file_names_what_cannot_be(tmp_path: Path, case: str) -> None:
     (old, new), expected = FAULTS[case]
-    folder = Path(shutil.copytree(ROBOTS_DIR / "koch_v1_1", tmp_path / "koch"))
-    file = folder / "robot.toml"
+    robot = "wx250s" if old == SHADOW else "koch_v1_1"
+    file = Path(shutil.copytree(ROBOTS_DIR / robot, tmp_path / robot)) / "robot.toml"
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new))
@@ -70,4 +83,14 @@ def test_a_mismatch_names_the_supply_and_each_of_its_servos() -> None:
     bus = load_robot("so101").servo_bus
     assert voltage_mismatches(bus, {1: 7.4}) == [
         "the supply: servo 1 (shoulder_pan) has 7.4 V, expected 9.0..14.0 V"
+    ]
+
+
+def test_two_servos_give_a_joint_the_torque_of_both() -> None:
+    robot = load_robot("wx250s")
+    assert robot.stall_effort("shoulder") == pytest.approx(8.2)
+    assert robot.stall_effort("waist") == pytest.approx(4.1)
+    assert [one.joint for one in robot.servo_bus.all_servos][-2:] == [
+        "shoulder_shadow",
+        "elbow_shadow",
     ]
