@@ -25,7 +25,7 @@ from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.servos import Coupling, WireTiming
-from sim_twin.servos.robot_bank import nominal_v, robot_bank
+from sim_twin.servos.robot_bank import robot_bank, supply_volts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySource
 
@@ -61,8 +61,7 @@ class Twin:
         self.person = WorldPerson(self.engine)
         shafts = self.engine.servos
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)
-        models = {servo.id: servo.model for servo in robot.servo_bus.servos}
-        self.servos = robot_bank(models, robot.servo_bus.baud, servo_timing, coupling)
+        self.servos = robot_bank(robot.servo_bus, servo_timing, coupling)
         parts = robot.parts
         self.drives = robot_drives(parts.can_bus) if parts.can_bus else ()
         self._drive_laws = [drive.advance for drive in self.drives]
@@ -93,7 +92,9 @@ class Twin:
         if parts.camera is not None:
             names.append(parts.camera.device)
         self.plugs = {name: Plug() for name in names}
-        self.servo_supply = Supply(nominal_v(models))
+        self.servo_supplies = {
+            name: Supply(volts) for name, volts in supply_volts(robot.servo_bus).items()
+        }
         self.battery = self._battery(robot)
         self.faults = FaultInjector(self)
         self._hazards: HazardWatch | None = None
@@ -229,7 +230,7 @@ class Twin:
 
     def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
         """Let a servo measure its shaft further off than it does, as after a blow."""
-        ids = [servo.id for servo in self.robot.servo_bus.servos]
+        ids = [servo.id for servo in self.robot.servo_bus.all_servos]
         self.engine.servos.slip(ids.index(servo_id), offset_rad)
         self.servos.couple_anew()
 
@@ -269,7 +270,10 @@ class Twin:
             self._shining = switched_on
 
     def _battery(self, robot: RobotDescription) -> TwinBattery | None:
-        """Return the pack of the robot file; servos hang on it where they measure it."""
+        """Return the pack of the robot file; servos hang on it where they measure it.
+
+        Of several supplies it is the first, and the others stand behind regulators.
+        """
         if robot.battery is None:
             return None
         feeds = robot.battery.source is BatterySource.SERVOS
@@ -277,7 +281,7 @@ class Twin:
             robot.battery,
             drawn_w=self._drawn_w,
             is_docked=dock_contact(self.engine, robot),
-            feed=self.servo_supply.feed if feeds else _keep_regulated,
+            feed=next(iter(self.servo_supplies.values())).feed if feeds else _keep_regulated,
         )
 
     def _drawn_w(self) -> float:
@@ -300,7 +304,7 @@ class Twin:
             now_ns,
             shafts.joint_motion(),
             shafts.joint_effort(),
-            self.servo_supply.volts(now_ns),
+            tuple(supply.volts(now_ns) for supply in self.servo_supplies.values()),
         )
         shafts.command(duty)
         engine.drives.command_each(now_ns, self._drive_laws)

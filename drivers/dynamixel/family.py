@@ -60,6 +60,7 @@ class DynamixelFamily:
             senses_current=sheet.current_unit_a is not None,
             full_duty_error_rad=FULL_DUTY_ERROR_RAD,
             temperature_limit_c=float(initial("temperature_limit")),
+            nominal_v=sheet.voltage_v,
             voltage_limits_v=(
                 initial("min_voltage_limit") * VOLTAGE_UNIT_V,
                 initial("max_voltage_limit") * VOLTAGE_UNIT_V,

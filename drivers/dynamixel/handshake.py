@@ -19,10 +19,12 @@ from drivers.servo.errors import ServoSilent, SlowAdapter, WrongServo
 
 _EXTENDED_RANGE = (-1_048_575, 1_048_575)
 _ECHO_MARGIN_S = 0.02
+_NO_SECONDARY_ID = 255
 _EXPECTED = {
-    "homing_offset": "keep offsets in the robot file",
-    "drive_mode": "keep directions in the robot file, and profiles velocity-based",
-    "startup_configuration": "a servo must not power its motor by itself",
+    "homing_offset": (0, "keep offsets in the robot file"),
+    "drive_mode": (0, "keep directions in the robot file, and profiles velocity-based"),
+    "startup_configuration": (0, "a servo must not power its motor by itself"),
+    "secondary_id": (_NO_SECONDARY_ID, "a servo must not obey another one's commands"),
 }
 
 
@@ -156,9 +158,9 @@ def _identity_faults(
 
 def _setting_faults(servo: ServoSpec, image: bytes) -> list[str]:
     faults = [
-        f"{servo}: expected {name} 0, got {got}; {reason}, then write 0"
-        for name, reason in _EXPECTED.items()
-        if name in servo.model.registers and (got := decode(servo, image, 0, name)) != 0
+        f"{servo}: expected {name} {wanted}, got {got}; {reason}, then write {wanted}"
+        for name, (wanted, reason) in _EXPECTED.items()
+        if name in servo.model.registers and (got := decode(servo, image, 0, name)) != wanted
     ]
     if decode(servo, image, 0, "torque_enable"):
         faults += [

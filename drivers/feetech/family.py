@@ -47,6 +47,7 @@ class FeetechFamily:
             senses_current=False,
             full_duty_error_rad=steps * sheet.step_rad,
             temperature_limit_c=float(sheet.registers["temperature_limit"].initial),
+            nominal_v=sheet.voltage_v,
             voltage_limits_v=(
                 9.0 if sheet.voltage_v > 9.0 else sheet.voltage_range_v[0],
                 sheet.registers["max_voltage_limit"].initial * FEETECH_VOLTAGE_UNIT_V,

@@ -23,6 +23,8 @@ class ServoFacts:
     full_duty_error_rad: float
     """The position error of the shaft at which the motor gives all it has, by our gains."""
     temperature_limit_c: float
+    nominal_v: float
+    """The voltage that the servo is made for: the datasheet's figures are of it."""
     voltage_limits_v: tuple[float, float]
     protocol: str
     """What is spoken on its wire: servos of one bus have the same."""

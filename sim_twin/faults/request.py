@@ -73,6 +73,9 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     faults = _unknown_keys(raw, effect, rhythmic=rhythmic)
     timing = _timing(raw, faults, rhythmic=rhythmic)
     values = {each.name: _value(each, raw, faults) for each in effect.parameters}
+    supplies = max(1, len(robot.servo_bus.supplies))
+    if values.get("supply", 0) > supplies:
+        faults.append(f"supply: expected 0..{supplies} of this robot; got {values['supply']:g}")
     if faults:
         raise FaultRefused(f"{component.value} {fault.value}: {'; '.join(faults)}")
     return FaultRequest(
@@ -101,7 +104,7 @@ def instances_of(component: Component, robot: RobotDescription) -> dict[str, int
     """Return names and ids of what there is several of; empty where there is but one."""
     match component:
         case Component.SERVO:
-            return {servo.joint: servo.id for servo in robot.servo_bus.servos}
+            return {servo.joint: servo.id for servo in robot.servo_bus.all_servos}
         case Component.DRIVE:
             can_bus = robot.parts.can_bus
             return {one.joint: one.node_id for one in (can_bus.drives if can_bus else ())}

@@ -51,7 +51,7 @@ def _mistune(target: Target, on: bool) -> None:
 
 
 def _mistune_all(target: Target, on: bool) -> None:
-    for servo in target.twin.robot.servo_bus.servos:
+    for servo in target.twin.robot.servo_bus.all_servos:
         target.twin.servos.set_wrong_baud(servo.id, on)
 
 
@@ -83,9 +83,17 @@ def _slip(target: Target) -> Ending:
 
 def _brown_out(target: Target) -> Ending:
     twin, values = target.twin, target.values
-    twin.servo_supply.ramp_to(values["volts_v"], twin.now_ns, values["ramp_s"])
-    supply = twin.servo_supply
-    return lambda: supply.ramp_to(supply.usual_v, twin.now_ns, values["ramp_s"])
+    supplies = list(twin.servo_supplies.values())
+    if number := round(values["supply"]):
+        supplies = supplies[number - 1 : number]
+    for supply in supplies:
+        supply.ramp_to(values["volts_v"], twin.now_ns, values["ramp_s"])
+
+    def end() -> None:
+        for supply in supplies:
+            supply.ramp_to(supply.usual_v, twin.now_ns, values["ramp_s"])
+
+    return end
 
 
 _VOLTS: Final = FaultParameter(
@@ -93,6 +101,9 @@ _VOLTS: Final = FaultParameter(
 )
 _RAMP: Final = FaultParameter(
     name="ramp_s", default=0.05, low=0.0, high=60.0, meaning="how long it takes, each way"
+)
+_SUPPLY: Final = FaultParameter(
+    name="supply", default=0, low=0, high=8, meaning="its place in the robot file, from 1; 0: all"
 )
 _OFFSET: Final = FaultParameter(
     name="offset_rad", default=1.0, low=-3.0, high=3.0, meaning="jump of the measured shaft angle"
@@ -104,7 +115,7 @@ _HEAT: Final = FaultParameter(
 SERVO_ROWS: Final[Rows] = {
     **line_rows(Component.SERVO_BUS, _bus_line, _bus_plug),
     (Component.SERVO_BUS, Fault.BROWN_OUT): Effect(
-        summary="the supply sags", begin=_brown_out, parameters=(_VOLTS, _RAMP)
+        summary="the supply sags", begin=_brown_out, parameters=(_VOLTS, _RAMP, _SUPPLY)
     ),
     (Component.SERVO_BUS, Fault.WRONG_BAUD): _switched(
         "every servo at another rate than the host", _mistune_all

@@ -43,10 +43,16 @@ def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
 
 
 def servo_shafts(robot: RobotDescription) -> list[Shaft]:
-    """Return how each servo's shaft drives its joint."""
+    """Return how each servo's shaft drives its joint, those of shadows last."""
+    bus = robot.servo_bus
     return [
-        Shaft(joint=servo.joint, offset=servo.offset, ratio=servo.sign * servo.travel_per_rad)
-        for servo in robot.servo_bus.servos
+        Shaft(
+            joint=servo.joint,
+            actuator=named.joint,
+            offset=servo.offset,
+            ratio=servo.sign * servo.travel_per_rad,
+        )
+        for servo, named in zip((*bus.servos, *bus.shadows), bus.all_servos, strict=True)
     ]
 
 

@@ -16,9 +16,13 @@ ControlLaw = Callable[[int, float, float], float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """Say how a motor's shaft drives a joint: joint = offset + ratio * shaft angle."""
+    """Say how a motor's shaft drives a joint: joint = offset + ratio * shaft angle.
+
+    Without `actuator` the motor is the actuator of the joint's name.
+    """
 
     joint: str
+    actuator: str = ""
     offset: float = 0.0
     ratio: float = 1.0
 
@@ -31,7 +35,8 @@ class Shafts:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, shafts: Sequence[Shaft]) -> None:
         joints = [_find(model.joint, "joint", shaft.joint) for shaft in shafts]
-        actuators = [_find(model.actuator, "actuator", shaft.joint) for shaft in shafts]
+        names = [shaft.actuator or shaft.joint for shaft in shafts]
+        actuators = [_find(model.actuator, "actuator", name) for name in names]
         qpos, qvel = model.jnt_qposadr[joints].tolist(), model.jnt_dofadr[joints].tolist()
         ratio = np.array([shaft.ratio for shaft in shafts])
         self.zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio

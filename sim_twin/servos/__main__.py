@@ -8,7 +8,7 @@ import argparse
 import gc
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -37,39 +37,39 @@ _MAX_RETURN_DELAY_US = 508
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Family:
-    """Hold what one family of servos has to choose from; `voltages_v` are its models'."""
+    """Hold what one family of servos has to choose from."""
 
-    voltages_v: Mapping[str, float]
+    models: Collection[str]
     usual_model: str
     baud_rates: Mapping[int, int]
     max_id: int
-    build: Callable[[int, Sequence[str], Mapping[str, int], float, WireTiming | None], FreeBank]
+    build: Callable[[int, Sequence[str], Mapping[str, int], WireTiming | None], FreeBank]
 
 
 _FAMILIES: Final[Mapping[str, _Family]] = {
     "dynamixel": _Family(
-        voltages_v={name: sheet.voltage_v for name, sheet in MODELS.items()},
+        models=MODELS,
         usual_model="XM430-W350",
         baud_rates=BAUD_RATES,
         max_id=MAX_SERVO_ID,
-        build=lambda count, models, eeprom, supply_v, timing: FreeServos(
-            make_specs(count, models, eeprom), supply_v=supply_v, timing=timing
+        build=lambda count, models, eeprom, timing: FreeServos(
+            make_specs(count, models, eeprom), timing=timing
         ),
     ),
     "feetech": _Family(
-        voltages_v={name: sheet.voltage_v for name, sheet in FEETECH_MODELS.items()},
+        models=FEETECH_MODELS,
         usual_model="STS3215-C018",
         baud_rates=FEETECH_BAUD_RATES,
         max_id=FEETECH_MAX_ID,
-        build=lambda count, models, eeprom, supply_v, timing: FreeFeetechServos(
-            make_feetech_specs(count, models, eeprom), supply_v=supply_v, timing=timing
+        build=lambda count, models, eeprom, timing: FreeFeetechServos(
+            make_feetech_specs(count, models, eeprom), timing=timing
         ),
     ),
 }
 
 
 def _models_line(family: str) -> str:
-    return f"  {family}: {', '.join(sorted(_FAMILIES[family].voltages_v))}"
+    return f"  {family}: {', '.join(sorted(_FAMILIES[family].models))}"
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -86,7 +86,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--models",
         nargs="+",
         metavar="MODEL",
-        help="in turn; the first one's voltage supplies all",
+        help="in turn; each has the voltage it is made for",
     )
     parser.add_argument("--seconds", type=float, help="stop after this time; else run until killed")
     rates = {rate for family in _FAMILIES.values() for rate in family.baud_rates.values()}
@@ -108,8 +108,8 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     if not 1 <= options.servos <= family.max_id:
         parser.error(f"--servos: expected 1..{family.max_id}, got {options.servos}")
     for model in options.models:
-        if model not in family.voltages_v:
-            expected = ", ".join(sorted(family.voltages_v))
+        if model not in family.models:
+            expected = ", ".join(sorted(family.models))
             parser.error(f"--models: {options.family} has {expected}; got {model}")
     if options.baud is not None and options.baud not in family.baud_rates.values():
         expected = ", ".join(map(str, sorted(family.baud_rates.values())))
@@ -142,8 +142,7 @@ def _build(options: argparse.Namespace) -> FreeBank:
             jitter_s=options.jitter_us / 1e6,
             seed=options.seed,
         )
-    supply_v = family.voltages_v[options.models[0]]
-    return family.build(options.servos, options.models, eeprom, supply_v, timing)
+    return family.build(options.servos, options.models, eeprom, timing)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -14,6 +14,7 @@ from sim_twin.servos.wire_bank import WireBank
 
 class ServoBank(WireBank[Packet | BrokenPacket]):
     """Be the Dynamixel servos of one bus. Without `coupling` the joints are the shafts.
+    `feeds` has the number of the supply of each servo, from 0; without it one feeds all.
 
     A bus watchdog that has run out trips when time is taken over, and a fast read ends where a
     servo says nothing.
@@ -28,8 +29,9 @@ class ServoBank(WireBank[Packet | BrokenPacket]):
         options: FirmwareOptions | None = None,
         timing: WireTiming | None = None,
         coupling: Coupling | None = None,
+        feeds: Sequence[int] | None = None,
     ) -> None:
         check_ids([servo.id for servo in servos])
         options = options or FirmwareOptions()
-        firmware = Firmware(servos, options, coupling)
+        firmware = Firmware(servos, options, coupling, feeds)
         super().__init__(firmware, BusProtocol(firmware, options), InstructionParser(), timing)

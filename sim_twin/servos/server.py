@@ -11,15 +11,13 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel.tables.control_table import MODELS
-from drivers.feetech.table import FeetechDatasheet
 from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.feetech import EmulatedFeetechSpec, FeetechBank, FeetechOptions
-from sim_twin.servos.firmware.rotor import FreeRotors
+from sim_twin.servos.firmware.rail import SupplyVolts
+from sim_twin.servos.firmware.rotor import FreeRotors, MotorFigures
 from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.wire_bank import WireBank
@@ -32,8 +30,6 @@ _STEP_COST_NS: Final = 300_000
 """A step does not begin this shortly before a reply is due."""
 _ANSWER_NS: Final = 500_000
 """A host that has its reply may send at once; a step would make the bytes seem to come late."""
-_INERTIA_S2: Final = 0.0035
-"""Inertia in kg m^2 per N m of stall torque: 0.01 for an STS3215."""
 _WATCH_NS: Final = 150_000
 """Sleep may end this late, so the rest of the time before a reply is spent watching the clock."""
 
@@ -41,9 +37,11 @@ _WATCH_NS: Final = 150_000
 class FreeBank:
     """Turn a bank's shafts on their own, in steps of `STEP_S`, as time goes on."""
 
-    def __init__(self, bank: WireBank[Any], rotors: FreeRotors, supply_v: float) -> None:
+    def __init__(
+        self, bank: WireBank[Any], models: Sequence[MotorFigures], supply_v: SupplyVolts
+    ) -> None:
         self.bank = bank
-        self.rotors = rotors
+        self.rotors = FreeRotors(models)
         self.supply_v = supply_v
         self.now_ns = 0
 
@@ -62,36 +60,37 @@ class FreeBank:
 
 
 class FreeServos(FreeBank):
-    """Be Dynamixel servos whose shafts turn on their own."""
+    """Be Dynamixel servos whose shafts turn on their own, each at the voltage it is made for."""
 
     def __init__(
         self,
         specs: Sequence[EmulatedServoSpec],
         options: FirmwareOptions | None = None,
-        supply_v: float = 12.0,
         timing: WireTiming | None = None,
     ) -> None:
         models = [MODELS[spec.model_name] for spec in specs]
-        super().__init__(ServoBank(specs, options, timing), FreeRotors(models), supply_v)
+        supply_v, feeds = _supplies_for(models)
+        super().__init__(ServoBank(specs, options, timing, feeds=feeds), models, supply_v)
 
 
 class FreeFeetechServos(FreeBank):
-    """Be FEETECH servos whose shafts turn on their own."""
+    """Be FEETECH servos whose shafts turn on their own, each at the voltage it is made for."""
 
     def __init__(
         self,
         specs: Sequence[EmulatedFeetechSpec],
         options: FeetechOptions | None = None,
-        supply_v: float = 12.0,
         timing: WireTiming | None = None,
     ) -> None:
-        bank = FeetechBank(specs, options, timing)
-        super().__init__(bank, free_feetech_rotors([spec.datasheet for spec in specs]), supply_v)
+        models = [spec.datasheet for spec in specs]
+        supply_v, feeds = _supplies_for(models)
+        super().__init__(FeetechBank(specs, options, timing, feeds=feeds), models, supply_v)
 
 
-def free_feetech_rotors(models: Sequence[FeetechDatasheet]) -> FreeRotors:
-    """Return shafts that each of these motors can turn: the weaker, the lighter."""
-    return FreeRotors(models, np.array([model.stall_torque_nm for model in models]) * _INERTIA_S2)
+def _supplies_for(models: Sequence[MotorFigures]) -> tuple[tuple[float, ...], list[int]]:
+    """Return a supply for each voltage that motors are made for, and which one feeds each motor."""
+    volts = sorted({model.voltage_v for model in models})
+    return tuple(volts), [volts.index(model.voltage_v) for model in models]
 
 
 def make_specs(

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Final, Generic, Protocol, TypeVar
 
 from sim_twin.servos.firmware.profile import Floats
+from sim_twin.servos.firmware.rail import SupplyVolts
 from sim_twin.servos.protocol.audience import BusAudience
 from sim_twin.servos.protocol.timing import Reply, ReplyQueue, WireTiming
 from sim_twin.servos.protocol.wire_faults import ReplySpoiler, WireFaults
@@ -72,7 +73,7 @@ class BankFirmware(Protocol):
         ...
 
     def advance(
-        self, now_ns: int, joint_motion: Floats, joint_effort: Floats, supply_v: float
+        self, now_ns: int, joint_motion: Floats, joint_effort: Floats, supply_v: SupplyVolts
     ) -> Floats:
         """Run the control loops and return each motor's duty."""
         ...
@@ -174,14 +175,14 @@ class WireBank(Generic[RequestT]):
         now_ns: int,
         joint_motion: Floats,
         joint_effort: Floats,
-        supply_v: float = 12.0,
+        supply_v: SupplyVolts = 12.0,
     ) -> Floats:
         """Return what the joints do; return each motor's duty, -1..1, until the next call.
 
         Arrays are in the order of the servos; a shaft at 0 rad is in the middle of its turn.
         `joint_motion` has a row of positions and one of speeds. They, duty and effort, which is the
         motor's torque in N m, are the joint's, and by default that is the shaft. Duty is zero
-        without torque. A supply below `brownout_v` of the options switches the servos off.
+        without torque. A supply below `brownout_v` of the options switches its servos off.
         """
         if now_ns > self._now_ns:
             self._now_ns = now_ns

@@ -1,4 +1,4 @@
-"""An SO-101 is a robot: six servos on one bus, on a table, moved by joints and by words."""
+"""An arm is a robot: six servos on one bus, on a table, moved by joints and by words."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,17 +16,21 @@ from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import load_robot
 from vla_deploy.skills.node import ExecutorNode
 
+DYNAMIXEL_ARMS = ("koch_v1_1", "omx", "wx250s")
+
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Iterator[LockstepControl]:
-    made = LockstepControl(tmp_path, robot="so101")
+def arm(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[LockstepControl]:
+    """Return an armed arm: an SO-101, where a test asks for none by name."""
+    made = LockstepControl(tmp_path, robot=getattr(request, "param", "so101"))
     made.arm()
     yield made
     made.close()
 
 
 def positions(arm: LockstepControl) -> dict[str, float]:
-    return {name: one["position"] for name, one in arm.lockstep.truth()["joints"].items()}
+    joints = arm.lockstep.truth()["joints"]
+    return {name: joints[name]["position"] for name in arm.robot.joint_names}
 
 
 def test_it_leaves_its_rest_and_goes_to_its_poses(arm: LockstepControl) -> None:
@@ -135,6 +139,44 @@ def test_words_move_it_and_what_it_lacks_is_named(arm: LockstepControl) -> None:
     assert "I have no head to turn" in str(talking.say("look down"))
     assert "I know of none" in str(talking.say("go to the kitchen"))
     assert np.isfinite(list(positions(arm).values())).all()
+
+
+@pytest.mark.parametrize("arm", DYNAMIXEL_ARMS, indirect=True)
+def test_a_dynamixel_arm_moves_by_joints_and_by_words_and_stands_at_an_emergency_stop(
+    arm: LockstepControl,
+) -> None:
+    ready, limits = arm.robot.poses["ready"], arm.robot.limits["gripper"]
+    arm.go(ready)
+    arm.lockstep.run_for(2.0)
+    assert positions(arm) == pytest.approx(ready, abs=0.02)
+    talking = Talking(arm)
+    assert talking.say("open the gripper")["success"]
+    assert positions(arm)["gripper"] == pytest.approx(limits.max, abs=0.05)
+    assert f"{arm.robot.name} has no base" in str(talking.say("turn left"))
+    arm.go(arm.robot.poses["folded"])
+    arm.lockstep.run_for(0.5)
+    arm.operate("estop")
+    arm.lockstep.run_for(0.6)
+    stood = positions(arm)
+    arm.lockstep.run_for(0.5)
+    assert arm.control_status()["estop_latched"]
+    assert positions(arm) == pytest.approx(stood, abs=0.01)
+    # Goals move every other step of the physics, of which the D term makes a ripple in the speed.
+    assert {one.kind for one in arm.lockstep.twin.hazards.found} <= {"joint speed"}
+
+
+@pytest.mark.parametrize("arm", ["koch_v1_1"], indirect=True)
+def test_servos_of_two_supplies_measure_their_own_and_stop_the_arm_when_one_sags(
+    arm: LockstepControl,
+) -> None:
+    assert arm.control_status()["joints"]["voltage_v"] == [12.0, 12.0, 5.0, 5.0, 5.0, 5.0]
+    with pytest.raises(FaultRefused, match=r"supply: expected 0..2"):
+        arm.faults.inject("servo_bus", None, "brown_out", supply=3)
+    arm.faults.inject("servo_bus", None, "brown_out", volts_v=3.6, supply=2)
+    arm.lockstep.run_for(0.5)
+    status = arm.control_status()
+    assert (status["cause"], status["subject"]) == ("joint_voltage_limit", "elbow_flex")
+    assert status["joints"]["voltage_v"] == [12.0, 12.0, 3.6, 3.6, 3.6, 3.6]
 
 
 @pytest.mark.stack

@@ -118,12 +118,12 @@ def test_servos_that_hang_on_the_pack_measure_its_voltage_and_a_fault_goes_befor
         step_for(twin, 0.3)
         volts = twin.servos.register(1, "present_input_voltage") / 10
         assert low_v < volts < high_v
-    twin.servo_supply.ramp_to(11.5, twin.now_ns)
+    twin.servo_supplies["main"].ramp_to(11.5, twin.now_ns)
     step_for(twin, 0.3)
     assert twin.servos.register(1, "present_input_voltage") == 115
-    twin.servo_supply.ramp_to(twin.servo_supply.usual_v, twin.now_ns)
+    twin.servo_supplies["main"].ramp_to(twin.servo_supplies["main"].usual_v, twin.now_ns)
     step_for(twin, 0.3)
-    assert twin.servo_supply.volts(twin.now_ns) == pytest.approx(battery.voltage_v)
+    assert twin.servo_supplies["main"].volts(twin.now_ns) == pytest.approx(battery.voltage_v)
 
 
 def test_it_charges_where_the_station_is_and_nowhere_else(twin: Twin) -> None:

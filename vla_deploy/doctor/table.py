@@ -29,6 +29,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Computer", "memory", computer.memory),
     Check("Computer", "user", computer.user, live=True),
     Check("Devices", "device files", devices.device_files),
+    Check("Devices", "servo supplies", devices.servo_supplies, live=True),
     Check("Devices", "camera calibration", devices.camera_calibration),
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),

@@ -56,6 +56,16 @@ def _servos(document: Document) -> list[Document]:
     return rows(table(document, "servo_bus"), "servos")
 
 
+def _motors(document: Document) -> list[tuple[str, Document]]:
+    """Return the servos and their shadows with their keys."""
+    bus = table(document, "servo_bus")
+    return [
+        (f"servo_bus.{kind}[{i}]", row)
+        for kind in ("servos", "shadows")
+        for i, row in enumerate(rows(bus, kind))
+    ]
+
+
 def _drives(document: Document) -> list[Document]:
     return rows(table(document, "can_bus"), "drives")
 
@@ -81,11 +91,14 @@ def repeats(
 
 def nothing_used_twice(document: Document) -> Iterator[TableFault]:
     """Servo ids, node ids, driven joints and device names are unique."""
-    servos = [(f"servo_bus.servos[{i}]", row) for i, row in enumerate(_servos(document))]
+    motors = _motors(document)
+    shadows = [(key, row) for key, row in motors if ".shadows[" in key]
+    servos = [(key, row) for key, row in motors if ".shadows[" not in key]
     drives = [(f"can_bus.drives[{i}]", row) for i, row in enumerate(_drives(document))]
-    yield from repeats([(f"{key}.id", row.get("id")) for key, row in servos])
+    yield from repeats([(f"{key}.id", row.get("id")) for key, row in motors])
     yield from repeats([(f"{key}.node_id", row.get("node_id")) for key, row in drives])
     yield from repeats([(f"{key}.joint", row.get("joint")) for key, row in servos + drives])
+    yield from repeats([(f"{key}.joint", row.get("joint")) for key, row in shadows])
     yield from repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
 
 
@@ -135,19 +148,32 @@ def drives_fit_protocol(document: Document) -> Iterator[TableFault]:
 def models_are_listed(document: Document) -> Iterator[TableFault]:
     """Each servo's model has its datasheet figures."""
     models = subtables(document, "servo_models")
-    for i, row in enumerate(_servos(document)):
+    for key, row in _motors(document):
         model = row.get("model")
         if isinstance(model, str) and model not in models:
-            key = f"servo_bus.servos[{i}].model"
-            yield unknown_name(key, model, "a key of servo_models", models)
+            yield unknown_name(f"{key}.model", model, "a key of servo_models", models)
+
+
+def shadows_have_leaders(document: Document) -> Iterator[TableFault]:
+    """A shadow turns a servo's joint, and is of that servo's model."""
+    leaders = {row.get("joint"): row for row in _servos(document)}
+    for key, row in _motors(document):
+        joint, model = row.get("joint"), row.get("model")
+        if ".shadows[" not in key or not isinstance(joint, str):
+            continue
+        if joint not in leaders:
+            yield unknown_name(f"{key}.joint", joint, "a servo's joint", _joints(_servos(document)))
+        elif model != (leader := leaders[joint].get("model")):
+            expected = f"{leader}, as the servo that it shadows"
+            yield TableFault(key=f"{key}.model", got=repr(model), expected=expected)
 
 
 def servos_have_one_driver(document: Document) -> Iterator[TableFault]:
     """One driver knows all servos of the bus, by their ids too, and can set them to its speed."""
     protocols: dict[str, str] = {}
     families = []
-    for i, row in enumerate(_servos(document)):
-        key, model, servo_id = f"servo_bus.servos[{i}]", row.get("model"), row.get("id")
+    for key, row in _motors(document):
+        model, servo_id = row.get("model"), row.get("id")
         if not isinstance(model, str):
             continue
         try:
@@ -199,7 +225,7 @@ def limits_match_servos(document: Document) -> Iterator[TableFault]:
 def servos_reach(document: Document) -> Iterator[TableFault]:
     """A servo's one turn covers its joint's limits, its no-load speed the velocity limit."""
     limits, models = table(document, "limits"), table(document, "servo_models")
-    for row in _servos(document):
+    for _, row in _motors(document):
         joint, offset, travel = row.get("joint"), row.get("offset"), row.get("travel_per_rad")
         if not (is_number(offset) and is_number(travel)):
             continue
@@ -333,6 +359,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     parts_come_together,
     drives_fit_protocol,
     models_are_listed,
+    shadows_have_leaders,
     servos_have_one_driver,
     limits_match_servos,
     servos_reach,

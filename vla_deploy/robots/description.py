@@ -369,9 +369,12 @@ class RobotDescription:
         return self.servo_models[servo.model]
 
     def stall_effort(self, joint: str) -> float:
-        """Return a stalled servo's torque on its joint in N m; for a finger its force, in N."""
-        servo = self.servo_bus.servos[self.joint_index[joint]]
-        return self.servo_models[servo.model].stall_torque_nm / servo.travel_per_rad
+        """Return what a joint's stalled servos give it in N m; for a finger their force, in N."""
+        bus = self.servo_bus
+        turning = (one for one in (*bus.servos, *bus.shadows) if one.joint == joint)
+        return sum(
+            self.servo_models[one.model].stall_torque_nm / one.travel_per_rad for one in turning
+        )
 
     def groups_moving(self, joints: Iterable[str]) -> tuple[str, ...]:
         """Return the names of the groups that move any of these joints."""

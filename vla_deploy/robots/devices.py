@@ -1,6 +1,6 @@
 """Describe what a robot is wired to: servos, drives, sensors, button and sound."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -32,6 +32,15 @@ class Servo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ServoSupply:
+    """Describe a power supply; `servos` are the ids of those that it feeds."""
+
+    name: str
+    voltage_v: float
+    servos: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ServoBus:
     """Describe the serial bus that carries every servo; their order is the joint order."""
 
@@ -41,6 +50,25 @@ class ServoBus:
     protocol: int = 2
     """Of Dynamixels, which is the only one that is spoken; others leave it out."""
     servos: tuple[Servo, ...]
+    shadows: tuple[Servo, ...] = ()
+    """Second servos of joints, which turn them together with the one in `servos`."""
+    supplies: tuple[ServoSupply, ...] = ()
+    """Each servo hangs on one of them; none are declared where one supply feeds all."""
+
+    @property
+    def all_servos(self) -> tuple[Servo, ...]:
+        """Return every servo on the wire, shadows last and under names of their own."""
+        named = (replace(one, joint=shadow_name(one.joint)) for one in self.shadows)
+        return (*self.servos, *named)
+
+    def supply_of(self, servo_id: int) -> ServoSupply | None:
+        """Return the declared supply that feeds a servo."""
+        return next((one for one in self.supplies if servo_id in one.servos), None)
+
+
+def shadow_name(joint: str) -> str:
+    """Return what a joint's second servo is called, and its actuator in the MJCF."""
+    return f"{joint}_shadow"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

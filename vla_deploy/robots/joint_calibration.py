@@ -17,6 +17,7 @@ from vla_deploy.robots.calibration.calibration import (
     write_calibration,
 )
 from vla_deploy.robots.description import RobotDescription
+from vla_deploy.robots.devices import shadow_name
 from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 
@@ -70,6 +71,19 @@ def answering_servos(
             if servo.joint in names:
                 raise
     return answering
+
+
+def shadows_of(robot: RobotDescription, link: ServoBench, names: Sequence[str]) -> list[JointServo]:
+    """Return the second servos of joints, which must let go, too, when these are moved by hand.
+
+    Raises:
+        ServoSilent: one does not answer.
+    """
+    return [
+        link.servo(one.id, shadow_name(one.joint))
+        for one in robot.servo_bus.shadows
+        if one.joint in names
+    ]
 
 
 class CalibrationRecord:

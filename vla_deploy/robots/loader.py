@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from xml.etree import ElementTree
 
 from platforms.profile_source import merged
-from vla_deploy.robots import home_devices, protection_schema, schema
+from vla_deploy.robots import home_devices, protection_schema, schema, supplies
 from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
@@ -55,6 +55,8 @@ Document = Mapping[str, Any]
 SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
     "servo_bus.servos": schema.SERVO,
+    "servo_bus.shadows": schema.SERVO,
+    "servo_bus.supplies": schema.SUPPLY,
     "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,
     "can_bus.drives": schema.DRIVE,
@@ -179,7 +181,7 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     yield from check_record(document, "", schema.ROBOT)
     yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
-    for check in (*CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
+    for check in (*CHECKS, *supplies.CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 

@@ -32,6 +32,10 @@ NUMBERS = ValueCheck(
     expected="a list of one or more numbers",
     holds=lambda value: isinstance(value, list) and bool(value) and all(map(NUMBER.holds, value)),
 )
+_IDS = ValueCheck(
+    expected="a list of servo ids, such as [1, 2]",
+    holds=lambda value: isinstance(value, list) and all(map(integer(0, 253).holds, value)),
+)
 
 ROBOT: Shape = {
     "name": TEXT,
@@ -72,7 +76,10 @@ SERVO_BUS: Shape = {
     "baud": integer(1),
     "protocol": one_of(2).optional,
     "servos": TABLES,
+    "shadows": TABLES.optional,
+    "supplies": TABLES.optional,
 }
+SUPPLY: Shape = {"name": TEXT, "voltage_v": POSITIVE, "servos": _IDS}
 SERVO: Shape = {
     "id": integer(0, 253),
     "model": TEXT,

@@ -5,10 +5,11 @@ of two servos with one id neither is understood.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.errors import NoReply, ProtocolError
-from drivers.servo.errors import CorruptReply, ServoSilent
+from drivers.servo.errors import CorruptReply, ServoSilent, WrongServo
 from drivers.servo.patience import ReplyPatience
 from drivers.servo.tools.bench import ONE_TRY, THREE_TRIES, FoundServo, ServoBench
 
@@ -127,6 +128,20 @@ def scan_speed(
         other_family_ids=() if found or clashes else tuple(link.other_family_ids()),
         noise_bytes=0 if found or clashes else noise_bytes,
     )
+
+
+def read_voltages(link: ServoBench, ids: Iterable[int]) -> dict[int, float]:
+    """Return what servos measure of their supply, by id; those that do not answer are left out.
+
+    Raises:
+        LinkLost: the adapter is gone.
+    """
+    servos = []
+    for servo_id in ids:
+        with suppress(NoReply, ProtocolError, WrongServo):
+            servos.append(link.servo(servo_id))
+    readings = link.read_servos(servos, {}) if servos else ()
+    return {reading.id: reading.voltage_v for reading in readings}
 
 
 def is_taken(link: ServoBench, servo_id: int) -> bool:

@@ -14,6 +14,7 @@ from sim_twin.servos.wire_bank import WireBank
 
 class FeetechBank(WireBank[FeetechPacket]):
     """Be the FEETECH servos of one bus. Without `coupling` the joints are the shafts.
+    `feeds` has the number of the supply of each servo, from 0; without it one feeds all.
 
     There is no bus watchdog: a servo whose host falls silent keeps its torque and its goal.
 
@@ -27,7 +28,8 @@ class FeetechBank(WireBank[FeetechPacket]):
         options: FeetechOptions | None = None,
         timing: WireTiming | None = None,
         coupling: Coupling | None = None,
+        feeds: Sequence[int] | None = None,
     ) -> None:
         check_ids([servo.id for servo in servos])
-        firmware = FeetechFirmware(servos, options or FeetechOptions(), coupling)
+        firmware = FeetechFirmware(servos, options or FeetechOptions(), coupling, feeds)
         super().__init__(firmware, FeetechProtocol(firmware), FeetechParser(), timing)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.feetech.table import (
@@ -30,7 +31,7 @@ from sim_twin.servos.feetech.protection import FeetechProtection, error_bits
 from sim_twin.servos.feetech.spec import EmulatedFeetechSpec, FeetechOptions
 from sim_twin.servos.firmware.coupling import Coupling
 from sim_twin.servos.firmware.profile import Floats
-from sim_twin.servos.firmware.rail import Rail
+from sim_twin.servos.firmware.rail import Rails, SupplyVolts
 
 _CHECK_PERIOD_NS: Final = 20_000_000
 _EFFORT_SMOOTHING: Final = 0.25
@@ -54,6 +55,7 @@ class FeetechFirmware:
         specs: Sequence[EmulatedFeetechSpec],
         options: FeetechOptions,
         coupling: Coupling | None = None,
+        feeds: Sequence[int] | None = None,
     ) -> None:
         count = len(specs)
         self.memory = memory = FeetechMemory(specs)
@@ -63,16 +65,17 @@ class FeetechFirmware:
         self._joint_stall_nm = joints.sign * [sheet.stall_torque_nm for sheet in memory.sheets]
         self._motion = FeetechMotion(memory, joints)
         self._protection = FeetechProtection(memory, options.ambient_c)
-        self._rail = Rail(memory.sheets, options.supply_ohm)
+        self._rails = Rails(memory.sheets, options.supply_ohm, feeds)
         self._joint_effort = np.zeros(count)
         self._held: dict[int, tuple[int, bytes]] = {}
         self._boot_until_ns = [0] * count
         self._unhomed = set(range(count))
-        self._powered = self._stale = True
+        self._powered = np.ones(count, np.bool_)
+        self._stale = True
         self._goals_moved = False
         self._feedback_is_fresh = False
-        self._supply_v: float | None = None
-        self._rail_v = memory.sheets[0].voltage_v
+        self._supply_v: SupplyVolts | None = None
+        self._rail_v = np.array([sheet.voltage_v for sheet in memory.sheets])
         self._advanced_ns: int | None = None
         self._checked_ns = 0
         self.now_ns = 0
@@ -82,11 +85,11 @@ class FeetechFirmware:
         self.now_ns = now_ns
 
     def advance(
-        self, now_ns: int, joint_motion: Floats, joint_effort: Floats, supply_v: float
+        self, now_ns: int, joint_motion: Floats, joint_effort: Floats, supply_v: SupplyVolts
     ) -> Floats:
         """Sense, run the control loops and return the duty for the next step.
 
-        The duty counts from the models' nominal voltage: what the rail lacks is taken off.
+        The duty counts from the models' nominal voltage: what its rail lacks is taken off.
         """
         self.now_ns = now_ns
         if self._advanced_ns is None:
@@ -106,7 +109,7 @@ class FeetechFirmware:
     @property
     def supply_w(self) -> float:
         """Return what the motors drew at the last look."""
-        return self._rail.supply_w if self._powered else 0.0
+        return self._rails.supply_w
 
     def couple_anew(self) -> None:
         """Take over a change of the coupling."""
@@ -114,7 +117,7 @@ class FeetechFirmware:
 
     def answers(self, row: int) -> bool:
         """Return whether a servo is powered and has finished booting."""
-        return self._powered and self.now_ns >= self._boot_until_ns[row]
+        return bool(self._powered[row]) and self.now_ns >= self._boot_until_ns[row]
 
     def error_byte(self, row: int) -> int:
         """Return the error byte of a servo's answers."""
@@ -253,13 +256,14 @@ class FeetechFirmware:
             self._motion.restart(row)
         self._motion.reload_goals()
 
-    def _check(self, supply_v: float) -> None:
+    def _check(self, supply_v: SupplyVolts) -> None:
         """Look at voltage, current and temperature, which are slow compared to control."""
         motion = self._motion
-        self._rail_v = self._rail.volts(supply_v, motion.shaft_duty, motion.shaft_rad_s)
-        motion.set_voltage(self._rail.nominal_ratio(self._rail_v))
-        if (self._rail_v >= self._options.brownout_v) != self._powered:
-            self._switch_power(on=not self._powered)
+        self._rail_v = self._rails.volts(supply_v, motion.shaft_duty, motion.shaft_rad_s)
+        motion.set_voltage(self._rails.nominal_ratio(self._rail_v))
+        powered = self._rail_v >= self._options.brownout_v
+        if (powered != self._powered).any():
+            self._switch_power(powered)
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
         effort_ratio = self._joint_effort / self._joint_stall_nm
@@ -275,10 +279,11 @@ class FeetechFirmware:
                 self.memory.put(row, "torque_enable", TorqueSwitch.FREE)
                 self._stale = True
 
-    def _switch_power(self, *, on: bool) -> None:
-        """Boot all servos, or take their power: either way they forget what is not kept."""
-        self._powered = on
-        for row in range(len(self.memory)):
+    def _switch_power(self, powered: NDArray[np.bool_]) -> None:
+        """Boot servos, or take their power: either way they forget what is not kept."""
+        changed = np.flatnonzero(powered != self._powered).tolist()
+        self._powered = powered
+        for row in changed:
             self.reboot(row)
 
     def _write_feedback(self) -> None:

@@ -70,7 +70,7 @@ class FeetechProtection:
         self._shutdown = column("shutdown")
         self._protective = column("protective_torque") * _PER_CENT
 
-    def check(self, effort_ratio: Floats, pwm: Floats, volts: float, dt_s: float) -> None:
+    def check(self, effort_ratio: Floats, pwm: Floats, volts: Floats, dt_s: float) -> None:
         """Bring the errors up to date after `dt_s` of this current and this load."""
         self.thermals.advance(effort_ratio, dt_s)
         self._overload_s = (self._overload_s + dt_s) * (np.abs(pwm) > self._most_load)

@@ -49,7 +49,7 @@ class Feedback:
         self._efforts = np.zeros((EFFORT_CYCLES, len(self._tick)))
         self._effort_rows = tuple(self._efforts)
         self._newest_effort = 0
-        self.supply_v = 12.0
+        self.supply_v: Floats = np.full(len(self._tick), 12.0)
         self.now_ns = 0
         self.booted_ns = np.zeros(len(self._tick), np.int64)
         self._writers: tuple[tuple[int, int, Callable[[], None]], ...] = (
@@ -130,5 +130,5 @@ class Feedback:
         self._position_trajectory[:] = np.rint(profile.position)
 
     def _write_supply(self) -> None:
-        self._voltage[:] = round(self.supply_v / VOLTAGE_UNIT_V)
+        self._voltage[:] = np.rint(self.supply_v / VOLTAGE_UNIT_V)
         self._temperature[:] = np.rint(self._protection.thermals.body_c)

@@ -25,7 +25,7 @@ from sim_twin.servos.firmware.goal_window import GoalWindow
 from sim_twin.servos.firmware.motion import ServoMotion
 from sim_twin.servos.firmware.profile import Floats
 from sim_twin.servos.firmware.protection import CHECK_PERIOD_S, ServoProtection
-from sim_twin.servos.firmware.rail import Rail
+from sim_twin.servos.firmware.rail import Rails, SupplyVolts
 from sim_twin.servos.firmware.reactions import Reactions
 from sim_twin.servos.protocol.register_file import RegisterFile
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
@@ -44,6 +44,7 @@ class Firmware:
         specs: Sequence[EmulatedServoSpec],
         options: FirmwareOptions,
         coupling: Coupling | None = None,
+        feeds: Sequence[int] | None = None,
     ) -> None:
         self.registers = RegisterFile(specs)
         self._columns = TableColumns(self.registers)
@@ -52,9 +53,9 @@ class Firmware:
         self._motion = ServoMotion(self.registers, self._columns, joints)
         models = [table.model for table in self.registers.tables]
         self._protection = ServoProtection(models, self._columns, options)
-        self._rail = Rail(models, options.supply_ohm)
-        self._brownout_v = min(
-            min(options.brownout_v, _BROWNOUT_RATIO * model.voltage_v) for model in models
+        self._rails = Rails(models, options.supply_ohm, feeds)
+        self._brownout_v = np.array(
+            [min(options.brownout_v, _BROWNOUT_RATIO * model.voltage_v) for model in models]
         )
         self._feedback = Feedback(self._columns, self._motion, self._protection)
         self._reactions = Reactions(
@@ -65,12 +66,13 @@ class Firmware:
         )
         self._goal_window = GoalWindow(self._columns)
         self._boot_until_ns = [0] * len(specs)
-        self._powered = True
+        self._powered = np.ones(len(specs), np.bool_)
+        self._all_powered = True
         self._pose_known = False
         self._all_readable = False
         self._advanced_ns = 0
         self._checked_ns = 0
-        self._supply_v = 0.0
+        self._supply_v: SupplyVolts = 0.0
         self.now_ns = 0
         for row in range(len(specs)):
             self._boot(row)
@@ -85,11 +87,11 @@ class Firmware:
         now_ns: int,
         joint_motion: Floats,
         joint_effort: Floats,
-        supply_v: float,
+        supply_v: SupplyVolts,
     ) -> Floats:
         """Sense, run the control loops and return the duty for the next step.
 
-        The duty counts from the models' nominal voltage: what the rail lacks is taken off.
+        The duty counts from the models' nominal voltage: what its rail lacks is taken off.
         """
         if self._reactions.stale:
             self._reload()
@@ -111,7 +113,7 @@ class Firmware:
     @property
     def supply_w(self) -> float:
         """Return what the motors drew at the last look."""
-        return self._rail.supply_w if self._powered else 0.0
+        return self._rails.supply_w
 
     def couple_anew(self) -> None:
         """Take over a change of the coupling."""
@@ -119,10 +121,10 @@ class Firmware:
 
     def answers(self, row: int) -> bool:
         """Return whether a servo is powered and has finished booting."""
-        return self._powered and self.now_ns >= self._boot_until_ns[row]
+        return bool(self._powered[row]) and self.now_ns >= self._boot_until_ns[row]
 
     def _all_answer(self) -> bool:
-        return self._powered and self.now_ns >= max(self._boot_until_ns)
+        return self._all_powered and self.now_ns >= max(self._boot_until_ns)
 
     def feed_watchdog(self, rows: Sequence[int]) -> None:
         """Count a packet to these servos as communication."""
@@ -226,10 +228,11 @@ class Firmware:
             self._motion.home(row)
         self._reactions.stale = True
 
-    def _switch_power(self, *, on: bool) -> None:
-        self._powered = on
-        for row in range(len(self.registers)):
-            if on:
+    def _switch_power(self, powered: NDArray[np.bool_]) -> None:
+        changed = np.flatnonzero(powered != self._powered).tolist()
+        self._powered, self._all_powered = powered, bool(powered.all())
+        for row in changed:
+            if powered[row]:
                 self.reboot(row)
             else:
                 self._reactions.cut_torque(row)
@@ -237,17 +240,17 @@ class Firmware:
     def _check(self) -> None:
         """Look at voltage, current and temperature, which are slow beside the control loops."""
         motion = self._motion
-        volts = self._rail.volts(self._supply_v, motion.duty, motion.shaft_rad_s)
-        motion.set_voltage(self._rail.nominal_ratio(volts))
+        volts = self._rails.volts(self._supply_v, motion.duty, motion.shaft_rad_s)
+        motion.set_voltage(self._rails.nominal_ratio(volts))
         self._feedback.supply_v = volts
-        if (volts >= self._brownout_v) != self._powered:
-            self._switch_power(on=not self._powered)
+        powered = volts >= self._brownout_v
+        if (powered != self._powered).any():
+            self._switch_power(powered)
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
         effort_ratio = motion.effort_ratio(self._feedback.joint_effort)
-        errors = self._protection.check(effort_ratio, volts, elapsed_s)
-        if self._powered:
-            for row, bits in errors:
+        for row, bits in self._protection.check(effort_ratio, volts, elapsed_s):
+            if powered[row]:
                 self.raise_errors(row, bits)
 
     def _reload(self) -> None:

@@ -36,14 +36,16 @@ class ServoProtection:
         self.reload()
 
     def check(
-        self, effort_ratio: Floats, supply_v: float, dt_s: float
+        self, effort_ratio: Floats, supply_v: Floats, dt_s: float
     ) -> Sequence[tuple[int, int]]:
         """Return rows and hardware error bits that hold now, after `dt_s` of this effort."""
         self.thermals.advance(effort_ratio, dt_s)
         effort = np.abs(effort_ratio)
         if self._overload_runs or float(_peak(effort)) > self._options.overload_ratio:
             self._count_overload(effort > self._options.overload_ratio, dt_s)
-        return () if self._is_fine(supply_v) else self._errors(supply_v)
+        supply = supply_v / VOLTAGE_UNIT_V
+        voltage = (supply > self._max_voltage) | (supply < self._min_voltage)
+        return () if self._is_fine(voltage) else self._errors(voltage)
 
     def _count_overload(self, overloaded: NDArray[np.bool_], dt_s: float) -> None:
         self._overload_s += dt_s
@@ -52,8 +54,6 @@ class ServoProtection:
 
     def reload(self) -> None:
         """Take over limits that the host changed."""
-        self._highest_supply = int(self._max_voltage.min())
-        self._lowest_supply = int(self._min_voltage.max())
         self._coolest_limit_c = int(self._temperature_limit.min())
 
     def clear_overload(self, row: int) -> None:
@@ -65,19 +65,16 @@ class ServoProtection:
         self._forced_overload[row] = on
         self._overload_is_forced = bool(self._forced_overload.any())
 
-    def _is_fine(self, supply_v: float) -> bool:
+    def _is_fine(self, voltage: NDArray[np.bool_]) -> bool:
         """Return whether no servo can have an error, which is nearly always so."""
-        supply = supply_v / VOLTAGE_UNIT_V
         return (
             not self._overload_runs
             and not self._overload_is_forced
-            and self._lowest_supply <= supply <= self._highest_supply
+            and not voltage.any()
             and float(_peak(self.thermals.body_c)) <= self._coolest_limit_c
         )
 
-    def _errors(self, supply_v: float) -> list[tuple[int, int]]:
-        supply = supply_v / VOLTAGE_UNIT_V
-        voltage = (supply > self._max_voltage) | (supply < self._min_voltage)
+    def _errors(self, voltage: NDArray[np.bool_]) -> list[tuple[int, int]]:
         hot = self.thermals.body_c > self._temperature_limit
         overload = (self._overload_s > self._options.overload_time_s) | self._forced_overload
         bits = (

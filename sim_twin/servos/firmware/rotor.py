@@ -1,11 +1,14 @@
 """Turn free shafts by their motors' duty, where no physics engine does it."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from sim_twin.servos.firmware.profile import Floats
+
+TIME_CONSTANT_S: Final = 0.02
+"""In which a gear motor without load takes on its speed (chosen: such motors have 10 to 30 ms)."""
 
 
 class MotorFigures(Protocol):
@@ -41,14 +44,16 @@ class FreeRotors:
     """Integrate one inertia per motor; the speed implicitly, so that any step is stable.
 
     torque = stall * duty - stall / no_load * velocity
+
+    Without `inertia_kg_m2` each motor turns its own rotor alone, by `TIME_CONSTANT_S`: an inertia
+    that suits a strong motor makes the position loop of a fast weak one unstable.
     """
 
-    def __init__(
-        self, models: Sequence[MotorFigures], inertia_kg_m2: Floats | float = 0.01
-    ) -> None:
+    def __init__(self, models: Sequence[MotorFigures], inertia_kg_m2: float | None = None) -> None:
         self._stall_nm = np.array([model.stall_torque_nm for model in models])
         self._damping = self._stall_nm / np.array([model.no_load_speed_rad_s for model in models])
-        self._inertia_kg_m2 = inertia_kg_m2
+        own_kg_m2 = TIME_CONSTANT_S * self._damping
+        self._inertia_kg_m2 = own_kg_m2 if inertia_kg_m2 is None else inertia_kg_m2
         self.motion: Floats = np.zeros((2, len(models)))
         self.position_rad, self.velocity_rad_s = self.motion
         self.torque_nm: Floats = np.zeros(len(models))

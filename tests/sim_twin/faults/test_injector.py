@@ -98,9 +98,11 @@ def test_a_pulled_cable_is_lost_to_who_has_it_open_and_missing_to_who_opens_it(
 def test_a_ramp_lowers_the_voltage_step_by_step(lockstep: Lockstep) -> None:
     lockstep.faults.inject("servo_bus", None, "brown_out", volts_v=8.0, ramp_s=0.4)
     lockstep.run_for(0.2)
-    assert lockstep.twin.servo_supply.volts(lockstep.twin.now_ns) == pytest.approx(10.0, abs=0.05)
+    assert lockstep.twin.servo_supplies["main"].volts(lockstep.twin.now_ns) == pytest.approx(
+        10.0, abs=0.05
+    )
     lockstep.run_for(0.3)
-    assert lockstep.twin.servo_supply.volts(lockstep.twin.now_ns) == 8.0
+    assert lockstep.twin.servo_supplies["main"].volts(lockstep.twin.now_ns) == 8.0
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.dynamixel.tables.control_table import OperatingMode
+from drivers.clock import NS_PER_S
+from drivers.dynamixel.tables.control_table import MODELS, OperatingMode
 from drivers.dynamixel.tables.model import PULSE_RAD, PWM_FULL
-from sim_twin.servos import FirmwareOptions
+from drivers.dynamixel.wire.codec import Instruction, encode_instruction
+from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.server import FreeServos
 
 CENTRE = 2048
 PERIOD_S = 0.002
@@ -226,3 +229,20 @@ def test_a_free_running_motor_reaches_the_speed_of_its_datasheet(
     assert bench.read("present_velocity") * 0.229 == pytest.approx(77, abs=0.5)
     assert bench.read("present_current") == pytest.approx(0, abs=2)
     assert math.isclose(bench.rotors.velocity_rad_s[0], 77 * math.tau / 60, rel_tol=0.01)
+
+
+@pytest.mark.parametrize("model_name", MODELS)
+def test_a_free_running_servo_of_each_model_settles_with_factory_gains(model_name: str) -> None:
+    """The weakest and fastest, XL330-M077, has an I gain as delivered, and takes the longest."""
+    servos = FreeServos([EmulatedServoSpec(id=1, model_name=model_name)])
+    bank, register = servos.bank, MODELS[model_name].registers
+    servos.advance_to(NS_PER_S)
+    for name, value in (("torque_enable", 1), ("goal_position", 2560)):
+        row = register[name]
+        params = row.address.to_bytes(2, "little") + row.to_bytes(value)
+        bank.receive(encode_instruction(1, Instruction.WRITE, params))
+    errors = []
+    for tick in range(1, 101):
+        servos.advance_to(NS_PER_S + tick * NS_PER_S // 50)
+        errors.append(abs(bank.register(1, "present_position") - 2560))
+    assert max(errors[50:]) <= 4

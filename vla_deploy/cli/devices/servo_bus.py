@@ -81,7 +81,7 @@ class ServoBusPort:
     @property
     def declared(self) -> dict[int, tuple[str, str]]:
         """Return joint and model of the servos in the robot file, by id; none without a file."""
-        servos = self.robot.servo_bus.servos if self.robot else ()
+        servos = self.robot.servo_bus.all_servos if self.robot else ()
         return {servo.id: (servo.joint, servo.model) for servo in servos}
 
     @property

@@ -26,6 +26,7 @@ from vla_deploy.robots.joint_calibration import (
     CalibrationRecord,
     answering_servos,
     guided_joints,
+    shadows_of,
 )
 
 _TRIES: Final = 3
@@ -98,7 +99,7 @@ def calibrate(
     _require_turns(joints)
     _require_values(joints, pose, arguments)
     watched = answering_servos(robot, link, names)
-    _release(arguments, link, watched)
+    _release(arguments, link, [*watched, *shadows_of(robot, link, names)])
     record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
     guide = CalibrationGuide(link, watched, person, bus.clock, accept_sign=arguments.accept_sign)
     failures = []

@@ -9,7 +9,13 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 from drivers.errors import NoReply
 from drivers.servo.tools.bench import FoundServo, ServoBench
-from drivers.servo.tools.scan import ServoScan, SpeedReport, scan_speed
+from drivers.servo.tools.scan import (
+    ServoScan,
+    SpeedReport,
+    is_model,
+    read_voltages,
+    scan_speed,
+)
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
     ProgressLine,
@@ -19,6 +25,7 @@ from vla_deploy.cli.devices.servo_bus import (
     servo_id,
 )
 from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.robots.supplies import voltage_mismatches
 
 _SCAN_EXAMPLES: Final = """  vla-deploy servo scan --port /dev/ttyUSB0
   vla-deploy servo scan --robot butler --json
@@ -53,15 +60,18 @@ def run_scan(arguments: argparse.Namespace) -> int:
     """Print what answers at each speed.
 
     Raises:
-        CommandFailed: nothing answers, ids clash, or a declared servo is missing.
+        CommandFailed: nothing answers, ids clash, or a declared servo is missing, is another, or
+            measures a voltage that its supply cannot give.
     """
     bus = bus_of(arguments)
     progress = ProgressLine(quiet=arguments.json)
-    reports = []
+    reports: list[SpeedReport] = []
+    mismatches: list[str] = []
     try:
         for baud in speeds_to_ask(bus):
             with bus.open(baud) as link:
                 reports.append(scan_speed(link, arguments.ids, progress))
+                mismatches += _mismatches(link, bus, reports[-1])
             if bus.is_pseudo_terminal and reports[-1].servos:
                 break  # servos without a speed answer at each
     finally:
@@ -72,10 +82,26 @@ def run_scan(arguments: argparse.Namespace) -> int:
         declared=bus.declared,
         is_complete=arguments.ids is None,
     )
-    emit(arguments, _scan_document(bus, scan), "\n".join(_scan_lines(bus, reports)))
+    document = {**_scan_document(bus, scan), "wrong_voltages": mismatches}
+    emit(arguments, document, "\n".join(_scan_lines(bus, reports)))
     if fault := scan.fault():
         raise CommandFailed(fault)
+    if mismatches:
+        raise CommandFailed(f"{'; '.join(mismatches)}; check converter, plugs and robot file")
     return 0
+
+
+def _mismatches(link: ServoBench, bus: ServoBusPort, report: SpeedReport) -> list[str]:
+    """Return what the servos of the robot file measure and their supplies cannot give."""
+    if bus.robot is None:
+        return []
+    found = {one.servo_id: one.model_name for one in report.servos}
+    ids = [
+        servo.id
+        for servo in bus.robot.servo_bus.all_servos
+        if servo.id in found and is_model(found[servo.id], servo.model)
+    ]
+    return voltage_mismatches(bus.robot.servo_bus, read_voltages(link, ids))
 
 
 def speeds_to_ask(bus: ServoBusPort) -> Sequence[int]:

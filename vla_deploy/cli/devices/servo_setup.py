@@ -22,7 +22,7 @@ from vla_deploy.cli.devices.servo_change import require_speed
 from vla_deploy.cli.devices.servo_scan import speeds_to_ask
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.devices import Servo
+from vla_deploy.robots.devices import Servo, shadow_name
 
 _TRIES: Final = 3
 _EXAMPLES: Final = """  vla-deploy servo setup --robot so101
@@ -93,7 +93,8 @@ def _chosen(robot: RobotDescription, joints: Sequence[str]) -> Sequence[Servo]:
         UsageError: the robot has no such joint.
     """
     names = chosen_joints(robot, joints)
-    chosen = [one for one in robot.servo_bus.servos if one.joint in names]
+    names += [shadow_name(one.joint) for one in robot.servo_bus.shadows if one.joint in names]
+    chosen = [one for one in robot.servo_bus.all_servos if one.joint in names]
     return sorted(chosen, key=lambda one: one.id, reverse=True)
 
 

@@ -7,6 +7,7 @@ from vla_deploy.control.motion.axes import Floats
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.protection import ZoneSource
+from vla_deploy.robots.supplies import voltage_range_v
 from vla_deploy.safety import SafetyLimits
 
 _RANGE_MARGIN = 0.02
@@ -39,7 +40,9 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
     """
     margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
     facts = [family_of(servo.model).facts(servo.model) for servo in robot.servo_bus.servos]
-    lowest_v, highest_v = np.array([each.voltage_limits_v for each in facts]).T
+    bus = robot.servo_bus
+    ranges_v = [voltage_range_v(bus, servo, _VOLTAGE_MARGIN_V) for servo in bus.servos]
+    lowest_v, highest_v = np.array(ranges_v).T
     tip_over, base, home = robot.protection.tip_over, robot.parts.base, robot.parts.home
     return SafetyLimits(
         joint_names=robot.joint_names,
@@ -61,8 +64,8 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         effort_ratio=np.full(len(robot.joint_names), _EFFORT_RATIO),
         temperature_c=np.array([each.temperature_limit_c for each in facts])
         - _TEMPERATURE_MARGIN_C,
-        voltage_min_v=lowest_v + _VOLTAGE_MARGIN_V,
-        voltage_max_v=highest_v - _VOLTAGE_MARGIN_V,
+        voltage_min_v=lowest_v,
+        voltage_max_v=highest_v,
         standstill_velocity=_STANDSTILL_SHARE * robot.velocity_max,
         standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / base.wheel_radius_m if base else np.inf,
         scan_required=base is not None,

@@ -13,6 +13,7 @@ from drivers.opener import DeviceOpener
 from drivers.servo.bus import ServoBusDriver
 from drivers.servo.family import ServoFamily, family_of
 from drivers.servo.joint_servo import JointServo
+from drivers.servo.shadowed_bus import ShadowedBus
 from drivers.servo.state import BusState
 from platforms import Profile
 from vla_deploy.control.motion.axes import Axes, Floats
@@ -33,7 +34,7 @@ def bus_family(robot: RobotDescription) -> ServoFamily:
 
 
 def servo_specs(robot: RobotDescription) -> list[JointServo]:
-    """Return what the bus driver must know of each servo of a robot."""
+    """Return what the bus driver must know of each servo of a robot, those of shadows last."""
     family = bus_family(robot)
     return [
         family.servo(
@@ -44,7 +45,7 @@ def servo_specs(robot: RobotDescription) -> list[JointServo]:
             offset_rad=servo.offset,
             travel_per_rad=servo.travel_per_rad,
         )
-        for servo in robot.servo_bus.servos
+        for servo in robot.servo_bus.all_servos
     ]
 
 
@@ -64,10 +65,11 @@ class ServoLine:
         self._watchdog_s = profile.bus_watchdog_s
         self._family = bus_family(robot)
         self._specs = servo_specs(robot)
-        self._ids = [spec.id for spec in self._specs]
+        self._ids = [servo.id for servo in robot.servo_bus.servos]
+        self._leaders = [robot.joint_index[one.joint] for one in robot.servo_bus.shadows]
         self._bus: ServoBusDriver | None = None
         self._next_open_ns = self._aged_ns = 0
-        self.state = BusState.of(len(self._specs))
+        self.state = BusState.of(len(self._ids))
 
     def open(self, *, thorough: bool = True) -> None:
         """Connect and read once; torque is left as the servos have it.
@@ -78,7 +80,7 @@ class ServoLine:
             DriverError: the line is missing or busy, or a servo is silent or not as declared.
         """
         transport = self._devices.serial(self.name)
-        bus = self._family.bus(
+        bus: ServoBusDriver = self._family.bus(
             transport,
             self._clock,
             self._specs,
@@ -86,6 +88,8 @@ class ServoLine:
             watchdog_s=self._watchdog_s,
             fault_policy=self.faults.policy,
         )
+        if self._leaders:
+            bus = ShadowedBus(bus, self._leaders)
         try:
             bus.connect(thorough=thorough)
             self.state = _first_state(bus)

@@ -13,7 +13,7 @@ from drivers.feetech.codec import (
 )
 from drivers.feetech.table import FEETECH_MODELS
 from sim_twin.servos.feetech import EmulatedFeetechSpec, FeetechBank, FeetechOptions
-from sim_twin.servos.server import free_feetech_rotors
+from sim_twin.servos.firmware.rotor import FreeRotors
 
 STEP_NS = 2_000_000
 
@@ -36,7 +36,7 @@ class FeetechBench:
             ],
             options,
         )
-        self.rotors = free_feetech_rotors(self.models)
+        self.rotors = FreeRotors(self.models)
         self.now_ns = NS_PER_S
         self.supply_v = self.models[0].voltage_v
         self.blocked = False
