@@ -24,6 +24,9 @@ if TYPE_CHECKING:  # what reads datasets loads OpenCV and the extra
 Floats = NDArray[np.float64]
 APPROACH_SPEED_RATIO: Final = 0.2
 """Of the top speeds, on the way to the first pose."""
+GRIPPER_EFFORT_RATIO: Final = 0.5
+"""A gripper presses on what it holds for as long as it is told to close: LeRobot gives it half its
+torque, too (so_follower.py: Max_Torque_Limit 500)."""
 JUDGED_SPEED_RATIO: Final = 0.97
 """Of the top speeds, that a path may need: a takeover adds a little to what was judged."""
 _SLOWER: Final = (0.75, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)
@@ -221,7 +224,8 @@ def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> Pl
 
     try:
         first = dict(zip(path.joints, path.positions[0].tolist(), strict=True))
-        motion_id = motions.go(first, {}, APPROACH_SPEED_RATIO)
+        grippers = dict.fromkeys(robot.gripper_joints & set(path.joints), GRIPPER_EFFORT_RATIO)
+        motion_id = motions.go(first, grippers, APPROACH_SPEED_RATIO)
         while (ended := motions.ended(motion_id)) is None:
             wait()
             motions.step()
