@@ -1,27 +1,34 @@
 """Episodes are judged before anything moves, and go through control's own limits and safety."""
 
 import itertools
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from drivers.clock import NS_PER_S
 from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.main import main
+from vla_deploy.cli.operation import joint_play
 from vla_deploy.cli.operation.joint_play import (
     path_of,
     require_followable,
     tolerance_of,
     within_limits,
 )
+from vla_deploy.cli.session import RobotSession
 from vla_deploy.client.link import RobotLink
 from vla_deploy.client.motions import Motions
 from vla_deploy.client.path_player import PathPlayer, PlayedPath
 from vla_deploy.client.path_windows import TimedPath
+from vla_deploy.ipc import ClaimBook
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.calibration.lerobot_units import LeRobotUnit, units_of
 from vla_deploy.telemetry.lerobot.reader import EpisodeActions
+from vla_deploy.telemetry.lerobot.writer import DatasetWriter
 
 SO101 = load_robot("so101")
 NAMES = tuple(joint + ".pos" for joint in SO101.joint_names)
@@ -114,11 +121,50 @@ def play(
     return result
 
 
-def test_the_arm_follows_an_episode_without_a_pause(arm: LockstepControl) -> None:
-    result = play(arm, played(waves(4.5)))
-    assert (result.ended.status, result.pauses) == ("done", 0)
-    assert result.setpoint_error < 0.01
-    assert result.position_error < 0.05
+class WaitingClock:
+    """Run the robot, under a supervisor, while somebody waits."""
+
+    def __init__(self, arm: LockstepControl) -> None:
+        self._arm = arm
+        self._table = arm.space.cell_writer("process_table")
+        self._table.put_document({"robot": "so101"})
+
+    def now_ns(self) -> int:
+        return self._arm.clock.now_ns()
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self._table.put_document({"robot": "so101"})
+        self._arm.lockstep.run_for((deadline_ns - self.now_ns()) / NS_PER_S)
+
+
+def test_a_dataset_is_played_on_the_arm(
+    arm: LockstepControl,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("pyarrow", reason="datasets need the extra: vla-deploy[lerobot]")
+    with DatasetWriter(
+        tmp_path / "set", names=NAMES, cameras=[], fps=30, robot_type="so_follower"
+    ) as writer:
+        for values in episode_of(waves(4.5)).actions:
+            writer.add_frame(values, values, {})
+        writer.end_episode("wave")
+    session = RobotSession(arm.lockstep.context.run_dir, WaitingClock(arm))
+    monkeypatch.setattr(joint_play, "attach", lambda _: session)
+    ClaimBook(arm.space, arm.clock).declare(dict.fromkeys(SO101.groups, 1))
+    words = ["joint", "play", str(tmp_path / "set")]
+    assert main([*words, "--episode", "1"]) == 2
+    assert "no episode 1; there are 0 to 0" in capsys.readouterr().err
+    assert main([*words, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["frames"], document["pauses"]) == (135, 0)
+    assert document["setpoint_error"] < 0.01
+    assert document["position_error"] < 0.05
+    arm.operate("estop")
+    arm.lockstep.run_for(0.1)
+    assert main(words) == 1
+    assert "reset and arm it" in capsys.readouterr().err
 
 
 def test_after_a_late_takeover_it_goes_on_from_rest_until_an_emergency_stop(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vla_deploy.cli.main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.calibration.lerobot_units import units_of
 from vla_deploy.telemetry.errors import DatasetRefused
@@ -101,6 +102,18 @@ def test_what_does_not_fit_together_is_refused(
     with pytest.raises(DatasetRefused, match=words):
         export(files, tmp_path / "set", DatasetRequest(fps=10, **{"task": "wave", **request_of}))
     assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.usefixtures("needs_arrow")
+def test_the_command_writes_a_dataset_or_says_why_not(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, folder = recording([*WORDS, *STATES]), str(tmp_path / "set")
+    words = ["record", "export", str(file.path), "-o", folder]
+    assert main([*words, "--with-failed", "--fps", "20"]) == 0
+    assert capsys.readouterr().out == f"{folder}: 3 episodes, 83 frames, no camera\n"
+    assert main(words) == 2
+    assert f"{folder} exists; name a folder that does not" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("needs_arrow")
