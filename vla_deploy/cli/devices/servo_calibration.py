@@ -1,4 +1,4 @@
-"""`vla-deploy servo calibration export | import`: exchange the calibration with other software."""
+"""`vla-deploy servo calibration import | export | check`: exchange it with other software."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+from drivers.errors import DeviceMissing
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import ServoBusPort, add_bus_arguments, bus_of
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -39,7 +40,7 @@ def register(commands: Any) -> None:
         "import",
         f"take the calibration of other software over into {CALIBRATION_FILE}",
         "  vla-deploy servo calibration import my_arm.json --robot so101\n"
-        "  vla-deploy servo calibration import my_arm.json --robot so101 --read-servos\n",
+        "  vla-deploy servo calibration import my_arm.json --robot so101 --homing servo\n",
         run_import,
     )
     exporting = add_command(
@@ -49,20 +50,28 @@ def register(commands: Any) -> None:
         "  vla-deploy servo calibration export my_arm.json --robot so101\n",
         run_export,
     )
+    checking = add_command(
+        acts,
+        "check",
+        "compare the homing offsets that the servos hold with those of the calibration",
+        "  vla-deploy servo calibration check --robot so101\n",
+        run_check,
+    )
     for act in (importing, exporting):
         act.add_argument("file", type=Path, help="the other software's file")
         act.add_argument(
             "--format", choices=FORMATS, default=FORMATS[0], help="of the file (default: lerobot)"
         )
+    for act in (importing, exporting, checking):
         add_bus_arguments(act)
-        act.add_argument(
-            "--read-servos", action="store_true", help="ask the servos for their homing offsets"
-        )
+    exporting.add_argument(
+        "--read-servos", action="store_true", help="ask the servos for their homing offsets"
+    )
     importing.add_argument(
         "--homing",
         choices=("servo", "none"),
-        help="servo: the servos hold the file's homing offsets, as LeRobot leaves them (default); "
-        "none: they hold 0 (default of Dynamixels, whose bus refuses any other)",
+        help="without asking the servos: they hold the file's homing offsets, as LeRobot leaves "
+        "them, or 0 (default: they are asked)",
     )
     importing.add_argument(
         "--output", type=Path, help=f"write here (default: {CALIBRATION_FILE} at the robot file)"
@@ -73,12 +82,10 @@ def run_import(arguments: argparse.Namespace) -> int:
     """Read a file, judge it by the robot, and write it over the joints that it names.
 
     Raises:
-        UsageError: no robot is named, or what is asked for contradicts itself.
+        UsageError: no robot is named, or its servos are not there and `--homing` is not given.
         RobotFileError: the file does not fit the robot; nothing is written.
         CommandFailed: a servo holds another homing offset than the file.
     """
-    if arguments.read_servos and arguments.homing:
-        raise UsageError("--homing and --read-servos: give one of them; the servos say which it is")
     bus = bus_of(arguments)
     robot = _robot_of(bus)
     motors = read_lerobot(arguments.file)
@@ -109,8 +116,7 @@ def run_export(arguments: argparse.Namespace) -> int:
     robot = _robot_of(bus)
     calibrations = read_calibration(robot.mjcf_path.parent / CALIBRATION_FILE)
     held = _held_offsets(bus, robot.joint_names) if arguments.read_servos else {}
-    for name, offset in held.items():
-        _require_as_calibrated(name, calibrations.get(name), offset)
+    _require_as_calibrated(calibrations, held)
     motors = exported(robot, calibrations, held)
     write_lerobot(arguments.file, motors)
     report = {"file": str(arguments.file), "motors": {n: asdict(m) for n, m in motors.items()}}
@@ -119,6 +125,26 @@ def run_export(arguments: argparse.Namespace) -> int:
         for name, motor in motors.items()
     ]
     return emit(arguments, report, "\n".join([*lines, f"written to {arguments.file}"]))
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Read the homing offset of every servo and compare it.
+
+    Raises:
+        UsageError: no robot is named.
+        CommandFailed: servos hold others than when they were calibrated.
+    """
+    bus = bus_of(arguments)
+    robot = _robot_of(bus)
+    calibrations = read_calibration(robot.mjcf_path.parent / CALIBRATION_FILE)
+    held = _held_offsets(bus, robot.joint_names)
+    _require_as_calibrated(calibrations, held)
+    lines = [
+        f"{name}: homing offset {offset}, "
+        + ("as calibrated" if _expected_offset(calibrations.get(name)) == offset else "part of it")
+        for name, offset in held.items()
+    ]
+    return emit(arguments, held, "\n".join(lines))
 
 
 def _robot_of(bus: ServoBusPort) -> RobotDescription:
@@ -134,10 +160,14 @@ def _homing_in_servo(
     motors: Mapping[str, LeRobotMotor],
 ) -> dict[str, bool]:
     """Return for each motor whether its servo holds the homing offset of the file."""
-    if not arguments.read_servos:
-        usual = "none" if bus.family.name == "dynamixel" else "servo"
-        return dict.fromkeys(motors, (arguments.homing or usual) == "servo")
-    held = _held_offsets(bus, [name for name in motors if name in robot.joint_index])
+    if arguments.homing:
+        return dict.fromkeys(motors, arguments.homing == "servo")
+    try:
+        held = _held_offsets(bus, [name for name in motors if name in robot.joint_index])
+    except DeviceMissing as error:
+        raise UsageError(
+            f"{error}; or say what the servos hold, without asking them, with --homing"
+        ) from error
     for name, offset in held.items():
         if offset not in (0, motors[name].homing_offset):
             raise CommandFailed(
@@ -161,15 +191,27 @@ def _held_offsets(bus: ServoBusPort, names: Sequence[str]) -> dict[str, int]:
         }
 
 
-def _require_as_calibrated(name: str, calibration: JointCalibration | None, offset: int) -> None:
+def _expected_offset(calibration: JointCalibration | None) -> int | None:
+    """Return the homing offset with which a joint was calibrated; None where it is not known."""
     origin = None if calibration is None else calibration.lerobot
     if origin is None:
-        return
-    expected = origin.homing_offset if origin.homing_in_servo else 0
-    if offset != expected:
+        return None
+    return origin.homing_offset if origin.homing_in_servo else 0
+
+
+def _require_as_calibrated(
+    calibrations: Mapping[str, JointCalibration], held: Mapping[str, int]
+) -> None:
+    expected = {name: _expected_offset(calibrations.get(name)) for name in held}
+    wrong = [
+        f"{name}: its servo holds homing offset {offset}, expected {expected[name]} as calibrated"
+        for name, offset in held.items()
+        if expected[name] not in (None, offset)
+    ]
+    if wrong:
         raise CommandFailed(
-            f"{name}: its servo holds homing offset {offset}, expected {expected} as calibrated: "
-            "something wrote it since; import LeRobot's file again, or calibrate the joint"
+            "; ".join(wrong)
+            + ": something wrote it since; import LeRobot's file again, or calibrate the joint"
         )
 
 

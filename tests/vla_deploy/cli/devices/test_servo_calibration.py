@@ -47,7 +47,7 @@ def test_the_servos_say_whether_they_hold_the_homing_offsets(
     said: Any,
 ) -> None:
     bus = make_bus.feetech(*range(1, 7), homing_offset=held)
-    words = [str(file_of(folder, -85)), "--robot", str(folder), "--port", bus.port, "--read-servos"]
+    words = [str(file_of(folder, -85)), "--robot", str(folder), "--port", bus.port]
     code = main(["servo", "calibration", "import", *words])
     if isinstance(said, str):
         assert code == 1
@@ -60,5 +60,21 @@ def test_the_servos_say_whether_they_hold_the_homing_offsets(
         one.lerobot is not None and one.lerobot.homing_in_servo for one in read.values()
     } == said
     words[0] = str(folder / "ours.json")
-    assert main(["servo", "calibration", "export", *words]) == 0
+    assert main(["servo", "calibration", "export", *words, "--read-servos"]) == 0
     assert (folder / "ours.json").read_text() == (folder / "theirs.json").read_text()
+    assert main(["servo", "calibration", "check", *words[1:]]) == 0
+    other = make_bus.feetech(*range(1, 7), homing_offset=7)
+    words = ["--robot", str(folder), "--port", other.port]
+    assert main(["servo", "calibration", "check", *words]) == 1
+    assert "elbow_flex: its servo holds homing offset 7, expected" in capsys.readouterr().err
+
+
+def test_without_the_servos_it_has_to_be_said(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["servo", "calibration", "import", str(file_of(folder, -85)), "--robot", str(folder)]
+    words += ["--port", str(tmp_path / "nothing")]
+    assert main(words) == 2
+    assert "say what the servos hold, without asking them, with --homing" in capsys.readouterr().err
+    assert main([*words, "--homing", "servo"]) == 0
+    assert read_calibration(folder / CALIBRATION_FILE)["gripper"].lerobot is not None
