@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.servo.tools.travel import PULSE_RAD
 from vla_deploy.cli.commands import add_command, emit, number_within, whole_number
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import RobotSession, attach
@@ -142,10 +143,10 @@ def within_limits(robot: RobotDescription, path: TimedPath, *, clip: bool) -> Ti
     low = np.array([robot.limits[joint].min for joint in path.joints])
     high = np.array([robot.limits[joint].max for joint in path.joints])
     clipped = np.clip(path.positions, low, high)
-    outside = np.argwhere(clipped != path.positions)
+    beyond = np.abs(path.positions - clipped)
+    outside = np.argwhere(beyond > _pulses(robot, path))
     if not len(outside) or clip:
         return replace(path, positions=clipped)
-    beyond = np.abs(path.positions - clipped)
     frame, row = np.unravel_index(int(beyond.argmax()), beyond.shape)
     joints = ", ".join(path.joints[one] for one in sorted({int(one) for _, one in outside}))
     raise UsageError(
@@ -153,6 +154,12 @@ def within_limits(robot: RobotDescription, path: TimedPath, *, clip: bool) -> Ti
         f"{low[row]:g} to {high[row]:g}; {len({int(one) for one, _ in outside})} frames leave the "
         f"limits ({joints}): take --clip to stay at them, or another --unit or calibration"
     )
+
+
+def _pulses(robot: RobotDescription, path: TimedPath) -> Floats:
+    """Return one pulse of each joint's servo: datasets are rounded, nothing less is beyond."""
+    servos = {servo.joint: servo for servo in robot.servo_bus.servos}
+    return PULSE_RAD * np.array([servos[joint].travel_per_rad for joint in path.joints])
 
 
 def require_followable(robot: RobotDescription, path: TimedPath, speed: float) -> None:
@@ -211,13 +218,17 @@ def _judge(robot: RobotDescription, window: PathWindow) -> None:
 
 
 def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> PlayedPath:
-    claim = Claimed(session, "cli/joint", robot.groups_moving(path.joints))
+    claim = Claimed(session, "cli/joint_play", robot.groups_moving(path.joints))
     refusal = refusal_of(session.document(topics.CONTROL_STATUS, _FRESH_S)) or claim.why_not_taken()
     if refusal:
         raise CommandFailed(refusal)
     motions = Motions(session, robot.joint_index, "cli")
+    orders = session.events(topics.PLAN)
 
     def wait() -> None:
+        # "Stop" in any words or from any place reaches the executor so; it holds for this, too.
+        if any("cancel" in order.payload and "of" not in order.payload for order in orders.drain()):
+            raise CommandFailed("stopped on request; the joints come to rest where they are")
         if session.document(topics.CONTROL_STATUS, _FRESH_S) is None:
             raise CommandFailed(SILENT)
         session.pause()
@@ -234,4 +245,5 @@ def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> Pl
         return PathPlayer(motions, session.clock, path, tolerance_of(robot, path)).play(wait)
     finally:
         motions.close()
+        orders.close()
         claim.release()

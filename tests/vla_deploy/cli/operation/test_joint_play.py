@@ -126,6 +126,7 @@ class WaitingClock:
 
     def __init__(self, arm: LockstepControl) -> None:
         self._arm = arm
+        self.acts: dict[int, Callable[[], None]] = {}
         self._table = arm.space.cell_writer("process_table")
         self._table.put_document({"robot": "so101"})
 
@@ -134,6 +135,8 @@ class WaitingClock:
 
     def sleep_until(self, deadline_ns: int) -> None:
         self._table.put_document({"robot": "so101"})
+        for at_ns in [one for one in self.acts if one <= deadline_ns]:
+            self.acts.pop(at_ns)()
         self._arm.lockstep.run_for((deadline_ns - self.now_ns()) / NS_PER_S)
 
 
@@ -150,7 +153,9 @@ def test_a_dataset_is_played_on_the_arm(
         for values in episode_of(waves(4.5)).actions:
             writer.add_frame(values, values, {})
         writer.end_episode("wave")
-    session = RobotSession(arm.lockstep.context.run_dir, WaitingClock(arm))
+    clock = WaitingClock(arm)
+    session = RobotSession(arm.lockstep.context.run_dir, clock)
+    plans = arm.space.ring_writer("plan")
     monkeypatch.setattr(joint_play, "attach", lambda _: session)
     ClaimBook(arm.space, arm.clock).declare(dict.fromkeys(SO101.groups, 1))
     words = ["joint", "play", str(tmp_path / "set")]
@@ -161,6 +166,10 @@ def test_a_dataset_is_played_on_the_arm(
     assert (document["frames"], document["pauses"]) == (135, 0)
     assert document["setpoint_error"] < 0.01
     assert document["position_error"] < 0.05
+    at = arm.clock.now_ns() + NS_PER_S
+    clock.acts[at] = lambda: plans.publish({"command_id": "c1", "cancel": True})
+    assert main(words) == 1
+    assert "stopped on request" in capsys.readouterr().err
     arm.operate("estop")
     arm.lockstep.run_for(0.1)
     assert main(words) == 1
