@@ -77,7 +77,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "mission": CommandEntry(
         "operation.mission", "give a mission of several objectives, and see how far it is"
     ),
-    "joint": CommandEntry("operation.joint", "show where the joints are, and move one of them"),
+    "joint": CommandEntry(
+        "operation.joint", "show where the joints are, move one, replay an episode"
+    ),
     "profile": CommandEntry("maintenance.profile", "choose how the stack uses this computer"),
     "robot": CommandEntry("devices.robot", "write the robot's description as URDF, for ROS"),
     "servo": CommandEntry("devices.servo", "find, look at, set up and calibrate servos"),

@@ -7,6 +7,8 @@ TelemetryError
 ├── ReplayRefused             a replay cannot do what is requested: request something else
 ├── ExtraMissing              an optional part is missing: the text says how to get it
 ├── RecordingRefused          a recording cannot be made as requested: request another
+├── DatasetRefused            a dataset cannot be written as requested: request another
+├── DatasetUnusable           a dataset cannot be read: mend it, or take another
 ├── RecordingSettingsInvalid  recording.toml has faults, all of them are listed: mend the file
 ├── TrendsUnavailable         the files of the history cannot be made: make room, or mend the folder
 └── SeriesUnknown             the history has no such series: list those it has
@@ -31,6 +33,14 @@ class FlightForeign(TelemetryError):
 
 class RecordingRefused(TelemetryError):
     """A recording cannot be made as requested."""
+
+
+class DatasetRefused(TelemetryError):
+    """A dataset cannot be written as requested."""
+
+
+class DatasetUnusable(TelemetryError):
+    """A dataset cannot be read."""
 
 
 class ExtraMissing(TelemetryError):

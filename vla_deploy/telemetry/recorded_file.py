@@ -111,6 +111,16 @@ class RecordedFile:
         """
         return self._read(verify=True, topics=channels or None)
 
+    def messages_between(
+        self, from_ns: int, to_ns: int, *channels: str
+    ) -> Iterator[RecordedMessage]:
+        """Yield the messages of some channels between two moments of the wall clock, by time.
+
+        Raises:
+            FlightUnreadable: the file is spoiled.
+        """
+        return self._read(verify=True, topics=channels, starting_at=from_ns, ending_before=to_ns)
+
     def messages_from(self, at_ns: int) -> Iterator[RecordedMessage]:
         """Yield the messages from a moment of the wall clock on, by time.
 

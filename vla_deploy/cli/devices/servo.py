@@ -5,13 +5,21 @@ from typing import Any
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.devices import (
     servo_calibrate,
+    servo_calibration,
     servo_change,
     servo_monitor,
     servo_scan,
     servo_setup,
 )
 
-PARTS = (servo_scan, servo_monitor, servo_setup, servo_calibrate, servo_change)
+PARTS = (
+    servo_scan,
+    servo_monitor,
+    servo_setup,
+    servo_calibrate,
+    servo_calibration,
+    servo_change,
+)
 
 
 def register(commands: Any) -> None:

@@ -1,4 +1,4 @@
-"""`vla-deploy joint show | move`: where the joints are, and one of them moved."""
+"""`vla-deploy joint show | move | play`: where the joints are, and how they are moved."""
 
 import argparse
 import sys
@@ -13,6 +13,7 @@ from vla_deploy.cli.commands import (
     number_within,
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.operation import joint_play
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.client.motions import Claimed, Motions, joint_view
 from vla_deploy.client.readiness import SILENT, refusal_of
@@ -26,6 +27,7 @@ _FRESH_S: Final = 1.0
 EXAMPLES: Final = """  vla-deploy joint show
   vla-deploy joint move head_pan --to 0.4
   vla-deploy joint move left_elbow --by -0.1 --speed 0.2
+  vla-deploy joint play pick_cube --episode 3
 """
 
 
@@ -62,6 +64,7 @@ def register(commands: Any) -> None:
         metavar="RAD_S",
         help=f"at most so fast (a finger: m/s; default: {USUAL_SPEED_RATIO:g} of its top speed)",
     )
+    joint_play.register(acts)
 
 
 def show(arguments: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`vla-deploy record start | stop | status | list | topics | once`: record what the robot does."""
+"""`vla-deploy record start | stop | status | list | topics | once | export`: record a run."""
 
 import argparse
 import os
@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.recording import export
 from vla_deploy.cli.recording.runs import (
     add_topic_arguments,
     stop_requested,
@@ -32,6 +33,7 @@ EXAMPLES: Final = """  vla-deploy record start                      everything, 
   vla-deploy record start --without rgbd --label kitchen
   vla-deploy record once --duration 30 -o run.mcap   into a file of your own
   vla-deploy record list
+  vla-deploy record export latest -o pick_cube       as a LeRobot dataset
 """
 Status = Mapping[str, Any]
 
@@ -60,6 +62,7 @@ def register(commands: Any) -> None:
     added["once"].add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="where to write it"
     )
+    export.register(acts)
     added["list"].add_argument(
         "--folder", type=Path, help="where recordings are (default: the robot's)"
     )

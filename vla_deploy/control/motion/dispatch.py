@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from vla_deploy.control.judging.thresholds import contact_torque
-from vla_deploy.control.motion.axes import AxisLimits
+from vla_deploy.control.motion.axes import AxisLimits, Floats
 from vla_deploy.control.motion.commands import (
     Cancel,
     CommandRefused,
@@ -33,6 +33,13 @@ def axis_limits(robot: RobotDescription) -> AxisLimits:
     )
 
 
+def start_tolerance(robot: RobotDescription) -> Floats:
+    """Return how far from its setpoint each joint's trajectory may begin."""
+    return _START_TOLERANCE_RAD * np.array(
+        [servo.travel_per_rad for servo in robot.servo_bus.servos]
+    )
+
+
 class Dispatcher:
     """Start, replace and cancel motions on request."""
 
@@ -41,8 +48,7 @@ class Dispatcher:
         self._names = np.array(robot.joint_names)
         self._limits = axis_limits(robot)
         self._lower, self._upper = robot.position_min, robot.position_max
-        travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
-        self._start_tolerance = _START_TOLERANCE_RAD * travel
+        self._start_tolerance = start_tolerance(robot)
         self._contact_nm = contact_torque(robot)
         self._motions = motions
         self._servos = servos

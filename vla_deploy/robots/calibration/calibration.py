@@ -5,14 +5,14 @@ It names the servo too: when another one is mounted, the old measurement is refu
 """
 
 import json
-import os
-import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from vla_deploy.robots.calibration.lerobot_file import RANGE, range_faults
+from vla_deploy.robots.calibration.replacing import replace_text
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.schema import SERVO
@@ -21,6 +21,8 @@ from vla_deploy.runtime.table_schema import (
     TEXT,
     Shape,
     TableFault,
+    ValueCheck,
+    build,
     check_record,
     check_tables,
 )
@@ -33,11 +35,32 @@ JOINT: Shape = {
     "offset": SERVO["offset"],
     "method": TEXT,
     "made_at": TEXT,
+    "lerobot": TABLE.optional,
+}
+LEROBOT: Shape = {
+    **RANGE,
+    "homing_in_servo": ValueCheck(
+        expected="true or false", holds=lambda value: isinstance(value, bool)
+    ),
 }
 HEADER = """\
 # Written by `vla-deploy servo calibrate`; replaces sign and offset of these joints in robot.toml.
 """
 Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeRobotOrigin:
+    """Keep what LeRobot's file says of a joint that was imported from one, to export it as it was.
+
+    `homing_in_servo` is whether the servo itself held the homing offset then.
+    """
+
+    drive_mode: int
+    homing_offset: int
+    range_min: int
+    range_max: int
+    homing_in_servo: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +72,7 @@ class JointCalibration:
     offset: float
     method: str
     made_at: str
+    lerobot: LeRobotOrigin | None = None
 
 
 def read_calibration(file: Path) -> dict[str, JointCalibration]:
@@ -61,7 +85,9 @@ def read_calibration(file: Path) -> dict[str, JointCalibration]:
     faults = tuple(_faults(document))
     if faults:
         raise RobotFileError(file, faults)
-    return {name: JointCalibration(**row) for name, row in subtables(document, "joints").items()}
+    return {
+        name: build(JointCalibration, row) for name, row in subtables(document, "joints").items()
+    }
 
 
 def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) -> None:
@@ -71,28 +97,6 @@ def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) 
         RobotFileError: it cannot be written; the old file stays.
     """
     replace_text(file, _as_toml(calibrations))
-
-
-def replace_text(file: Path, text: str) -> None:
-    """Write a file under another name, then put it in place; `<file>.bak` is the one before.
-
-    Raises:
-        RobotFileError: it cannot be written; the old file stays.
-    """
-    fresh = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        with fresh.open("w", encoding="utf-8") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        if file.exists():
-            shutil.copy2(file, file.with_name(file.name + ".bak"))
-        fresh.replace(file)
-    except OSError as error:
-        fresh.unlink(missing_ok=True)
-        expected = "a file that can be written; choose one with --output"
-        fault = TableFault(key="(file)", got=error.strerror or str(error), expected=expected)
-        raise RobotFileError(file, (fault,)) from error
 
 
 def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
@@ -150,11 +154,25 @@ def _parse(file: Path) -> Document:
 def _faults(document: Document) -> Iterator[TableFault]:
     yield from check_record(document, "", CALIBRATION)
     yield from check_tables(document, {"joints.*": JOINT})
+    for name, row in subtables(document, "joints").items():
+        if isinstance(origin := row.get("lerobot"), dict):
+            key = f"joints.{name}.lerobot"
+            yield from check_record(origin, key, LEROBOT) or range_faults(origin, key)
 
 
 def _as_toml(calibrations: Mapping[str, JointCalibration]) -> str:
     parts = [HEADER]
     for joint, row in calibrations.items():
         parts.append(f"\n[joints.{json.dumps(joint)}]\n")
-        parts += [f"{key} = {json.dumps(value)}\n" for key, value in asdict(row).items()]
+        parts += [
+            f"{key} = {_toml_value(value)}\n"
+            for key, value in asdict(row).items()
+            if value is not None
+        ]
     return "".join(parts)
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {json.dumps(one)}" for key, one in value.items()) + " }"
+    return json.dumps(value)

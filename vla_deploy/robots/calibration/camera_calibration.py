@@ -18,8 +18,8 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.robots.calibration.calibration import replace_text
 from vla_deploy.robots.calibration.lens_schema import lens_faults
+from vla_deploy.robots.calibration.replacing import replace_text
 from vla_deploy.robots.camera import CameraDescription, CameraMounting, LensCalibration
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.runtime.one_line import one_line

@@ -39,6 +39,7 @@ class RobotViews:
 
         self._model = RobotModel(robot)
         self._names = robot.joint_names
+        self._sees = robot.parts.camera is not None
         lidar = robot.parts.lidar
         self._lidar_m = (
             np.zeros(3)
@@ -60,7 +61,9 @@ class RobotViews:
         positions = np.array(state["position"][: len(self._names)], dtype=np.float64)
         if not np.isfinite(positions).all():
             return {"transforms": []}
-        poses = {**self._model.joint_poses(positions), CAMERA: self._model.camera_pose(positions)}
+        poses = dict(self._model.joint_poses(positions))
+        if self._sees:
+            poses[CAMERA] = self._model.camera_pose(positions)
         frames = [_frame(BASE, name, *matrix_json(at), stamp_ns) for name, at in poses.items()]
         return {"transforms": frames}
 

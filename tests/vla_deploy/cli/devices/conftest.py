@@ -53,8 +53,10 @@ def make_bus(tmp_path: Path) -> Iterator[Callable[..., Bus]]:
         buses.append(Bus(tmp_path / f"bus{len(buses)}", free))
         return buses[-1]
 
-    make.feetech = lambda *ids: serve_bus(
-        FreeFeetechServos([EmulatedFeetechSpec(id=one, model_name="STS3215-C018") for one in ids])
+    make.feetech = lambda *ids, **eeprom: serve_bus(
+        FreeFeetechServos(
+            [EmulatedFeetechSpec(id=one, model_name="STS3215-C018", eeprom=eeprom) for one in ids]
+        )
     )
 
     yield make

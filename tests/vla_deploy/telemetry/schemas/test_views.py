@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import jsonschema_rs
@@ -118,6 +119,13 @@ def test_frames_tell_where_the_camera_looks(drawer: ViewDrawer) -> None:
     assert camera["parent_frame_id"] == "base"
     assert camera["translation"]["z"] > 0.5
     assert {frame["child_frame_id"] for frame in frames} >= set(ROBOT.joint_names)
+
+
+def test_a_robot_without_a_camera_has_the_frames_of_its_joints() -> None:
+    blind = replace(ROBOT, parts=replace(ROBOT.parts, camera=None))
+    frames = drawn(ViewDrawer(blind), "joint_state")["view/frames"]["transforms"]
+    assert {frame["child_frame_id"] for frame in frames} >= set(ROBOT.joint_names)
+    assert "camera" not in {frame["child_frame_id"] for frame in frames}
 
 
 def test_an_object_is_drawn_where_the_scene_says(drawer: ViewDrawer) -> None:
