@@ -185,7 +185,7 @@ class _Trial:
             if seen.speed_rad_s() < STANDSTILL_RAD_S:
                 self._rest_s, self._rest_places = seen.since_s, seen.where().copy()
         else:
-            moved_rad = float(np.abs(seen.where() - self._rest_places).max())
+            moved_rad = float(np.abs(seen.where() - self._rest_places).max(initial=0.0))
             self._moved_rad = max(self._moved_rad, moved_rad)
 
     def _failures(self) -> Iterator[str]:

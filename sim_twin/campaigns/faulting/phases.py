@@ -16,7 +16,7 @@ _TURN_TIMEOUT_S: Final = 8.0
 _GAZE: Final = {"head_pan": 0.0, "head_tilt": 0.3}
 """As the executor looks where it drives."""
 _POSE_S: Final = 3.5
-_CLOSE_S: Final = 1.5
+_CLOSE_S: Final = 3.0
 _SETTLE_S: Final = 1.0
 _RUN_UP_S: Final = 0.6
 _PAYLOAD_WIDTH_M: Final = 0.025
