@@ -66,9 +66,11 @@ def test_a_dead_cable_leaves_it_where_it_passes_and_it_goes_on_after_a_reset(
     assert arm.control_status()["cause"] == "servo_bus_lost"
     speeds = [abs(one["velocity"]) for one in arm.lockstep.truth()["joints"].values()]
     assert max(speeds) < 0.01, "no watchdog stops it: its last goal is where it stands"
-    assert positions(arm) == pytest.approx(passing, abs=0.1)
+    stood = positions(arm)
+    assert stood == pytest.approx(passing, abs=0.1)
     arm.lockstep.twin.plugs["servos"].push()
     arm.lockstep.run_for(2.5)
+    assert positions(arm) == pytest.approx(stood, abs=0.01), "it goes on to no setpoint"
     arm.arm()
     arm.go(arm.robot.poses["ready"])
     arm.lockstep.run_for(3.0)
