@@ -1,7 +1,7 @@
 """Bring a robot in lock-step into each phase of its work: at rest, driving, reaching, carrying."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
 from sim_twin.campaigns.faulting.choreography import Phase, choreography_of
@@ -17,6 +17,10 @@ _GAZE: Final = {"head_pan": 0.0, "head_tilt": 0.3}
 """As the executor looks where it drives."""
 _POSE_S: Final = 3.5
 _CLOSE_S: Final = 3.0
+_UNDER_WAY: Final = 10
+"""Looks until the fingers are surely in motion."""
+_FINGERS_REST: Final = 0.02
+"""Rad/s, or m/s."""
 _SETTLE_S: Final = 1.0
 _RUN_UP_S: Final = 0.6
 _PAYLOAD_WIDTH_M: Final = 0.025
@@ -67,6 +71,11 @@ class PhaseStage:
         """Return whether the physics sees the payload in a hand."""
         return self.moves.payload in self._lockstep.truth()["held"]
 
+    def _stand(self, joints: Iterable[str]) -> bool:
+        """Return whether fingers have met what stands fast between them."""
+        now = self._lockstep.truth()["joints"]
+        return all(abs(now[name]["velocity"]) < _FINGERS_REST for name in joints)
+
     def _drive(self) -> None:
         self._speeds = (_DRIVE_M_S, 0.0)
 
@@ -96,9 +105,9 @@ class PhaseStage:
         self.run_for(_POSE_S)
         grip = engine.data.site(hand.grip_site)
         self._stack.go(shut, 0.5, dict.fromkeys(fingers, 0.5))
-        for _ in range(round(_CLOSE_S / _COMMAND_S)):
+        for look in range(round(_CLOSE_S / _COMMAND_S)):
             self._lockstep.run_for(_COMMAND_S)
-            if self.holds_payload:
+            if look > _UNDER_WAY and self.holds_payload and self._stand(fingers):
                 break
             aside_m = hand.middle_m(_PAYLOAD_WIDTH_M)
             middle = grip.xpos + aside_m * grip.xmat.reshape(3, 3)[:, 1]
