@@ -9,7 +9,7 @@ import pytest
 
 from platforms import load_profile
 from sim_twin.faults.request import FaultRefused
-from sim_twin.harness.lockstep_stack import LockstepControl
+from sim_twin.harness.lockstep_stack import LockstepControl, armed_lockstep
 from sim_twin.harness.processes import armed_processes
 from vla_deploy.ipc import topics
 from vla_deploy.planning.node import PlannerNode
@@ -90,6 +90,17 @@ def test_a_servo_that_is_too_hot_stops_it_and_is_named(arm: LockstepControl) -> 
 def test_what_it_does_not_have_cannot_fail(arm: LockstepControl, component: str) -> None:
     with pytest.raises(FaultRefused, match=r"the robot file has no \["):
         arm.faults.inject(component, None, "off" if component == "drive" else "unplug")
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+@pytest.mark.parametrize("name", ["so101", "koch_v1_1", "omx", "wx250s"])
+def test_every_arm_puts_the_red_block_into_the_bowl(tmp_path: Path, name: str) -> None:
+    with armed_lockstep(tmp_path, robot=name) as stack:
+        ended = stack.say(stack.robot.twin.demo)
+        assert ended.get("success"), ended
+        stack.lockstep.run_for(1.0)
+        assert stack.lockstep.inside("red_block", "bowl")["inside"]
 
 
 class Talking:

@@ -19,6 +19,8 @@ EASED_RATIO: Final = 0.5
 # Of the joint's top speed: slower than what counts as motion while the robot has to stand.
 EASING_RATIO: Final = 0.05
 UNWINDING_RATIO: Final = 0.3
+# A stop begins where answers are missing for so long; its setpoints go on without the joint.
+SILENT_S: Final = 0.05
 
 
 class JointOutput:
@@ -40,6 +42,7 @@ class JointOutput:
             for hand in robot.hands.values()
         ]
         self._full_error = full_duty_error(robot)
+        self._silent = np.zeros(len(robot.joint_names), dtype=np.bool_)
 
     @property
     def sent(self) -> Floats:
@@ -54,7 +57,7 @@ class JointOutput:
     def move(self, period_s: float) -> list[MotionResult]:
         """Advance the setpoints, bound them, add what gravity asks for, and send them."""
         state = self._servos.state
-        loose = ~state.torque_on | (state.watchdog < 0)
+        loose = ~state.torque_on | (state.watchdog < 0) | self._back()
         if any_of(loose):
             self.place(loose)
         ended = self.motions.advance(period_s)
@@ -62,6 +65,13 @@ class JointOutput:
         if any_of(state.torque_on):
             self._servos.write(sent + self._gravity.at(sent))
         return ended
+
+    def _back(self) -> Flags:
+        """Return the joints that were silent, and answer again: they have missed their goals."""
+        silent = self._servos.state.age_s > SILENT_S
+        back: Flags = self._silent & ~silent
+        self._silent = silent
+        return back
 
     def place(self, joints: Flags) -> None:
         """Let setpoints of joints that take no goals follow them, so that arming is bumpless.

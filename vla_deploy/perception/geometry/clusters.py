@@ -22,8 +22,9 @@ HIGHER_MARGIN_M = 0.05
 MAX_EXTENT_M = 0.55
 FLOATING_M = 0.08
 MIN_PIXELS = 14
-NEAR_CELL_M, FAR_CELL_M = 0.01, 0.02
-NEAR_M = 1.5
+# Things are apart whose gap, seen from above, is wider than two cells; up close pixels are denser.
+CLOSE_CELL_M, NEAR_CELL_M, FAR_CELL_M = 0.005, 0.01, 0.02
+CLOSE_M, NEAR_M = 0.65, 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
 TOP_HIDDEN_SHARE = 0.5
@@ -125,6 +126,8 @@ def _split(
 
 
 def _cell_m(depth_m: float) -> float:
+    if depth_m < CLOSE_M:
+        return CLOSE_CELL_M
     return NEAR_CELL_M if depth_m < NEAR_M else FAR_CELL_M
 
 
