@@ -31,6 +31,19 @@ MOTORS = {
 }
 
 
+class HandClock:
+    """Pass time only when a test says so, or a driver waits."""
+
+    def __init__(self) -> None:
+        self.time_ns = NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+
 class EmulatedLeader:
     """Be six servos on a line; a hand has them where `pose` says at each moment."""
 

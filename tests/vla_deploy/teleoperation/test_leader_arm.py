@@ -7,24 +7,11 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from tests.vla_deploy.teleoperation.conftest import FOLDED, MOTORS, SO101, EmulatedLeader
+from tests.vla_deploy.teleoperation.conftest import FOLDED, MOTORS, SO101, EmulatedLeader, HandClock
 from vla_deploy.robots.calibration.lerobot_file import LeRobotMotor
 from vla_deploy.teleoperation.errors import HandMotionEnded, LeaderUnusable
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
-
-
-class HandClock:
-    """Pass time only when a test says so, or a driver waits."""
-
-    def __init__(self) -> None:
-        self.time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = max(self.time_ns, deadline_ns)
 
 
 @pytest.fixture

@@ -1,8 +1,9 @@
 """`vla-deploy teleoperate`: move the arm by hand, through the limits and safety of any motion."""
 
 import argparse
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,17 +15,24 @@ from vla_deploy.cli.devices.servo_bus import ServoBusPort
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.attended_motion import AttendedMotion, attended_motion
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.client.motions import JointView, joint_view
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.calibration.lerobot_file import read_lerobot, write_lerobot
 from vla_deploy.teleoperation.errors import HandMotionEnded
 from vla_deploy.teleoperation.following import PERIOD_S, Following
-from vla_deploy.teleoperation.hand_pose import HandInput
+from vla_deploy.teleoperation.hand_pose import Floats, HandInput
+from vla_deploy.teleoperation.jogging import JogHand, JogInput
+from vla_deploy.teleoperation.keyboard import DEAD_MAN_S, keys_of, keys_of_terminal
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
+from vla_deploy.teleoperation.pad_jog import gamepad_at
 
+SCREEN_S: Final = 0.1
 EXAMPLES: Final = """\
   vla-deploy teleoperate --leader /dev/ttyACM1 --calibration lead.json --calibrate --robot so101
   vla-deploy teleoperate --leader /dev/ttyACM1 --calibration lead.json --approach
+  vla-deploy teleoperate --keyboard
+  vla-deploy teleoperate --gamepad
 """
 
 
@@ -39,6 +47,19 @@ def register(commands: Any) -> None:
         type=Path,
         metavar="PORT",
         help="follow the leader arm at this port; it has no torque, and nothing is written to it",
+    )
+    hand.add_argument(
+        "--keyboard",
+        action="store_true",
+        help=f"jog by this terminal's keys; none for {DEAD_MAN_S:g} s stops",
+    )
+    hand.add_argument(
+        "--gamepad",
+        type=Path,
+        nargs="?",
+        const=Path(),
+        metavar="DEVICE",
+        help="jog by a gamepad (default: the one that is plugged in) with its left shoulder held",
     )
     command.add_argument(
         "--calibration",
@@ -74,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         LeaderUnusable: the leader has torque, or its calibration is not the robot's.
         CommandFailed: the robot is not armed, was stopped, or the leader was lost.
     """
-    if arguments.calibration is None:
+    if arguments.leader is not None and arguments.calibration is None:
         raise UsageError(
             "--leader: expected --calibration FILE, LeRobot's or one that --calibrate makes"
         )
@@ -84,8 +105,27 @@ def run(arguments: argparse.Namespace) -> int:
     robot = session.running_robot()
     if arguments.robot is not None and load_robot(arguments.robot).name != robot.name:
         raise UsageError(f"--robot {arguments.robot}: {robot.name} runs")
-    with leader_of(arguments, session, robot) as hand:
+    if arguments.leader is not None:
+        with leader_of(arguments, session, robot) as leader:
+            return _follow(arguments, session, robot, leader)
+    with jog_input(arguments, session, robot) as source:
+        hand = JogHand(robot, session.clock, source, lambda: _setpoints(session, robot))
         return _follow(arguments, session, robot, hand)
+
+
+def _setpoints(session: RobotSession, robot: RobotDescription) -> Floats | None:
+    view = joint_view(session, robot.joint_index, robot.joint_names)
+    return None if view is None else view.setpoint
+
+
+def jog_input(
+    arguments: argparse.Namespace, session: RobotSession, robot: RobotDescription
+) -> AbstractContextManager[JogInput]:
+    """Return what opens the keyboard or the gamepad for a `with` block."""
+    if arguments.keyboard:
+        return keys_of_terminal(session.clock, robot.joint_names)
+    path = None if arguments.gamepad == Path() else arguments.gamepad
+    return gamepad_at(path, session.clock, robot.joint_names, robot.gripper_joints)
 
 
 @contextmanager
@@ -94,6 +134,11 @@ def leader_of(
 ) -> Iterator[LeaderArm]:
     """Open the leader for a `with` block."""
     port = leader_port(arguments, robot)
+    if not arguments.calibration.exists():
+        raise UsageError(
+            f"--calibration {arguments.calibration}: no such file; make it: add --calibrate "
+            f"--robot {robot.name}, which takes a minute"
+        )
     motors = read_lerobot(arguments.calibration)
     with port.open() as bench:
         yield open_leader(bench, session.clock, robot, motors, port.family.name)
@@ -133,7 +178,8 @@ def _follow(
     began_ns = session.clock.now_ns()
     with attended_motion(session, robot, "cli/teleoperate", hand.joints) as attended:
         following = Following(attended.motions, robot, hand, approach=arguments.approach)
-        why = _until_ended(session, attended, following)
+        screen = JogScreen(session, robot, arguments) if arguments.leader is None else None
+        why = _until_ended(session, attended, following, screen)
     document = {
         "duration_s": round((session.clock.now_ns() - began_ns) / NS_PER_S, 3),
         "goals": following.goals,
@@ -150,13 +196,57 @@ def _follow(
     return emit(arguments, document, text)
 
 
-def _until_ended(session: RobotSession, attended: AttendedMotion, following: Following) -> str:
+class JogScreen:
+    """Show the joints and their keys in place, ten times a second."""
+
+    def __init__(
+        self, session: RobotSession, robot: RobotDescription, arguments: argparse.Namespace
+    ) -> None:
+        self._session = session
+        self._robot = robot
+        self._quiet = arguments.json or not sys.stdout.isatty()
+        self._keys = keys_of(robot.joint_names) if arguments.keyboard else {}
+        self._shown_ns = 0
+
+    def show(self) -> None:
+        """Show them, where it is time to."""
+        now_ns = self._session.clock.now_ns()
+        if self._quiet or now_ns - self._shown_ns < SCREEN_S * NS_PER_S:
+            return
+        self._shown_ns = now_ns
+        robot = self._robot
+        view = joint_view(self._session, robot.joint_index, robot.joint_names)
+        if view is not None:
+            print("\033[H\033[2J" + "\n".join(self._lines(view)), flush=True)
+
+    def _lines(self, view: JointView) -> Iterator[str]:
+        keyboard = "arrows, page up, page down: the hand; any other key: stop; Ctrl-C: end"
+        pad = "hold the left shoulder to move, the right one, too, for the hand; Ctrl-C: end"
+        yield keyboard if self._keys else pad
+        width = max(map(len, self._robot.joint_names))
+        yield f"{'':{width}}  position  setpoint  range"
+        for row, name in enumerate(self._robot.joint_names):
+            limits = self._robot.limits[name]
+            yield (
+                f"{name:{width}}  {view.position[row]:8.3f}  {view.setpoint[row]:8.3f}"
+                f"  {limits.min:.2f} to {limits.max:.2f}  {self._keys.get(name, '')}"
+            )
+
+
+def _until_ended(
+    session: RobotSession,
+    attended: AttendedMotion,
+    following: Following,
+    screen: JogScreen | None,
+) -> str:
     """Follow until it ends; return why, "" for Ctrl-C."""
     due_ns = session.clock.now_ns()
     try:
         while True:
             attended.require_wanted()
             following.step()
+            if screen is not None:
+                screen.show()
             now_ns = session.clock.now_ns()
             due_ns = max(due_ns + round(PERIOD_S * NS_PER_S), now_ns)
             session.clock.sleep_until(due_ns)
