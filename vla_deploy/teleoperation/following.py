@@ -32,7 +32,7 @@ _SAME_RAD: Final = 0.001
 """Goals nearer than this to the last are not sent: a pulse is 0.0015 rad."""
 
 
-class Following:
+class HandFollowing:
     """Send a goal for each pose, slowly until the joints have met the hand."""
 
     def __init__(

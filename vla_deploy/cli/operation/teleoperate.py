@@ -19,7 +19,7 @@ from vla_deploy.client.motions import JointView, joint_view
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.calibration.lerobot_file import read_lerobot, write_lerobot
 from vla_deploy.teleoperation.errors import HandMotionEnded
-from vla_deploy.teleoperation.following import PERIOD_S, Following
+from vla_deploy.teleoperation.following import PERIOD_S, HandFollowing
 from vla_deploy.teleoperation.hand_pose import Floats, HandInput
 from vla_deploy.teleoperation.jogging import JogHand, JogInput
 from vla_deploy.teleoperation.keyboard import DEAD_MAN_S, keys_of, keys_of_terminal
@@ -177,7 +177,7 @@ def _follow(
 ) -> int:
     began_ns = session.clock.now_ns()
     with attended_motion(session, robot, "cli/teleoperate", hand.joints) as attended:
-        following = Following(attended.motions, robot, hand, approach=arguments.approach)
+        following = HandFollowing(attended.motions, robot, hand, approach=arguments.approach)
         screen = JogScreen(session, robot, arguments) if arguments.leader is None else None
         why = _until_ended(session, attended, following, screen)
     document = {
@@ -236,7 +236,7 @@ class JogScreen:
 def _until_ended(
     session: RobotSession,
     attended: AttendedMotion,
-    following: Following,
+    following: HandFollowing,
     screen: JogScreen | None,
 ) -> str:
     """Follow until it ends; return why, "" for Ctrl-C."""
