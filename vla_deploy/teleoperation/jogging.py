@@ -10,6 +10,9 @@ from typing import Final, Protocol
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.control.motion.axes import AxesState
+from vla_deploy.control.motion.dispatch import axis_limits
+from vla_deploy.control.motion.profile_motion import plan_stop
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.teleoperation.hand_pose import Floats, HandPose
@@ -61,8 +64,10 @@ class JogHand:
         self._source = source
         self._setpoints = setpoints
         self._position: Floats | None = None
+        self._velocity = np.zeros(len(robot.joint_names))
         self._stamp_ns = clock.now_ns()
         travel = np.array([one.travel_per_rad for one in robot.servo_bus.servos])
+        self._limits = axis_limits(robot)
         self._lead = LEAD_RAD * travel
         hands = list(robot.hands.values())
         self._site = hands[0].grip_site if hands else ""
@@ -90,17 +95,22 @@ class JogHand:
         if setpoints is None:
             return None
         before = setpoints if self._position is None else self._position
-        velocity = self._velocity(wish, before)
-        after = before + velocity * step_s
-        if not velocity.any():
-            after = before
+        wanted = self._wanted_velocity(wish, before)
+        after = np.where(wanted == 0.0, self._rest_of(before), before + wanted * step_s)
         after = np.clip(after, setpoints - self._lead, setpoints + self._lead)
         after = np.clip(after, self._robot.position_min, self._robot.position_max)
-        is_held = np.abs(after - before) < np.abs(velocity) * step_s / 2
-        self._position = after
-        return HandPose(position=after, velocity=np.where(is_held, 0.0, velocity))
+        is_held = np.abs(after - before) < np.abs(wanted) * step_s / 2
+        self._position, self._velocity = after, np.where(is_held, 0.0, wanted)
+        return HandPose(position=after, velocity=self._velocity)
 
-    def _velocity(self, wish: JogWish, position: Floats) -> Floats:
+    def _rest_of(self, position: Floats) -> Floats:
+        """Return where joints rest that brake now: back to where they were let go is no way."""
+        now = AxesState(
+            position=position, velocity=self._velocity, acceleration=np.zeros_like(position)
+        )
+        return plan_stop(now, self._limits).target
+
+    def _wanted_velocity(self, wish: JogWish, position: Floats) -> Floats:
         velocity = np.zeros(len(position))
         if any(wish.hand) and self._site:
             velocity[self._columns] = self._hand_velocity(wish.hand, position)

@@ -54,9 +54,10 @@ class Jogged:
 def test_a_joint_moves_at_a_quarter_of_its_speed_until_it_is_let_go_or_at_its_limit() -> None:
     jogged = Jogged()
     jogged.wishes.now = JogWish(joints={"shoulder_pan": 1.0})
-    assert jogged.pass_time(1.0)[0] - READY[0] == pytest.approx(0.5, abs=0.02)
+    assert jogged.pass_time(1.0)[0] - READY[0] == pytest.approx(0.5, abs=0.001)
     jogged.wishes.now = NOTHING
     stood = jogged.pass_time(0.02)
+    assert 0.51 < stood[0] - READY[0] < 0.56, "where it can stop, not where it was let go"
     assert jogged.pass_time(1.0) == pytest.approx(stood, abs=1e-9)
     jogged.wishes.now = JogWish(joints={"shoulder_pan": 1.0})
     assert jogged.pass_time(6.0)[0] == SO101.limits["shoulder_pan"].max
@@ -76,7 +77,7 @@ def test_the_hand_goes_straight(axis: int) -> None:
     jogged.wishes.now = JogWish(hand=(wanted[0], wanted[1], wanted[2]))
     before = model.site_pose("grip", READY)[:3, 3]
     moved = model.site_pose("grip", jogged.pass_time(0.3))[:3, 3] - before
-    assert moved[axis] > 0.5 * 0.3 * HAND_SPEED_M_S
+    assert moved[axis] > 0.4 * 0.3 * HAND_SPEED_M_S
     assert np.linalg.norm(moved - moved[axis] * wanted) < 0.4 * moved[axis]
 
 

@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
+from drivers.servo.family import servo_family
+from sim_twin.ports.lines import MemoryLine
+from sim_twin.servos.server import FreeServos, make_specs
 from tests.vla_deploy.teleoperation.conftest import FOLDED, MOTORS, SO101, EmulatedLeader, HandClock
+from vla_deploy.robots import load_robot
 from vla_deploy.robots.calibration.lerobot_file import LeRobotMotor
+from vla_deploy.robots.calibration.lerobot_units import units_of
 from vla_deploy.teleoperation.errors import HandMotionEnded, LeaderUnusable
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
@@ -63,6 +68,30 @@ def test_the_homing_offset_of_the_file_counts_whatever_the_servos_hold(
     assert pose is not None
     apart = 200 * 2 * np.pi / 4096
     np.testing.assert_allclose(pose.position[:5], FOLDED[:5] + apart, atol=0.003)
+
+
+def test_a_dynamixel_leader_is_read_by_the_same_contract(clock: HandClock) -> None:
+    robot = load_robot("koch_v1_1")
+    servos = FreeServos(make_specs(6, ["XL330-M288"]))
+    servos.rotors.position_rad[:] = 0.3
+    servos.advance_to(clock.now_ns())
+    motors = {
+        name: LeRobotMotor(
+            id=row + 1, drive_mode=0, homing_offset=0, range_min=1024, range_max=3072
+        )
+        for row, name in enumerate(robot.joint_names)
+    }
+    bench = servo_family("dynamixel").bench(MemoryLine(servos.bank, clock), clock, 1_000_000)
+    arm = open_leader(bench, clock, robot, motors, "dynamixel")
+    pose = arm.read()
+    assert pose is not None
+    middles = units_of(robot).to_joints(np.zeros(6))
+    turned = np.abs(pose.position - middles)[:5]
+    np.testing.assert_allclose(turned, 0.3, atol=0.002)
+    servos.bank.silence(2)
+    clock.time_ns += NS_PER_S
+    with pytest.raises(HandMotionEnded, match=r"servo 2 .* gave no position"):
+        arm.read()
 
 
 def unplug(leader: EmulatedLeader) -> None:

@@ -99,6 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(
             "--leader: expected --calibration FILE, LeRobot's or one that --calibrate makes"
         )
+    if arguments.calibrate and arguments.leader is None:
+        raise UsageError("--calibrate: expected --leader PORT, which is calibrated")
     if arguments.calibrate:
         return _calibrate(arguments)
     session = attach(arguments.runtime_base)
