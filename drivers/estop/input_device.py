@@ -24,6 +24,10 @@ _WRITE: Final = 1 << 30
 _KIND: Final = ord("E") << 8
 EVIOCGKEY: Final = _READ | _KEY_BYTES << 16 | _KIND | 0x18
 EVIOCGBIT_KEY: Final = _READ | _KEY_BYTES << 16 | _KIND | (0x20 + EventType.KEY)
+_AXIS_INFO: Final = struct.Struct("@6i")
+"""Value, minimum, maximum, fuzz, flat, resolution: struct input_absinfo."""
+EVIOCGABS: Final = _READ | _AXIS_INFO.size << 16 | _KIND | 0x40
+"""Of axis 0; that of axis n is n more."""
 EVIOCGRAB: Final = _WRITE | 4 << 16 | _KIND | 0x90
 EVIOCSCLOCKID: Final = _WRITE | 4 << 16 | _KIND | 0xA0
 _REMEDIES: Final = {
@@ -94,6 +98,20 @@ class InputDevice:
         if not data:
             raise self._lost("hung up")
         return data
+
+    def axis_range(self, axis: int) -> tuple[int, int]:
+        """Return the least and the greatest value of an axis, such as that of a stick.
+
+        Raises:
+            LinkLost: the device is gone, or has no such axis.
+        """
+        info = bytearray(_AXIS_INFO.size)
+        try:
+            self._ask(EVIOCGABS + axis, info)
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+        _, low, high, *_ = _AXIS_INFO.unpack(info)
+        return low, high
 
     def discard_input(self) -> None:
         """Drop what has arrived and was not read.

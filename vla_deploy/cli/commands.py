@@ -80,6 +80,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "joint": CommandEntry(
         "operation.joint", "show where the joints are, move one, replay an episode"
     ),
+    "teleoperate": CommandEntry(
+        "operation.teleoperate", "move the arm by hand: by a leader arm, by keys, by a gamepad"
+    ),
     "profile": CommandEntry("maintenance.profile", "choose how the stack uses this computer"),
     "robot": CommandEntry("devices.robot", "write the robot's description as URDF, for ROS"),
     "servo": CommandEntry("devices.servo", "find, look at, set up and calibrate servos"),

@@ -35,6 +35,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.robots.errors": "RobotError",
     "vla_deploy.speech.errors": "SpeechError",
     "vla_deploy.supervisor.errors": "SupervisorError",
+    "vla_deploy.teleoperation.errors": "TeleoperationError",
     "vla_deploy.telemetry.errors": "TelemetryError",
     "vla_deploy.world.errors": "WorldError",
 }

@@ -15,6 +15,9 @@ from vla_deploy.ipc.motion_ids import motion_ids, sender_of
 from vla_deploy.ipc.payloads.motion import CancelMotion, GoalMotion, TrajectoryMotion
 
 Floats = NDArray[np.float64]
+GRIPPER_EFFORT_RATIO: Final = 0.5
+"""A gripper presses on what it holds for as long as it is told to close: LeRobot gives it half its
+torque, too (so_follower.py: Max_Torque_Limit 500)."""
 _JOINT_AGE_S: Final = 0.25
 
 
@@ -99,17 +102,23 @@ class Motions:
         targets: Mapping[str, float],
         effort_ratio: Mapping[str, float],
         speed_ratio: float = 1.0,
+        *,
+        together: bool = True,
     ) -> int:
-        """Ask control to bring joints to targets, and return the motion's id."""
-        return self._send(
-            {
-                "kind": "goal",
-                "motion_id": next(self._ids),
-                "targets": dict(targets),
-                "speed_ratio": speed_ratio,
-                "effort_ratio": dict(effort_ratio),
-            }
-        )
+        """Ask control to bring joints to targets, and return the motion's id.
+
+        Unless `together`, each joint arrives as early as it can.
+        """
+        command: GoalMotion = {
+            "kind": "goal",
+            "motion_id": next(self._ids),
+            "targets": dict(targets),
+            "speed_ratio": speed_ratio,
+            "effort_ratio": dict(effort_ratio),
+        }
+        if not together:
+            command["together"] = False
+        return self._send(command)
 
     def cancel(self, motion_id: int) -> None:
         """Ask control to end a motion, its joints on a ramp; its result follows."""

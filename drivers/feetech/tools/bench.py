@@ -28,7 +28,7 @@ from drivers.feetech.table import (
     hardware_errors,
 )
 from drivers.servo.counters import BusCounters
-from drivers.servo.errors import CorruptReply, ServoSilent, WrongServo
+from drivers.servo.errors import ServoSilent, WrongServo
 from drivers.servo.fault_policy import describe_bits
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
@@ -303,13 +303,13 @@ class FeetechBench:
         Raises:
             LinkLost: the adapter is gone.
         """
-        found = {}
-        for servo in map(_spec, servos):
-            try:
-                found[servo.id] = self.link.read(servo, "present_position")
-            except (ServoSilent, CorruptReply):
-                continue
-        return found
+        specs = [_spec(servo) for servo in servos]
+        spans = self.link.read_spans(specs, BLOCK_START, BLOCK_BYTES, THREE_TRIES)
+        return {
+            servo.id: value_in(servo, spans[servo.id].params, BLOCK_START, "present_position")
+            for servo in specs
+            if servo.id in spans
+        }
 
     def read_servos(
         self, servos: Sequence[JointServo], joints: Mapping[int, str]

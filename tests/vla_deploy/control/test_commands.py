@@ -35,6 +35,10 @@ def test_a_goal_names_its_joints_by_index() -> None:
     assert (goal.motion_id, goal.speed_ratio, goal.effort_ratio) == (4, 0.5, {2: 0.25})
     assert goal.axes.tolist() == [1, 2]
     assert goal.target.tolist() == [1.0, 0.02]
+    assert goal.together
+    alone = parse_command({**GOAL, "together": False}, INDEX)
+    assert isinstance(alone, JointGoal)
+    assert not alone.together
 
 
 def test_a_trajectory_keeps_the_order_of_its_joints() -> None:
@@ -55,6 +59,7 @@ def test_a_cancel_needs_its_id_only() -> None:
         ({**GOAL, "motion_id": True}, "motion_id: expected an integer"),
         ({**GOAL, "kind": None}, "kind: expected goal, trajectory or cancel"),
         ({**GOAL, "targets": {}}, "at least one joint"),
+        ({**GOAL, "together": 1}, "together: expected true or false, got 1"),
         ({**GOAL, "targets": [1.0]}, "targets: expected a value per joint"),
         ({**GOAL, "targets": {"knee": 1.0}}, "no joint knee; there are shoulder, elbow, gripper"),
         ({**GOAL, "targets": {"elbow": "up"}}, "elbow: expected a finite number"),

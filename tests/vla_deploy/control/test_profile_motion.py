@@ -147,6 +147,18 @@ def test_moving_axes_arrive_together_too() -> None:
     assert (np.abs(before.velocity) > 1e-6).all()
 
 
+def test_axes_that_need_not_arrive_together_are_each_as_fast_as_alone() -> None:
+    start, target = state([0.0, 0.0], [0.5, -0.3], [1.0, 0.0]), np.array([2.0, 0.2])
+    profile = plan_motion(start, target, LIMITS, together=False)
+    for axis in range(2):
+        one = np.array([axis])
+        alone = plan_motion(start.of(one), target[one], LIMITS.of(one))
+        for at_s in np.linspace(0.0, profile.duration_s, 50):
+            assert profile.sample(at_s).position[axis] == pytest.approx(
+                alone.sample(at_s).position[0], abs=1e-9
+            )
+
+
 def test_an_axis_that_is_on_its_target_does_not_move() -> None:
     profile = plan_motion(state([0.0, 0.7]), np.array([1.0, 0.7]), LIMITS)
     _, position, velocity, _ = sampled(profile)

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from drivers.servo.tools.travel import PULSE_RAD
 from vla_deploy.cli.commands import add_command, emit, number_within, whole_number
 from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.operation.attended_motion import attended_motion
 from vla_deploy.cli.session import RobotSession, attach
-from vla_deploy.client.motions import Claimed, Motions
+from vla_deploy.client.motions import GRIPPER_EFFORT_RATIO
 from vla_deploy.client.path_player import DONE, PathPlayer, PlayedPath
 from vla_deploy.client.path_windows import PathWindow, TimedPath, windows_of
-from vla_deploy.client.readiness import SILENT, refusal_of
-from vla_deploy.ipc import topics
 from vla_deploy.robots import RobotDescription
 
 if TYPE_CHECKING:  # what reads datasets loads OpenCV and the extra
@@ -25,13 +24,9 @@ if TYPE_CHECKING:  # what reads datasets loads OpenCV and the extra
 Floats = NDArray[np.float64]
 APPROACH_SPEED_RATIO: Final = 0.2
 """Of the top speeds, on the way to the first pose."""
-GRIPPER_EFFORT_RATIO: Final = 0.5
-"""A gripper presses on what it holds for as long as it is told to close: LeRobot gives it half its
-torque, too (so_follower.py: Max_Torque_Limit 500)."""
 JUDGED_SPEED_RATIO: Final = 0.97
 """Of the top speeds, that a path may need: a takeover adds a little to what was judged."""
 _SLOWER: Final = (0.75, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)
-_FRESH_S: Final = 1.0
 _EXAMPLES: Final = """\
   vla-deploy joint play pick_cube --episode 3
   vla-deploy joint play pick_cube --speed 0.5 --clip
@@ -218,22 +213,13 @@ def _judge(robot: RobotDescription, window: PathWindow) -> None:
 
 
 def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> PlayedPath:
-    claim = Claimed(session, "cli/joint_play", robot.groups_moving(path.joints))
-    refusal = refusal_of(session.document(topics.CONTROL_STATUS, _FRESH_S)) or claim.why_not_taken()
-    if refusal:
-        raise CommandFailed(refusal)
-    motions = Motions(session, robot.joint_index, "cli")
-    orders = session.events(topics.PLAN)
+    with attended_motion(session, robot, "cli/joint_play", path.joints) as attended:
+        motions = attended.motions
 
-    def wait() -> None:
-        # "Stop" in any words or from any place reaches the executor so; it holds for this, too.
-        if any("cancel" in order.payload and "of" not in order.payload for order in orders.drain()):
-            raise CommandFailed("stopped on request; the joints come to rest where they are")
-        if session.document(topics.CONTROL_STATUS, _FRESH_S) is None:
-            raise CommandFailed(SILENT)
-        session.pause()
+        def wait() -> None:
+            attended.require_wanted()
+            session.pause()
 
-    try:
         first = dict(zip(path.joints, path.positions[0].tolist(), strict=True))
         grippers = dict.fromkeys(robot.gripper_joints & set(path.joints), GRIPPER_EFFORT_RATIO)
         motion_id = motions.go(first, grippers, APPROACH_SPEED_RATIO)
@@ -243,7 +229,3 @@ def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> Pl
         if ended.status != DONE:
             raise CommandFailed(f"the first pose was not reached: {ended.status}, {ended.reason}")
         return PathPlayer(motions, session.clock, path, tolerance_of(robot, path)).play(wait)
-    finally:
-        motions.close()
-        orders.close()
-        claim.release()

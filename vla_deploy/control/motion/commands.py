@@ -15,13 +15,14 @@ class CommandRefused(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointGoal:
-    """Ask joints to go to values, arriving together."""
+    """Ask joints to go to values; `together`: none arrives before the others."""
 
     motion_id: int
     axes: Axes
     target: Floats
     speed_ratio: float
     effort_ratio: Mapping[int, float] = field(default_factory=dict)
+    together: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +93,7 @@ def _goal(motion_id: int, payload: Mapping[str, Any], joint_index: Mapping[str, 
             int(axis): _ratio(efforts, joint)
             for axis, joint in zip(effort_axes, efforts, strict=True)
         },
+        together=_flag(payload, "together", absent=True),
     )
 
 
@@ -136,6 +138,13 @@ def _ratio(table: Mapping[str, Any], key: str) -> float:
     value = _number(table, key)
     if not 0.0 < value <= 1.0:
         raise CommandRefused(f"{key}: expected above 0 and at most 1, got {value:g}")
+    return value
+
+
+def _flag(payload: Mapping[str, Any], key: str, *, absent: bool) -> bool:
+    value = payload.get(key, absent)
+    if not isinstance(value, bool):
+        raise CommandRefused(f"{key}: expected true or false, got {value!r}")
     return value
 
 

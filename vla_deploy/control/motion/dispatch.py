@@ -79,7 +79,8 @@ class Dispatcher:
         if not self._servos.limit_effort(efforts):
             raise CommandRefused(self._servos.failure)
         limits = self._limits.of(goal.axes).scaled(goal.speed_ratio)
-        curve = plan_motion(self._motions.state.of(goal.axes), goal.target, limits)
+        start = self._motions.state.of(goal.axes)
+        curve = plan_motion(start, goal.target, limits, together=goal.together)
         return self._motions.start(goal.motion_id, goal.axes, curve)
 
     def _start_waypoints(self, command: Waypoints) -> list[MotionResult]:

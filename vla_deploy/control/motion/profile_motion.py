@@ -67,11 +67,14 @@ class MotionProfile:
         self._moving: Flags = elapsed_s < self._axis_ends
 
 
-def plan_motion(start: AxesState, target: Floats, limits: AxisLimits) -> MotionProfile:
+def plan_motion(
+    start: AxesState, target: Floats, limits: AxisLimits, *, together: bool = True
+) -> MotionProfile:
     """Return the fastest motion to rest on `target` in which all moving axes arrive together.
 
     The limits hold throughout when the start can keep them; a start beyond them is brought back
-    first. An axis that cannot be slowed without turning round arrives early.
+    first. An axis that cannot be slowed without turning round arrives early. Unless `together`,
+    each axis arrives as early as it can.
     """
     distance = target - start.position
     peak, total_s = peak_from_rest(distance, limits)
@@ -79,6 +82,8 @@ def plan_motion(start: AxesState, target: Floats, limits: AxisLimits) -> MotionP
     if moving.any():
         axes = np.flatnonzero(moving)
         peak[axes], total_s[axes] = fastest_peak(start.of(axes), distance[axes], limits.of(axes))
+    if not together:
+        return MotionProfile(start, *_segments(start, peak, distance, limits), target)
     arrival_s = float(total_s.max(initial=0.0))
     early = moving & (total_s < arrival_s - _TINY)
     if early.any():

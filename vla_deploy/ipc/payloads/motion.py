@@ -19,8 +19,9 @@ class OperatorRequest(TypedDict):
 class GoalMotion(TypedDict):
     """Bring joints to targets (rad, or m for a finger): time-optimal, jerk-limited, together.
 
-    Like a trajectory it takes over the joints that it names; a motion that loses any of its joints
-    ends as cancelled. Ratios are above 0 and at most 1, the effort's by joint.
+    Where `together` is false each joint arrives as early as it can. Like a trajectory it takes over
+    the joints that it names; a motion that loses any of its joints ends as cancelled. Ratios are
+    above 0 and at most 1, the effort's by joint.
     """
 
     kind: Literal["goal"]
@@ -28,6 +29,7 @@ class GoalMotion(TypedDict):
     targets: dict[str, float]
     speed_ratio: float
     effort_ratio: NotRequired[dict[str, float]]
+    together: NotRequired[bool]
 
 
 class TrajectoryMotion(TypedDict):

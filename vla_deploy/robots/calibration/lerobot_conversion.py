@@ -28,7 +28,7 @@ SHORTEST_SWEEP_RATIO: Final = 0.6
 """Of the MJCF range: less was swept by mistake, or is another joint's."""
 # LeRobot's half turn: FEETECH shows position - offset, Dynamixel position + offset (feetech.py,
 # dynamixel.py `_get_half_turn_homings`).
-_SHOWN_BY_OFFSET: Final[Mapping[str, int]] = {"feetech": -1, "dynamixel": 1}
+SHOWN_BY_OFFSET: Final[Mapping[str, int]] = {"feetech": -1, "dynamixel": 1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +132,7 @@ def _is_in_servo(calibration: JointCalibration | None) -> bool:
 def _shift(joint: GuidedJoint, motor: LeRobotMotor, homing_in_servo: bool) -> int:
     """Return by how much a servo that holds no offset shows more than one that LeRobot set up."""
     family = family_of(joint.servo.model_name).name
-    return 0 if homing_in_servo else -_SHOWN_BY_OFFSET[family] * motor.homing_offset
+    return 0 if homing_in_servo else -SHOWN_BY_OFFSET[family] * motor.homing_offset
 
 
 def _by_range(joint: GuidedJoint, homing_offset: int) -> LeRobotMotor:
