@@ -340,6 +340,17 @@ def test_calibration_ends_in_one_line_when_the_input_does(make_bus, servo, tmp_p
     assert said.err == "vla-deploy: the input ended; what was written before stays\n"
 
 
+@pytest.mark.parametrize("family", ["dynamixel", "feetech"])
+def test_the_limits_of_a_servo_are_set_for_its_whole_turn_or_as_said(make_bus, servo, family):
+    bus = make_bus(3) if family == "dynamixel" else make_bus.feetech(3)
+    words = (3, "--yes", "--family", family)
+    said = servo(bus, "set-limits", *words, "--pulses", 100, 3000, "--json")
+    assert (said.document["old_limits"], said.document["limits"]) == ("0..4095", [100, 3000])
+    assert bus.bank.register(3, "max_position_limit") == 3000
+    assert "position limits 0..4095 (were 100..3000)" in servo(bus, "set-limits", *words).out
+    fails(servo(bus, "set-limits", *words, "--pulses", 9, 5000), "within 0..4095")
+
+
 def test_feetech_servos_are_found_read_and_changed_like_the_others(make_bus, servo):
     bus = make_bus.feetech(1, 2)
     fails(servo(bus, "scan", "--baud", 1_000_000), "another protocol: a servo of another make")
