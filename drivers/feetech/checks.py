@@ -185,7 +185,7 @@ def _supply(servo: FeetechServo, image: FeetechImage) -> Iterator[ServoTrouble]:
 
 
 def _other_version(servo: FeetechServo, image: FeetechImage) -> Iterator[ServoTrouble]:
-    """Tell versions that share a number by the limit that their factory gives them."""
+    """Distinguish versions that share a number by the limit that their factory gives them."""
     sheet = servo.datasheet
     if len(model_names(sheet.number)) < 2:
         return

@@ -93,7 +93,7 @@ class FeetechProtocol:
             servo_id = self._memory.get(row, "id")
             reply = self._single(row, packet)
             if packet.code == FeetechInstruction.PING and self._memory.sheets[row].has_sync_read:
-                replies.setdefault(servo_id, reply)
+                replies[servo_id] = replies.get(servo_id) or reply
         return [reply for each in replies.values() for reply in each]
 
     def _single(self, row: int, packet: FeetechPacket) -> list[Reply]:
