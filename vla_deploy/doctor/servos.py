@@ -4,6 +4,7 @@ Nothing is written, and a port that another process holds is left alone.
 """
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -21,7 +22,8 @@ from vla_deploy.robots.servos.declared import bus_family
 from vla_deploy.robots.servos.survey import ServoSurvey, survey
 
 _PORT: Final = "servo port"
-_SERVOS: Final = "servos"
+_SERVOS: Final = "servo bus"
+_COMMAND: Final = re.compile("`(vla-deploy [^`]+)`")
 _GRABBERS: Final = {
     "ModemManager": "sudo systemctl disable --now ModemManager",
     "brltty": "sudo apt remove brltty",
@@ -56,7 +58,7 @@ def servos_on_the_bus(context: DoctorContext) -> Iterator[DoctorFinding]:
         yield missing(_SERVOS, str(error))
         return
     troubles = [*scan.troubles(), *scan.strays(), *found.troubles]
-    yield from map(_finding, troubles)
+    yield from (_finding(one, robot) for one in troubles)
     if not any(one.level > TroubleLevel.NOTE for one in troubles):
         low_v, high_v = min(found.volts.values()), max(found.volts.values())
         measured = (
@@ -66,9 +68,12 @@ def servos_on_the_bus(context: DoctorContext) -> Iterator[DoctorFinding]:
         yield ok(_SERVOS, measured)
 
 
-def _finding(trouble: ServoTrouble) -> DoctorFinding:
+def _finding(trouble: ServoTrouble, robot: RobotDescription) -> DoctorFinding:
+    """Put the first command of the remedy in front, or the one that shows whether it helped."""
     judge = warn if trouble.level is TroubleLevel.NOTE else fail
-    return judge(_SERVOS, trouble.measured, trouble.remedy)
+    named = _COMMAND.search(trouble.remedy)
+    command = named[1] if named else "vla-deploy servo scan"
+    return judge(_SERVOS, trouble.measured, f"{command} --robot {robot.name}   # {trouble.remedy}")
 
 
 def _look(

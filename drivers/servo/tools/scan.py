@@ -91,8 +91,8 @@ class ServoScan:
                 yield ServoTrouble(
                     measured=f"{self.port} at {report.baud} baud: the answers of id {ids} are "
                     "damaged: more than one servo has it, or the cable is bad",
-                    remedy="connect one of them alone and give it a free id: vla-deploy servo "
-                    f"set-id{'; ' * bool(setup)}{setup}",
+                    remedy="connect one of them alone and give it a free id: `vla-deploy servo "
+                    f"set-id`{'; ' * bool(setup)}{setup}",
                 )
 
     def _setup_remedy(self, servo_id: int) -> str:
@@ -102,7 +102,7 @@ class ServoScan:
         joints = [self.declared[one][0] for one in self.missing]
         return (
             f"id {FACTORY_ID} is the factory's: where it is that of {' or '.join(joints)}, "
-            f"connect it alone: vla-deploy servo setup --joint {joints[0]}"
+            f"connect it alone: `vla-deploy servo setup --joint {joints[0]}`"
         )
 
     def _silent(self) -> Iterator[ServoTrouble]:
@@ -122,7 +122,7 @@ class ServoScan:
                 yield ServoTrouble(
                     measured=f"{self.port}: no answer at {own} baud from {self._label(one)}, but "
                     f"at {elsewhere[one]} baud",
-                    remedy=f"vla-deploy servo set-baud {own} {one} --baud {elsewhere[one]}",
+                    remedy=f"`vla-deploy servo set-baud {own} {one} --baud {elsewhere[one]}`",
                 )
 
     def _other_models(self) -> Iterator[ServoTrouble]:

@@ -102,7 +102,7 @@ def homing_troubles(
         yield ServoTrouble(
             measured=f"homing offsets are set in servos that were not calibrated here: "
             f"{', '.join(unknown)}",
-            remedy="vla-deploy servo calibration import FILE   # LeRobot's; or servo calibrate",
+            remedy="import LeRobot's, `vla-deploy servo calibration import`, or servo calibrate",
             level=TroubleLevel.NOTE,
         )
 

@@ -88,7 +88,7 @@ def test_scan_of_a_range_asks_only_that(bus, servo):
     ],
 )
 def test_scan_ends_with_one_line_about_what_is_wrong(bus, servo, monkeypatch, report, words):
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         return SpeedReport(baud=57_600, **report)
 
     monkeypatch.setattr(servo_scan, "scan_speed", found)
@@ -100,7 +100,7 @@ def test_scan_asks_at_every_speed_of_a_real_line_and_tells_of_servos_at_several(
 ):
     asked = []
 
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         asked.append(link.baud)
         one = FoundServo(
             servo_id=len(asked), model_number=1020, model_name="XM430-W350", firmware="48"
@@ -119,7 +119,7 @@ def test_scan_asks_at_every_speed_of_a_real_line_and_tells_of_servos_at_several(
 def test_scan_asks_a_pseudo_terminal_again_only_where_nobody_answers(bus, servo, monkeypatch):
     asked = []
 
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         asked.append(link.baud)
         one = FoundServo(servo_id=1, model_number=1020, model_name="XM430-W350", firmware="48")
         return SpeedReport(baud=link.baud, servos=(one,) if link.baud == 57_600 else ())
