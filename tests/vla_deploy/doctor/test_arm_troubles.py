@@ -24,6 +24,12 @@ from vla_deploy.doctor import FindingLevel
 from vla_deploy.doctor.devices import device_files, latency_timers
 from vla_deploy.doctor.servos import port_users, servos_on_the_bus
 from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.calibration.calibration import (
+    CALIBRATION_FILE,
+    JointCalibration,
+    LeRobotOrigin,
+    write_calibration,
+)
 from vla_deploy.robots.servos.declared import bus_family, servo_specs
 
 SO101, KOCH = load_robot("so101"), load_robot("koch_v1_1")
@@ -346,6 +352,26 @@ def test_connecting_is_refused_by_the_same_name(row: Trouble) -> None:
             bus.connect()
     else:
         bus.connect()
+
+
+@pytest.mark.parametrize(("held", "level"), [(-50, OK), (-80, FAIL)])
+def test_a_homing_offset_that_was_changed_since_calibration_is_named(
+    computer: Any, tmp_path: Path, held: int, level: FindingLevel
+) -> None:
+    origin = LeRobotOrigin(
+        drive_mode=0, homing_offset=-50, range_min=900, range_max=3200, homing_in_servo=True
+    )
+    calibration = JointCalibration(
+        servo_id=3, sign=1, offset=0.0, method="lerobot", made_at="2026-11-30", lerobot=origin
+    )
+    write_calibration(tmp_path / CALIBRATION_FILE, {"elbow_flex": calibration})
+    computer.write(SO101.servo_bus.path)
+    line = so101({3: {"homing_offset": held}})
+    robot = replace(SO101, mjcf_path=tmp_path / "so101.xml")
+    context = replace(computer.context(), robot=robot, clock=line, open_serial=line.open)
+    (finding,) = servos_on_the_bus(context)
+    assert finding.level is level
+    assert level is OK or "expected homing offset -50, as calibrated, got -80" in finding.measured
 
 
 def process(computer: Any, pid: int, name: str, *files: Path) -> None:
