@@ -26,7 +26,8 @@ from benchmarks.live_robot import live_robot
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
-from sim_twin.campaigns.faulting.phases import Phase, PhaseStage
+from sim_twin.campaigns.faulting.choreography import Phase
+from sim_twin.campaigns.faulting.phases import PhaseStage
 from sim_twin.harness.lockstep_stack import lockstep_robot
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.supply_current import motor_current_ratio
 from drivers.dynamixel.tables.control_table import VOLTAGE_UNIT_V
 from drivers.dynamixel.tables.layout import CLIMATE, MOTION, STATUS, Block
 from drivers.dynamixel.wire.block import BlockRead, decode
@@ -74,6 +75,12 @@ class Group:
         rows = state.readings[: len(self._rows)]
         self._values = rows if self._fills_rows else np.empty_like(self._units)
         self._positions = self._values[0]
+        self._at_supply = [
+            place for place, spec in enumerate(specs) if spec.model.senses_supply_current
+        ]
+        self._no_load = np.array(
+            [specs[n].model.no_load_speed_rad_s * specs[n].travel_per_rad for n in self._at_supply]
+        )
         self._copies = [
             (self._values[start:end], self.read.columns(self._rows[start:end]))
             for start, end in _alike(first.block, self._rows)
@@ -100,6 +107,9 @@ class Group:
             rows[...] = columns
         np.multiply(values, self._units, values)
         np.add(self._positions, self._zeros, self._positions)
+        if self._at_supply:
+            at = self._at_supply
+            values[2, at] = motor_current_ratio(values[2, at], values[1, at] / self._no_load)
         if not self._fills_rows:
             self._state.readings[: len(values), self.members] = values
         errors = self.read.errors
@@ -128,10 +138,20 @@ class Group:
         for row, name in enumerate(self._rows):
             values = decode(self._fields[name], found) * self._units[row, places]
             self._state.readings[row, answered] = values if row else values + self._zeros[places]
+        self._mend_efforts(places)
         self._store_errors([entry.error for entry in found], answered)
         self._store_status([decode(self._fields[name], found) for name in self._status_names])
         self.forget_status()
         return []
+
+    def _mend_efforts(self, places: Sequence[int]) -> None:
+        """Turn what some servos draw from the supply into their motors' currents."""
+        chosen = [n for n, place in enumerate(self._at_supply) if place in places]
+        if chosen:
+            rows = [self.members[self._at_supply[n]] for n in chosen]
+            readings = self._state.readings
+            speeds = readings[1, rows] / self._no_load[chosen]
+            readings[2, rows] = motor_current_ratio(readings[2, rows], speeds)
 
     def forget_status(self) -> None:
         """Store the status of the next reply even if it is that of the last."""

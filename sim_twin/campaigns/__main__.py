@@ -85,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
         "--hours", type=number_above_zero("hours"), default=1.0, help="how long to soak"
     )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--robot", default="butler", help="of demos, kills and load")
+    parser.add_argument("--robot", default="butler", help="of demos, faults, kills and load")
     parser.add_argument(
         "--workers", type=whole_number(), default=2, help="how many cases at a time"
     )

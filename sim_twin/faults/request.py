@@ -67,8 +67,9 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     part = _PARTS.get(component)
     if part is not None and getattr(robot.parts, part) is None:
         raise FaultRefused(f"{component.value}: the robot file has no [{part}]")
-    if component is Component.BATTERY and robot.battery is None:
-        raise FaultRefused("battery: the robot file has no [battery]")
+    device = _DEVICES.get(component)
+    if device is not None and getattr(robot, device) is None:
+        raise FaultRefused(f"{component.value}: the robot file has no [{device}]")
     instance, number = _instance(component, raw.get("instance"), robot)
     faults = _unknown_keys(raw, effect, rhythmic=rhythmic)
     timing = _timing(raw, faults, rhythmic=rhythmic)
@@ -90,6 +91,13 @@ def parse_request(raw: Mapping[str, Any], robot: RobotDescription) -> FaultReque
     )
 
 
+_DEVICES: Final = {
+    Component.ESTOP: "estop",
+    Component.MICROPHONE: "microphone",
+    Component.SPEAKER: "speaker",
+    Component.BATTERY: "battery",
+}
+"""What a component is called in the robot file, where it is no part that moves or sees."""
 _PARTS: Final = {
     Component.LIDAR: "lidar",
     Component.IMU: "imu",

@@ -286,12 +286,15 @@ def armed_lockstep(run_dir: Path, **chosen: Any) -> Iterator[LockstepStack]:
         yield stack
 
 
-def lockstep_robot(tmp_path: Path, seed: int = 0, *, takes_all: bool) -> LockstepControl:
+def lockstep_robot(
+    tmp_path: Path, seed: int = 0, *, takes_all: bool, robot: str = "butler"
+) -> LockstepControl:
     """Return the whole stack, or, at a fraction of its cost, control and what it drives by."""
     if takes_all:
-        return LockstepStack(tmp_path, seed)
-    control = LockstepControl(tmp_path, seed)
-    control.add_senses()
+        return LockstepStack(tmp_path, seed, robot=robot)
+    control = LockstepControl(tmp_path, seed, robot=robot)
+    if control.robot.parts.base is not None:
+        control.add_senses()
     return control
 
 

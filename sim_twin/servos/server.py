@@ -60,35 +60,47 @@ class FreeBank:
 
 
 class FreeServos(FreeBank):
-    """Be Dynamixel servos whose shafts turn on their own, each at the voltage it is made for."""
+    """Be Dynamixel servos whose shafts turn on their own.
+
+    Without `supply_v` for all of them, each has the voltage that it is made for.
+    """
 
     def __init__(
         self,
         specs: Sequence[EmulatedServoSpec],
         options: FirmwareOptions | None = None,
+        supply_v: float | None = None,
         timing: WireTiming | None = None,
     ) -> None:
         models = [MODELS[spec.model_name] for spec in specs]
-        supply_v, feeds = _supplies_for(models)
-        super().__init__(ServoBank(specs, options, timing, feeds=feeds), models, supply_v)
+        volts, feeds = _supplies_for(models, supply_v)
+        super().__init__(ServoBank(specs, options, timing, feeds=feeds), models, volts)
 
 
 class FreeFeetechServos(FreeBank):
-    """Be FEETECH servos whose shafts turn on their own, each at the voltage it is made for."""
+    """Be FEETECH servos whose shafts turn on their own.
+
+    Without `supply_v` for all of them, each has the voltage that it is made for.
+    """
 
     def __init__(
         self,
         specs: Sequence[EmulatedFeetechSpec],
         options: FeetechOptions | None = None,
+        supply_v: float | None = None,
         timing: WireTiming | None = None,
     ) -> None:
         models = [spec.datasheet for spec in specs]
-        supply_v, feeds = _supplies_for(models)
-        super().__init__(FeetechBank(specs, options, timing, feeds=feeds), models, supply_v)
+        volts, feeds = _supplies_for(models, supply_v)
+        super().__init__(FeetechBank(specs, options, timing, feeds=feeds), models, volts)
 
 
-def _supplies_for(models: Sequence[MotorFigures]) -> tuple[tuple[float, ...], list[int]]:
-    """Return a supply for each voltage that motors are made for, and which one feeds each motor."""
+def _supplies_for(
+    models: Sequence[MotorFigures], supply_v: float | None
+) -> tuple[tuple[float, ...], list[int]]:
+    """Return the voltages of the supplies, and which one feeds each motor."""
+    if supply_v is not None:
+        return (supply_v,), [0] * len(models)
     volts = sorted({model.voltage_v for model in models})
     return tuple(volts), [volts.index(model.voltage_v) for model in models]
 

@@ -184,6 +184,8 @@ class ControlNode:
     def _read(self) -> None:
         if self._modes.mode in AT_REST_MODES:
             if self._servos.try_reopen():
+                # Setpoints came to rest further on than servos did that heard of them no more.
+                self._joints.place_all()
                 self._stopping.release()
             self._wheels.try_reopen()
         self._servos.read()

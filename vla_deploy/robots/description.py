@@ -302,6 +302,12 @@ class RobotDescription:
         return tuple(servo.joint for servo in self.servo_bus.servos)
 
     @property
+    def wheel_joints(self) -> tuple[str, ...]:
+        """Return the joints that the drives of the CAN bus turn, none without a base."""
+        bus = self.parts.can_bus
+        return tuple(drive.joint for drive in bus.drives) if bus else ()
+
+    @property
     def joint_index(self) -> dict[str, int]:
         """Return each servo joint's place in a joint array."""
         return {name: index for index, name in enumerate(self.joint_names)}

@@ -16,6 +16,8 @@ CENTRE_PULSE: Final = 2048
 PULSE_RAD: Final = 2 * pi / PULSES_PER_REV
 VELOCITY_UNIT_RAD_S: Final = 0.229 * 2 * pi / 60
 CURRENT_UNIT_A: Final = 2.69e-3
+SUPPLY_CURRENT_UNIT_A: Final = 1e-3
+"""Of an X330, which measures at its supply, not in the motor."""
 LOAD_UNIT_RATIO: Final = 1e-3
 VOLTAGE_UNIT_V: Final = 0.1
 PWM_FULL: Final = 885
@@ -124,6 +126,11 @@ class ServoDatasheet:
     min_firmware_watchdog: int = 38
     indirect: tuple[tuple[int, tuple[IndirectBank, ...]], ...] = ()
     """Banks by the firmware they came with, the newest first."""
+
+    @property
+    def senses_supply_current(self) -> bool:
+        """Return whether address 126 tells the supply's current, not the motor's."""
+        return self.current_unit_a == SUPPLY_CURRENT_UNIT_A
 
     @property
     def effort_unit_ratio(self) -> float:

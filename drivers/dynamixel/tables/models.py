@@ -13,6 +13,7 @@ from typing import Final
 
 from drivers.dynamixel.tables.model import (
     CURRENT_UNIT_A,
+    SUPPLY_CURRENT_UNIT_A,
     IndirectBank,
     OperatingMode,
     Register,
@@ -27,9 +28,6 @@ from drivers.dynamixel.tables.table_rows import (
     PWM_SLOPE,
     SMALL_INDIRECT,
 )
-
-X330_CURRENT_UNIT_A: Final = 1e-3
-"""Measured at the supply side of an X330, not in the motor."""
 
 Limits = tuple[int | None, int | None, int | None]
 """Initial value, minimum, maximum."""
@@ -65,7 +63,7 @@ _2X430: Final = _Family(
     lacks=_LATE_REGISTERS, changes={"drive_mode": (0, 0, 1)}, fast_sync=None, watchdog=1
 )
 _X330: Final = _Family(
-    current_unit_a=X330_CURRENT_UNIT_A,
+    current_unit_a=SUPPLY_CURRENT_UNIT_A,
     extra=CURRENT_SENSING + PWM_SLOPE,
     changes={
         "baud_rate": (1, 0, 6),

@@ -12,7 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sim_twin.campaigns.faulting.phases import PAYLOAD, NotSet, Phase, PhaseStage
+from sim_twin.campaigns.faulting.choreography import Phase, choreography_of
+from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.campaigns.processes import played
@@ -28,11 +29,6 @@ from sim_twin.physics.hazards import Hazard
 from sim_twin.physics.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot
 
-INSTANCES: Final = {
-    Component.SERVO: ("left_elbow", "left_gripper"),
-    Component.DRIVE: ("left_wheel",),
-    Component.HOME_DEVICE: ("lamp",),
-}
 _SENSORS: Final = (
     *(Component.LIDAR, Component.IMU, Component.CAMERA),
     *(Component.MICROPHONE, Component.SPEAKER),
@@ -54,7 +50,6 @@ _STILL_RAD: Final = 0.05
 _LEAST_GAP_M: Final = 0.005
 """Between base and furniture; where Butler grasps, tables are 0.018 m and more away."""
 _STOPPED: Final = ("stopping", "stopped", "fault")
-_WHEELS: Final = ("left_wheel", "right_wheel")
 _LIMP: Final = (Fault.BROWN_OUT, Fault.OVERHEAT, Fault.OVERLOAD)
 """These take the torque off in the servo's own firmware: what hangs on it goes limp whatever the
 software does, so its own joint may fall with what it holds; all else must stay safe."""
@@ -96,11 +91,17 @@ class Cell:
 
 def cells(robot: RobotDescription) -> Iterator[Cell]:
     """Return every supported fault of every component in every phase."""
+    moves = choreography_of(robot)
+    instances: dict[Component, tuple[str | None, ...]] = {
+        Component.SERVO: moves.servos,
+        Component.DRIVE: robot.wheel_joints[:1],
+        Component.HOME_DEVICE: tuple(robot.devices)[:1],
+    }
     for component in Component:
         for fault in faults_of(component):
-            for instance in INSTANCES.get(component, (None,)):
+            for instance in instances.get(component, (None,)):
                 of = faults_of(component)[0] if fault is Fault.INTERMITTENT else None
-                for phase in Phase:
+                for phase in moves.phases:
                     cell = Cell(
                         component=component, instance=instance, fault=fault, of=of, phase=phase
                     )
@@ -116,11 +117,11 @@ def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
     return True
 
 
-def play(cell: Cell, seed: int = 0) -> CampaignCase:
+def play(cell: Cell, seed: int = 0, robot: str = "butler") -> CampaignCase:
     """Play one case on a robot of its own and judge it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         takes_all = cell.component in _SENSORS
-        with closing(lockstep_robot(Path(folder), seed, takes_all=takes_all)) as stack:
+        with closing(lockstep_robot(Path(folder), seed, takes_all=takes_all, robot=robot)) as stack:
             try:
                 return _Trial(cell, stack).run()
             except (NotSet, RobotFailed) as error:
@@ -137,7 +138,8 @@ class _Trial:
         self._stage = PhaseStage(stack)
         self._limp = cell.limp_joints(stack.robot)
         engine = stack.lockstep.twin.engine
-        self._separation = Separation(engine.model, engine.data)
+        drives = stack.robot.parts.base is not None
+        self._separation = Separation(engine.model, engine.data) if drives else None
         self._stopped_s = math.nan
         self._rest_s = math.nan
         self._rest_places = np.zeros(0)
@@ -149,12 +151,13 @@ class _Trial:
         self._stage.begin(cell.phase)
         lockstep.twin.hazards.begin()
         firm = [name for name in self._stack.robot.joint_names if name not in self._limp]
-        seen = FaultWitness(self._stack, lockstep.now_s, (*firm, *_WHEELS))
+        seen = FaultWitness(self._stack, lockstep.now_s, (*firm, *self._stack.robot.wheel_joints))
         lockstep.faults.inject_checked(cell.request(self._stack.robot))
         while seen.since_s < _FAULT_S + _AFTER_S:
             self._stage.run_for(_LOOK_S)
             seen.look()
-            self._separation.look()
+            if self._separation is not None:
+                self._separation.look()
             self._watch_stop(seen)
         return CampaignCase(
             name=cell.name,
@@ -163,10 +166,15 @@ class _Trial:
                 "cause": seen.cause,
                 "cause_s": _known(seen.cause_s),
                 "rest_s": _known(self._rest_s),
-                "gap_m": _known(self._separation.least_m),
+                "gap_m": _known(self._least_gap_m),
             },
             seconds=seen.since_s,
         )
+
+    @property
+    def _least_gap_m(self) -> float:
+        """Return how near the base came to furniture; one that is mounted comes near to nothing."""
+        return math.inf if self._separation is None else self._separation.least_m
 
     def _watch_stop(self, seen: FaultWitness) -> None:
         """Note when it stops and first rests, and how far it moves after that."""
@@ -177,7 +185,7 @@ class _Trial:
             if seen.speed_rad_s() < STANDSTILL_RAD_S:
                 self._rest_s, self._rest_places = seen.since_s, seen.where().copy()
         else:
-            moved_rad = float(np.abs(seen.where() - self._rest_places).max())
+            moved_rad = float(np.abs(seen.where() - self._rest_places).max(initial=0.0))
             self._moved_rad = max(self._moved_rad, moved_rad)
 
     def _failures(self) -> Iterator[str]:
@@ -190,17 +198,17 @@ class _Trial:
             yield f"never at rest after the stop at {self._stopped_s:.3f} s"
         if self._moved_rad > _STILL_RAD:
             yield f"moved on after the stop, by {self._moved_rad:.3f} rad"
-        if self._separation.least_m < _LEAST_GAP_M:
-            yield f"{self._separation.least_m:.4f} m to furniture, limit {_LEAST_GAP_M}"
+        if self._least_gap_m < _LEAST_GAP_M:
+            yield f"{self._least_gap_m:.4f} m to furniture, limit {_LEAST_GAP_M}"
         limp_grippers = self._limp & self._stack.robot.gripper_joints
         carries = self._cell.phase is Phase.CARRYING and not limp_grippers
         if carries and not self._stage.holds_payload:
-            yield f"{PAYLOAD} is no longer in the hand"
+            yield f"{self._stage.moves.payload} is no longer in the hand"
 
     def _may(self, hazard: Hazard) -> bool:
         """Return whether a servo without torque accounts for it."""
         carries = self._cell.phase is Phase.CARRYING
-        falls = hazard.kind == "fall" and hazard.part == PAYLOAD and carries
+        falls = hazard.kind == "fall" and hazard.part == self._stage.moves.payload and carries
         swings = hazard.kind in ("joint speed", "joint range") and hazard.part in self._limp
         return bool(self._limp) and (falls or swings)
 
@@ -212,9 +220,11 @@ def _known(value: float) -> float | None:
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Play every case whose name contains `options.only`, several at a time."""
-    robot = load_robot("butler")
+    robot = load_robot(options.robot)
     mine = chosen(cells(robot), options.only, lambda cell: cell.name)
-    cases = played(partial(play, seed=options.seed), mine, options.workers, tell, 20)
+    cases = played(
+        partial(play, seed=options.seed, robot=options.robot), mine, options.workers, tell, 20
+    )
     return CampaignReport(campaign="faults", cases=cases, summary=_summary(cases))
 
 
@@ -223,7 +233,8 @@ def _summary(cases: Sequence[CampaignCase]) -> dict[str, Any]:
     longest = {}
     for phase in Phase:
         rests = _figures("rest_s", [case for case in cases if case.name.endswith(phase.value)])
-        longest[f"longest_rest_s_{phase.value}"] = max(rests, default=0.0)
+        if rests:
+            longest[f"longest_rest_s_{phase.value}"] = max(rests)
     nearest = min(_figures("gap_m", cases), default=None)
     return {**longest, "least_gap_m": nearest, "unsafe": sum(bool(case.failures) for case in cases)}
 

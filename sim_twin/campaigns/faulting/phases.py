@@ -1,14 +1,12 @@
 """Bring a robot in lock-step into each phase of its work: at rest, driving, reaching, carrying."""
 
 import math
-from collections.abc import Callable, Mapping
-from enum import Enum
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
+from sim_twin.campaigns.faulting.choreography import Phase, choreography_of
 from sim_twin.harness.lockstep_stack import LockstepControl
 
-PAYLOAD: Final = "red_cup"
-"""What the left hand carries; its middle is where the hand's grip site is."""
 _COMMAND_S: Final = 0.02
 _DRIVE_M_S: Final = 0.3
 _TURN_RAD_S: Final = 0.9
@@ -18,31 +16,15 @@ _TURN_TIMEOUT_S: Final = 8.0
 _GAZE: Final = {"head_pan": 0.0, "head_tilt": 0.3}
 """As the executor looks where it drives."""
 _POSE_S: Final = 3.5
-_CLOSE_S: Final = 1.5
+_CLOSE_S: Final = 3.0
+_UNDER_WAY: Final = 10
+"""Looks until the fingers are surely in motion."""
+_FINGERS_REST: Final = 0.02
+"""Rad/s, or m/s."""
 _SETTLE_S: Final = 1.0
 _RUN_UP_S: Final = 0.6
-_POSE: Final = {
-    "left_shoulder_yaw": -0.4,
-    "left_shoulder_pitch": -0.3,
-    "left_elbow": 2.5,
-    "left_wrist_pitch": -2.35,
-    "left_wrist_roll": 1.57,
-    "right_shoulder_yaw": 0.2,
-}
-"""Butler's left hand before the chest, where its fingers hold the cup from both sides."""
-_TUCK: Final = "tuck"
-_HAND: Final = "left"
-_REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.4, "right_elbow": 1.9}
-_CARRY_REACH: Final = {"left_elbow": 2.2, "right_elbow": 2.2}
-
-
-class Phase(Enum):
-    """Name what the robot does when something fails."""
-
-    IDLE = "idle"
-    DRIVING = "driving"
-    REACHING = "reaching"
-    CARRYING = "carrying"
+_PAYLOAD_WIDTH_M: Final = 0.025
+"""Of a block, in a hand with one jaw that stands fast."""
 
 
 class NotSet(Exception):
@@ -55,11 +37,12 @@ class PhaseStage:
     def __init__(self, stack: LockstepControl) -> None:
         self._stack = stack
         self._lockstep = stack.lockstep
+        self.moves = choreography_of(stack.robot)
         self._speeds: tuple[float, float] | None = None
         self._begin: Mapping[Phase, Callable[[], None]] = {
             Phase.IDLE: lambda: None,
             Phase.DRIVING: self._drive_at_the_wall,
-            Phase.REACHING: lambda: self._stack.go(_REACH, 0.7),
+            Phase.REACHING: lambda: self._stack.go(self.moves.reach, 0.7),
             Phase.CARRYING: self._carry,
         }
 
@@ -86,7 +69,12 @@ class PhaseStage:
     @property
     def holds_payload(self) -> bool:
         """Return whether the physics sees the payload in a hand."""
-        return PAYLOAD in self._lockstep.truth()["held"]
+        return self.moves.payload in self._lockstep.truth()["held"]
+
+    def _stand(self, joints: Iterable[str]) -> bool:
+        """Return whether fingers have met what stands fast between them."""
+        now = self._lockstep.truth()["joints"]
+        return all(abs(now[name]["velocity"]) < _FINGERS_REST for name in joints)
 
     def _drive(self) -> None:
         self._speeds = (_DRIVE_M_S, 0.0)
@@ -106,23 +94,28 @@ class PhaseStage:
 
     def _carry(self) -> None:
         """Put the payload into the hand, hold it there until the fingers do, and set off."""
-        robot, engine = self._stack.robot, self._lockstep.twin.engine
-        hand = robot.hands[_HAND]
+        robot, engine, moves = self._stack.robot, self._lockstep.twin.engine, self.moves
+        hand = robot.hands[moves.hand]
         fingers = robot.group(hand.gripper).joints
-        widest = dict(zip(robot.joint_names, robot.position_max.tolist(), strict=True))
-        open_m = {name: widest[name] for name in fingers}
-        self._stack.go({**robot.poses[_TUCK], **_POSE, **open_m}, 1.0)
+        limits = [robot.limits[name] for name in fingers]
+        open_at = {name: one.max for name, one in zip(fingers, limits, strict=True)}
+        shut = {name: max(one.min, 0.004) for name, one in zip(fingers, limits, strict=True)}
+        folded = robot.poses[hand.travel_pose] if hand.travel_pose else {}
+        self._stack.go({**folded, **moves.hold, **open_at}, 1.0)
         self.run_for(_POSE_S)
         grip = engine.data.site(hand.grip_site)
-        self._stack.go(dict.fromkeys(fingers, 0.004), 0.5, dict.fromkeys(fingers, 0.5))
-        for _ in range(round(_CLOSE_S / _COMMAND_S)):
+        self._stack.go(shut, 0.5, dict.fromkeys(fingers, 0.5))
+        for look in range(round(_CLOSE_S / _COMMAND_S)):
             self._lockstep.run_for(_COMMAND_S)
-            if self.holds_payload:
+            if look > _UNDER_WAY and self.holds_payload and self._stand(fingers):
                 break
-            x_m, y_m, z_m = (float(value) for value in grip.xpos)
-            engine.place(PAYLOAD, x_m, y_m, z_m, 0.0)
+            aside_m = hand.middle_m(_PAYLOAD_WIDTH_M)
+            middle = grip.xpos + aside_m * grip.xmat.reshape(3, 3)[:, 1]
+            x_m, y_m, z_m = (float(value) for value in middle)
+            engine.place(moves.payload, x_m, y_m, z_m, 0.0)
         self.run_for(_SETTLE_S)
         if not self.holds_payload:
-            raise NotSet(f"{PAYLOAD} at {grip.xpos} did not stay in the {_HAND} hand")
-        self._drive()
-        self._stack.go(_CARRY_REACH, 0.5)
+            raise NotSet(f"{moves.payload} at {grip.xpos} did not stay in the {moves.hand} hand")
+        if Phase.DRIVING in moves.phases:
+            self._drive()
+        self._stack.go(moves.carry_reach, 0.5)

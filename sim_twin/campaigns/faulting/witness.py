@@ -71,7 +71,8 @@ class FaultWitness:
 
     def speed_rad_s(self) -> float:
         """Return the speed of the fastest part."""
-        return float(np.abs(self._stack.lockstep.twin.engine.data.qvel[self._dofs]).max())
+        speeds = self._stack.lockstep.twin.engine.data.qvel[self._dofs]
+        return float(np.abs(speeds).max(initial=0.0))
 
     def where(self) -> NDArray[np.float64]:
         """Return where the parts are."""

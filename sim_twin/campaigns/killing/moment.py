@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from sim_twin.campaigns.killing.jobs import jobs_of
 from sim_twin.campaigns.killing.rules import Injection, KillMoment
 from sim_twin.harness.service import Machine, RobotService
-from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots import load_robot
 
 MOVING_RAD_S: Final = 0.1
 """The base or an arm that is slower is about to start or to end a motion."""
@@ -36,7 +36,7 @@ class Work:
         self._jobs = jobs_of(described)
         self._put_down = itertools.cycle(self._jobs.put_down)
         arms = [described.group(hand.arm).joints for hand in described.hands.values()]
-        self._parts = (*itertools.chain.from_iterable(arms), *_wheels(described))
+        self._parts = (*itertools.chain.from_iterable(arms), *described.wheel_joints)
 
     def meet(self, injection: Injection) -> dict[str, Any]:
         """Work until the injection's time and moment, and return what the robot is at then.
@@ -90,8 +90,3 @@ class Work:
             "held": truth["held"],
             "skill": self._robot.skill(),
         }
-
-
-def _wheels(robot: RobotDescription) -> tuple[str, ...]:
-    bus = robot.parts.can_bus
-    return tuple(drive.joint for drive in bus.drives) if bus else ()

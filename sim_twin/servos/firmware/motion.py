@@ -19,7 +19,6 @@ from drivers.dynamixel.tables.model import (
     PWM_FULL,
     OperatingMode,
 )
-from drivers.dynamixel.tables.models import X330_CURRENT_UNIT_A
 from sim_twin.servos.firmware.columns import TableColumns
 from sim_twin.servos.firmware.coupling import Coupling
 from sim_twin.servos.firmware.profile import (
@@ -65,9 +64,7 @@ class Motors:
             no_load_rad_s=np.array([m.no_load_speed_rad_s for m in models]),
             effort_unit_ratio=np.array([m.effort_unit_ratio for m in models]),
             velocity_unit_rad_s=np.array([m.velocity_unit_rad_s for m in models]),
-            senses_supply_current=np.array(
-                [m.current_unit_a == X330_CURRENT_UNIT_A for m in models]
-            ),
+            senses_supply_current=np.array([m.senses_supply_current for m in models]),
         )
 
 

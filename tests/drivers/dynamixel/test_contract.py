@@ -53,7 +53,7 @@ def connected(line: ByteTransport, clock: Clock, models: list[str]) -> Dynamixel
 class TestInMemory(ServoBusContract, ServoTorqueContract, ServoUnplugContract):
     @pytest.fixture
     def bench(self) -> WireBench[DynamixelBus]:
-        servos = FreeServos(make_specs(COUNT, MODELS))
+        servos = FreeServos(make_specs(COUNT, MODELS), supply_v=5.0)
         return WireBench(
             FreeServoDevice(servos), lambda line, clock: connected(line, clock, MODELS)
         )

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from sim_twin.campaigns.faulting import fault_matrix
+from sim_twin.campaigns.faulting.choreography import Phase
 from sim_twin.campaigns.faulting.fault_matrix import Cell, cells, play
-from sim_twin.campaigns.faulting.phases import NotSet, Phase, PhaseStage
+from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.report import CampaignCase
 from sim_twin.faults import Component, Fault

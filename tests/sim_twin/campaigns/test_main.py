@@ -51,9 +51,9 @@ def test_a_figure_that_plays_nothing_is_refused_in_one_line(
 
 
 def test_a_campaign_plays_as_many_cases_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kills, "inject_all", lambda drawn, _seed, _tell, _workers: drawn)
+    monkeypatch.setattr(kills, "inject_all", lambda drawn, *_others: drawn)
     for count, expected in ((None, kills.INJECTIONS), (3, 3), (0, 0)):
-        options = argparse.Namespace(count=count, seed=0, only="", workers=2)
+        options = argparse.Namespace(count=count, seed=0, only="", workers=2, robot="butler")
         assert len(kills.run(options, print)) == expected  # type: ignore[arg-type]
 
 

@@ -18,7 +18,7 @@ import sys, tempfile, time
 from sim_twin.campaigns import __main__ as campaigns
 from sim_twin.campaigns.faulting import fault_matrix
 
-def play(cell, seed=0):
+def play(cell, seed=0, robot=""):
     with tempfile.TemporaryDirectory(dir=sys.argv[1], prefix="vla-"):
         time.sleep(300.0)
 

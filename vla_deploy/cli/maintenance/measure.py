@@ -70,7 +70,7 @@ def register(commands: Any) -> None:
     validate.add_argument(
         "--workers", type=whole_number(), help="how many cases at a time (default: 2)"
     )
-    validate.add_argument("--robot", help="of demos, kills and load (default: butler)")
+    validate.add_argument("--robot", help="of demos, faults, kills and load (default: butler)")
     validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
     validate.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
 
