@@ -77,6 +77,7 @@ class DynamixelFamily:
         sign: int,
         offset_rad: float,
         travel_per_rad: float,
+        goal_range: tuple[float, float] | None = None,
     ) -> ServoSpec:
         """Declare a servo.
 
@@ -90,6 +91,7 @@ class DynamixelFamily:
             sign=sign,
             offset_rad=offset_rad,
             travel_per_rad=travel_per_rad,
+            goal_range=goal_range,
         )
 
     def bus(

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from drivers.errors import DriverError, LinkLost, NoReply, ProtocolError
 from drivers.feetech.block import BLOCK_BYTES, FeetechBlock
+from drivers.feetech.checks import EEPROM_BYTES
 from drivers.feetech.goals import FeetechGoals
 from drivers.feetech.link import FeetechLink, value_in
 from drivers.feetech.servo import FeetechServo
-from drivers.feetech.settings import EEPROM_BYTES, FeetechSetup, write_kept_settings
+from drivers.feetech.settings import FeetechSetup, write_kept_settings
 from drivers.feetech.table import TorqueSwitch, hardware_errors
 from drivers.servo.journal import BusJournal
 from drivers.servo.patience import ReplyPatience

@@ -64,6 +64,7 @@ class FeetechFamily:
         sign: int,
         offset_rad: float,
         travel_per_rad: float,
+        goal_range: tuple[float, float] | None = None,
     ) -> FeetechServo:
         """Declare a servo.
 
@@ -77,6 +78,7 @@ class FeetechFamily:
             sign=sign,
             offset_rad=offset_rad,
             travel_per_rad=travel_per_rad,
+            goal_range=goal_range,
         )
 
     def bus(

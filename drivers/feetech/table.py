@@ -301,3 +301,20 @@ def hardware_errors(bits: int) -> int:
         if bits & bit:
             found |= error
     return int(found)
+
+
+def models_of(data: bytes) -> tuple[list[str], int]:
+    """Return the models with a number, and the number, in the byte order that makes sense.
+
+    STS and SMS send the low byte first, SCS the high one: whichever of the two is known is taken.
+    """
+    little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+    for number in (little, big):
+        if names := model_names(number):
+            return names, number
+    return [], little
+
+
+def model_names(number: int) -> list[str]:
+    """Return the models that share a number: several motors and gears may."""
+    return [name for name, sheet in FEETECH_MODELS.items() if sheet.number == number]

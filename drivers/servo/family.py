@@ -66,8 +66,9 @@ class ServoFamily(Protocol):
         sign: int,
         offset_rad: float,
         travel_per_rad: float,
+        goal_range: tuple[float, float] | None = None,
     ) -> JointServo:
-        """Declare a servo.
+        """Declare a servo; connecting refuses one whose own limits clip the `goal_range`.
 
         Raises:
             ValueError: a value is out of its range.

@@ -20,6 +20,8 @@ class JointServo:
     sign: int = 1
     offset_rad: float = 0.0
     travel_per_rad: float = 1.0
+    goal_range: tuple[float, float] | None = None
+    """Between which joint values goals will lie, as the robot file limits them."""
 
     def __post_init__(self) -> None:
         faults = [text for wrong, text in self._checks() if wrong]

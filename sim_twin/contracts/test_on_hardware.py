@@ -19,7 +19,7 @@ from sim_twin.contracts.imu import ImuContract
 from sim_twin.contracts.lidar import LidarContract
 from sim_twin.contracts.servo_bus import ServoBusContract, ServoTorqueContract
 from vla_deploy.control.output.drive_buses import drive_bus
-from vla_deploy.control.output.servos import servo_specs
+from vla_deploy.robots.servos.declared import servo_specs
 
 CAMERA_HZ = 5.0
 

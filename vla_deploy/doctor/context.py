@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from drivers.base import ByteTransport
 from drivers.clock import Clock, MonotonicClock
+from drivers.serial_port import SerialPort
 from platforms import Profile
 from platforms.board import Board, identify
 from platforms.tree import Tree, ValueMissing
@@ -24,6 +26,10 @@ _CAP_SYS_NICE: Final = 23
 
 Asker = Callable[[Sequence[str]], str]
 """Run a command and return what it prints; raise `ValueMissing` where it cannot be run."""
+
+
+SerialOpener = Callable[[Path, int, Clock], ByteTransport]
+"""Open a serial port at a speed; raise `DriverError` where it is missing or busy."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +61,7 @@ class DoctorContext:
     clock: Clock
     models: ModelStore
     profile_fault: str = ""
+    open_serial: SerialOpener = SerialPort
 
 
 def live_context(

@@ -10,10 +10,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from drivers.errors import DriverError
-from drivers.serial_port import SerialPort
-from drivers.servo.family import family_of
-from drivers.servo.tools.scan import read_voltages
 from platforms.tree import ValueMissing
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, trouble, warn
@@ -21,7 +17,6 @@ from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.camera import CameraMounting, LensCalibration
-from vla_deploy.robots.supplies import voltage_mismatches
 from vla_deploy.runtime.one_line import one_line
 from vla_deploy.runtime.state_dir import engines_dir_of
 from vla_deploy.speech.stop_words.listener import OFF
@@ -78,39 +73,14 @@ def _judged(context: DoctorContext, node: DeviceNode) -> DoctorFinding:
     path = context.tree.root / node.path.lstrip("/")
     folder, _, file = node.path.rpartition("/")
     if not os.access(path, os.F_OK, effective_ids=True):
-        return fail(node.name, f"there is no {file}", f"ls -l {folder}   # is it plugged in?")
+        there = [name for name in context.tree.names(folder) if name.startswith("usb-")]
+        instead = f"; there is {', '.join(there)}" if there else ""
+        remedy = f"ls -l {folder}   # is it plugged in?"
+        return fail(node.name, f"there is no {file}{instead}", remedy)
     if not os.access(path, node.access, effective_ids=True):
         remedy = f"sudo usermod -aG {_group(path, node.group)} $USER   # then log in anew"
         return fail(node.name, f"no right to open {file}", remedy)
     return ok(node.name, file)
-
-
-def servo_supplies(context: DoctorContext) -> Iterator[DoctorFinding]:
-    """Check that the servos measure what their supplies give; a bus in use is left alone."""
-    if context.robot is None:
-        return
-    name, bus = "servo supplies", context.robot.servo_bus
-    port = context.tree.root / bus.path.lstrip("/")
-    if not port.exists():
-        return  # the check of the device files names it
-    try:
-        transport = SerialPort(port, bus.baud, context.clock)
-    except DriverError as error:
-        yield missing(name, str(error))
-        return
-    bench = family_of(bus.servos[0].model).bench(transport, context.clock, bus.baud)
-    try:
-        bench.detect_echo()
-        volts = read_voltages(bench, [servo.id for servo in bus.all_servos])
-    finally:
-        bench.close()
-    remedy = f"vla-deploy servo scan --robot {context.robot.name}"
-    wrong = voltage_mismatches(bus, volts)
-    yield from (fail(name, mismatch, remedy) for mismatch in wrong)
-    if not volts:
-        yield missing(name, "no servo answers", remedy)
-    elif not wrong:
-        yield ok(name, f"{min(volts.values()):.1f} V to {max(volts.values()):.1f} V as declared")
 
 
 def _group(path: Path, usual: str) -> str:

@@ -5,7 +5,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from platforms.tree import ValueMissing
-from vla_deploy.doctor import computer, devices, home_devices, power, realtime, ros, software
+from vla_deploy.doctor import (
+    computer,
+    devices,
+    home_devices,
+    power,
+    realtime,
+    ros,
+    servos,
+    software,
+)
 from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, Section, missing, warn
 
@@ -29,7 +38,8 @@ CHECKS: tuple[Check, ...] = (
     Check("Computer", "memory", computer.memory),
     Check("Computer", "user", computer.user, live=True),
     Check("Devices", "device files", devices.device_files),
-    Check("Devices", "servo supplies", devices.servo_supplies, live=True),
+    Check("Devices", "servo port", servos.port_users, live=True),
+    Check("Devices", "servo bus", servos.servos_on_the_bus, live=True),
     Check("Devices", "camera calibration", devices.camera_calibration),
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),

@@ -5,6 +5,7 @@ from typing import Final, cast
 
 from drivers.base import ByteTransport
 from drivers.clock import Clock
+from drivers.dynamixel.checks import servo_troubles
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tables.control_table import (
     BAUD_RATES,
@@ -14,6 +15,7 @@ from drivers.dynamixel.tables.control_table import (
     VOLTAGE_UNIT_V,
 )
 from drivers.dynamixel.tables.registers import Registers, decode
+from drivers.dynamixel.tables.settings import IMAGE_BYTES
 from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     MAX_SERVO_ID,
@@ -38,6 +40,7 @@ from drivers.servo.tools.bench import (
     ServoReading,
     await_boot,
 )
+from drivers.servo.trouble import ServoTrouble
 
 PING_ANSWER_BYTES: Final = 3
 _SLOT_S: Final = 0.003
@@ -175,6 +178,17 @@ class DynamixelBench:
         """
         self.write(servo, "id", new_id)
 
+    def set_limits(self, servo: JointServo, least: int, most: int) -> None:
+        """Give a servo without torque other position limits, in pulses.
+
+        Raises:
+            Rejected: the servo refuses; the class tells why.
+            ServoSilent: no answer.
+            LinkLost: the adapter is gone.
+        """
+        self.write(servo, "min_position_limit", least)
+        self.write(servo, "max_position_limit", most)
+
     def bauds(self, servo: JointServo) -> Collection[int]:
         """Return the speeds that a servo can be set to."""
         most = _spec(servo).model.registers["baud_rate"].maximum
@@ -236,6 +250,30 @@ class DynamixelBench:
         """
         specs = [_spec(servo) for servo in servos]
         return self._registers.read_many("present_position", specs, THREE_TRIES)
+
+    def examine(self, servos: Sequence[JointServo]) -> list[ServoTrouble]:
+        """Compare servos with their declarations; silent ones are left out, nothing is written.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        specs = [_spec(servo) for servo in servos]
+        images = self._registers.read_span_many(specs, 0, IMAGE_BYTES, THREE_TRIES)
+        return [
+            trouble
+            for servo in specs
+            if (image := images.get(servo.id)) is not None
+            for trouble in servo_troubles(servo, image)
+        ]
+
+    def homing_offsets(self, servos: Sequence[JointServo]) -> dict[int, int]:
+        """Return the homing offsets that servos hold, by id, of those that answer.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        specs = [_spec(servo) for servo in servos]
+        return self._registers.read_many("homing_offset", specs, THREE_TRIES)
 
     def read_servos(
         self, servos: Sequence[JointServo], joints: Mapping[int, str]

@@ -9,6 +9,7 @@ from drivers.base import ByteTransport
 from drivers.clock import Clock
 from drivers.errors import DriverError
 from drivers.feetech.block import BLOCK_BYTES, BLOCK_START
+from drivers.feetech.checks import all_troubles, read_head, read_images
 from drivers.feetech.codec import (
     FEETECH_BROADCAST_ID,
     FEETECH_MAX_ID,
@@ -26,6 +27,8 @@ from drivers.feetech.table import (
     FEETECH_VOLTAGE_UNIT_V,
     LOAD_FULL,
     hardware_errors,
+    model_names,
+    models_of,
 )
 from drivers.servo.counters import BusCounters
 from drivers.servo.errors import ServoSilent, WrongServo
@@ -41,14 +44,15 @@ from drivers.servo.tools.bench import (
     ServoReading,
     await_boot,
 )
+from drivers.servo.trouble import ServoTrouble
 
 _SLOT_S: Final = 0.003
 """The longest that each servo's turn to answer a broadcast ping takes, its bytes left out."""
 _PROBES: Final = 3
-_HEAD_BYTES: Final = 5  # firmware .. model number
 _MOST_AT_ONCE: Final = 40
 _PROTOCOL_2_HEAD: Final = b"\xff\xff\xfd\x00"
 _PROTOCOL_2_PING: Final = _PROTOCOL_2_HEAD + b"\xfe\x03\x00\x01\x31\x42"
+HOMING: Final = "homing_offset"
 _BAUD_CODES: Final = {rate: code for code, rate in FEETECH_BAUD_RATES.items()}
 
 
@@ -57,7 +61,7 @@ class _FoundFeetech(FeetechServo):
     """Name only what the number tells, not the motor and gear that the robot file knows."""
 
     def __str__(self) -> str:
-        name = _common_name(_names(self.datasheet.number))
+        name = _common_name(model_names(self.datasheet.number))
         return f"servo {self.id} ({self.joint}, {name})"
 
 
@@ -98,19 +102,13 @@ class FeetechBench:
             CorruptReply: only damaged answers, as when two servos share the id.
             LinkLost: the adapter is gone.
         """
-        packet = self.link.request(
-            _unnamed(servo_id),
-            FeetechInstruction.READ,
-            bytes((0, _HEAD_BYTES)),
-            answer_bytes=_HEAD_BYTES,
-            patience=patience,
-        )
-        names, number = _models_of(packet.params[3:5])
+        head = read_head(self.link, _unnamed(servo_id), patience)
+        names, number = models_of(head[3:5])
         return FoundServo(
             servo_id=servo_id,
             model_number=number,
             model_name=_common_name(names) or f"unknown model {number}",
-            firmware=f"{packet.params[0]}.{packet.params[1]}",
+            firmware=f"{head[0]}.{head[1]}",
         )
 
     def servo(self, servo_id: int, joint: str = "") -> FeetechServo:
@@ -122,7 +120,7 @@ class FeetechBench:
             LinkLost: the adapter is gone.
         """
         found = self.ping(servo_id)
-        names = _names(found.model_number)
+        names = model_names(found.model_number)
         if not names:
             raise WrongServo(
                 f"servo {servo_id}: {found.model_name}; its registers are not known, only those of "
@@ -148,7 +146,7 @@ class FeetechBench:
         for servo_id in ids[:_MOST_AT_ONCE]:
             try:
                 found.append(self.ping(servo_id))
-            except ServoSilent:
+            except (ServoSilent, CorruptReply):
                 noise_bytes += 1
         return found, noise_bytes
 
@@ -201,14 +199,29 @@ class FeetechBench:
             ServoSilent: no answer.
             LinkLost: the adapter is gone.
         """
-        self.link.write(_spec(servo), "lock", 0)
+        self._write_locked(_spec(servo), {"id": new_id})
+
+    def set_limits(self, servo: JointServo, least: int, most: int) -> None:
+        """Give a servo without torque other position limits, and lock that against a power cut.
+
+        Raises:
+            ServoSilent: no answer.
+            LinkLost: the adapter is gone.
+        """
+        limits = {"min_position_limit": least, "max_position_limit": most}
+        self._write_locked(_spec(servo), limits)
+
+    def _write_locked(self, servo: FeetechServo, values: Mapping[str, int]) -> None:
+        """Open the EEPROM for these values, whatever happens only for them."""
+        self.link.write(servo, "lock", 0)
         try:
-            self.link.write(_spec(servo), "id", new_id)
+            for name, value in values.items():
+                self.link.write(servo, name, value)
         except DriverError:
             with suppress(DriverError):  # the first error says what is wrong
-                self.link.write(_spec(servo), "lock", 1)
+                self.link.write(servo, "lock", 1)
             raise
-        self.link.write(replace(_spec(servo), id=new_id), "lock", 1)
+        self.link.write(replace(servo, id=values.get("id", servo.id)), "lock", 1)
 
     def bauds(self, servo: JointServo) -> Collection[int]:
         """Return the speeds that a servo can be set to."""
@@ -311,6 +324,29 @@ class FeetechBench:
             if servo.id in spans
         }
 
+    def examine(self, servos: Sequence[JointServo]) -> list[ServoTrouble]:
+        """Compare servos with their declarations; silent ones are left out, nothing is written.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        specs = [_spec(servo) for servo in servos]
+        return all_troubles(specs, read_images(self.link, specs, THREE_TRIES))
+
+    def homing_offsets(self, servos: Sequence[JointServo]) -> dict[int, int]:
+        """Return the homing offsets that servos hold, by id, of those that answer and have one.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        found = {}
+        for servo in map(_spec, servos):
+            if HOMING not in servo.datasheet.registers:
+                continue
+            with suppress(ServoSilent, CorruptReply):
+                found[servo.id] = self.link.read(servo, HOMING)
+        return found
+
     def read_servos(
         self, servos: Sequence[JointServo], joints: Mapping[int, str]
     ) -> list[ServoReading]:
@@ -349,7 +385,7 @@ def _reading(
     return ServoReading(
         id=servo.id,
         joint=joint,
-        model=_common_name(_names(sheet.number)),
+        model=_common_name(model_names(sheet.number)),
         position_rad=(value("present_position") - sheet.centre_step) * sheet.step_rad,
         velocity_rad_s=value("present_velocity") * sheet.step_rad,
         effort=100.0 * value("present_load") / LOAD_FULL,
@@ -359,19 +395,6 @@ def _reading(
         torque_on=torque.params[0] == 1,
         errors=describe_bits(hardware_errors(sensed.code)),
     )
-
-
-def _names(number: int) -> list[str]:
-    return [name for name, sheet in FEETECH_MODELS.items() if sheet.number == number]
-
-
-def _models_of(data: bytes) -> tuple[list[str], int]:
-    """Return the models with a number, and the number, in the byte order that makes sense."""
-    little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
-    for number in (little, big):
-        if names := _names(number):
-            return names, number
-    return [], little
 
 
 def _common_name(names: Sequence[str]) -> str:

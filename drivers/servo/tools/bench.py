@@ -10,9 +10,12 @@ from drivers.servo.counters import BusCounters
 from drivers.servo.errors import ServoSilent
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
+from drivers.servo.trouble import ServoTrouble
 
 ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)
 THREE_TRIES: Final = ReplyPatience(margin_s=0.02, attempts=3)
+FACTORY_ID: Final = 1
+"""The id of a new servo, of all families."""
 _BOOT_PATIENCE_S: Final = 3.0
 _BOOT_POLL_S: Final = 0.05
 
@@ -143,6 +146,10 @@ class ServoBench(Protocol):
         """Give a servo without torque another id, for good."""
         ...
 
+    def set_limits(self, servo: JointServo, least: int, most: int) -> None:
+        """Give a servo without torque other position limits, in pulses, for good."""
+        ...
+
     def bauds(self, servo: JointServo) -> Collection[int]:
         """Return the speeds that a servo can be set to."""
         ...
@@ -177,6 +184,14 @@ class ServoBench(Protocol):
 
     def positions(self, servos: Sequence[JointServo]) -> dict[int, int]:
         """Return the pulses of the encoders of the servos that answer, by id."""
+        ...
+
+    def examine(self, servos: Sequence[JointServo]) -> list[ServoTrouble]:
+        """Compare servos with their declarations; silent ones are left out, nothing is written."""
+        ...
+
+    def homing_offsets(self, servos: Sequence[JointServo]) -> dict[int, int]:
+        """Return the homing offsets that servos hold, by id, of those that answer and have one."""
         ...
 
     def read_servos(

@@ -4,14 +4,20 @@ All servos are asked at once first. Where that gives damaged answers, each id is
 of two servos with one id neither is understood.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.errors import NoReply, ProtocolError
-from drivers.servo.errors import CorruptReply, ServoSilent, WrongServo
+from drivers.servo.errors import CorruptReply, ServoSilent
 from drivers.servo.patience import ReplyPatience
-from drivers.servo.tools.bench import ONE_TRY, THREE_TRIES, FoundServo, ServoBench
+from drivers.servo.tools.bench import (
+    FACTORY_ID,
+    ONE_TRY,
+    THREE_TRIES,
+    FoundServo,
+    ServoBench,
+)
+from drivers.servo.trouble import ServoTrouble, TroubleLevel
 
 Progress = Callable[[str], None]
 
@@ -54,50 +60,105 @@ class ServoScan:
 
     def fault(self) -> str:
         """Return what is wrong with the bus and what to try; "" where nothing is."""
+        return "\n".join(map(str, self.troubles()))
+
+    def troubles(self) -> list[ServoTrouble]:
+        """Return what is wrong with the bus: who shares an id, is silent, or is another model."""
+        if not any(report.servos or report.clashes for report in self.reports):
+            return [self._nothing_found()]
+        return [*self._clashes(), *self._silent(), *self._other_models()]
+
+    def strays(self) -> list[ServoTrouble]:
+        """Return the servos that answer at the bus' own speed and that no joint has."""
+        if not self.declared:
+            return []
+        strays = [one for one in self.reports[0].servos if one.servo_id not in self.declared]
+        return [
+            ServoTrouble(
+                measured=f"servo {one.servo_id}, {one.model_name}, answers, but the robot file has "
+                "no servo of this id",
+                remedy=self._setup_remedy(one.servo_id) or "name it there, or disconnect it",
+                level=TroubleLevel.NOTE,
+            )
+            for one in strays
+        ]
+
+    def _clashes(self) -> Iterator[ServoTrouble]:
         for report in self.reports:
             if report.clashes:
                 ids = ", ".join(map(str, report.clashes))
-                return (
-                    f"{self.port} at {report.baud} baud: the answers of id {ids} are damaged: more "
-                    "than one servo has it, or the cable is bad. Connect one of them alone and "
-                    "give it a free id: vla-deploy servo set-id"
+                setup = next(filter(None, map(self._setup_remedy, report.clashes)), "")
+                yield ServoTrouble(
+                    measured=f"{self.port} at {report.baud} baud: the answers of id {ids} are "
+                    "damaged: more than one servo has it, or the cable is bad",
+                    remedy="connect one of them alone and give it a free id: `vla-deploy servo "
+                    f"set-id`{'; ' * bool(setup)}{setup}",
                 )
-        if not any(report.servos for report in self.reports):
-            return self._nothing_found()
-        if self.missing:
-            names = ", ".join(map(self._label, self.missing))
-            return (
-                f"{self.port} at {self.reports[0].baud} baud: no answer from {names}; check power, "
-                "cable and speed (see the table for servos at another speed)"
+
+    def _setup_remedy(self, servo_id: int) -> str:
+        """Return what to do about an id that a servo has which was never given its own."""
+        if servo_id != FACTORY_ID or not self.missing:
+            return ""
+        joints = [self.declared[one][0] for one in self.missing]
+        return (
+            f"id {FACTORY_ID} is the factory's: where it is that of {' or '.join(joints)}, "
+            f"connect it alone: `vla-deploy servo setup --joint {joints[0]}`"
+        )
+
+    def _silent(self) -> Iterator[ServoTrouble]:
+        own = self.reports[0].baud
+        elsewhere = {
+            one.servo_id: report.baud for report in self.reports[1:] for one in report.servos
+        }
+        silent = [one for one in self.missing if one not in elsewhere]
+        if silent:
+            yield ServoTrouble(
+                measured=f"{self.port} at {own} baud: no answer from "
+                f"{', '.join(map(self._label, silent))}",
+                remedy="check power, cable and id (one of another voltage is silent, too)",
             )
-        wrong = [
-            f"{self._label(one.servo_id)} is {one.model_name}, the robot file says "
-            f"{self.declared[one.servo_id][1]}"
-            for one in self.reports[0].servos
-            if one.servo_id in self.declared
-            and not is_model(one.model_name, self.declared[one.servo_id][1])
-        ]
-        return f"{'; '.join(wrong)}; correct the robot file or the wiring" if wrong else ""
+        for one in self.missing:
+            if one in elsewhere:
+                yield ServoTrouble(
+                    measured=f"{self.port}: no answer at {own} baud from {self._label(one)}, but "
+                    f"at {elsewhere[one]} baud",
+                    remedy=f"`vla-deploy servo set-baud {own} {one} --baud {elsewhere[one]}`",
+                )
+
+    def _other_models(self) -> Iterator[ServoTrouble]:
+        for one in self.reports[0].servos:
+            joint, model = self.declared.get(one.servo_id, ("", one.model_name))
+            if joint and not is_model(one.model_name, model):
+                yield ServoTrouble(
+                    measured=f"{self._label(one.servo_id)} is {one.model_name}, the robot file "
+                    f"says {model}",
+                    remedy="correct the robot file or the wiring",
+                )
 
     def _label(self, servo_id: int) -> str:
         return f"servo {servo_id} ({self.declared[servo_id][0]})"
 
-    def _nothing_found(self) -> str:
+    def _nothing_found(self) -> ServoTrouble:
         for report in self.reports:
             if report.other_family_ids:
                 ids = ", ".join(map(str, report.other_family_ids))
-                return (
-                    f"{self.port} at {report.baud} baud: id {ids} answers in another protocol: a "
-                    "servo of another make (try --family), or one whose protocol_type is not 2"
+                return ServoTrouble(
+                    measured=f"{self.port} at {report.baud} baud: id {ids} answers in another "
+                    "protocol: a servo of another make, or one whose protocol_type is not 2",
+                    remedy="try --family, or correct the models in the robot file",
                 )
         for report in self.reports:
             if report.noise_bytes:
-                return (
-                    f"{self.port}: bytes came at {report.baud} baud, but no packet: another speed, "
-                    "an adapter that echoes, or another device; check the adapter's mode"
+                return ServoTrouble(
+                    measured=f"{self.port}: bytes came at {report.baud} baud, but no packet",
+                    remedy="another speed, an adapter that echoes, or another device; check the "
+                    "adapter's mode",
                 )
         asked = ", ".join(str(report.baud) for report in self.reports)
-        return f"{self.port}: no servo answers at {asked} baud; check power, cable and port"
+        return ServoTrouble(
+            measured=f"{self.port}: no servo answers at {asked} baud",
+            remedy="check power, cable and port",
+        )
 
 
 def is_model(found: str, declared: str) -> bool:
@@ -106,9 +167,14 @@ def is_model(found: str, declared: str) -> bool:
 
 
 def scan_speed(
-    link: ServoBench, ids: Sequence[int] | None = None, progress: Progress = lambda text: None
+    link: ServoBench,
+    ids: Sequence[int] | None = None,
+    progress: Progress = lambda text: None,
+    expected: Collection[int] = (),
 ) -> SpeedReport:
     """Return what answers at the link's speed: of all ids, or of the given ones.
+
+    The `expected` are asked by themselves, too: not every model answers a question to all.
 
     Raises:
         LinkLost: the adapter is gone.
@@ -118,7 +184,8 @@ def scan_speed(
         progress(f"{link.baud} baud: all ids at once")
         servos, noise_bytes = link.ask_everyone()
         doubtful = noise_bytes > 0 or len({one.servo_id for one in servos}) < len(servos)
-        ids = link.all_ids if doubtful else sorted(one.servo_id for one in servos)
+        answered = {one.servo_id for one in servos}
+        ids = link.all_ids if doubtful else sorted(answered | {*expected})
     patience = ONE_TRY if doubtful else THREE_TRIES
     found, clashes = _ask_each(link, ids, patience, progress)
     return SpeedReport(
@@ -128,20 +195,6 @@ def scan_speed(
         other_family_ids=() if found or clashes else tuple(link.other_family_ids()),
         noise_bytes=0 if found or clashes else noise_bytes,
     )
-
-
-def read_voltages(link: ServoBench, ids: Iterable[int]) -> dict[int, float]:
-    """Return what servos measure of their supply, by id; those that do not answer are left out.
-
-    Raises:
-        LinkLost: the adapter is gone.
-    """
-    servos = []
-    for servo_id in ids:
-        with suppress(NoReply, ProtocolError, WrongServo):
-            servos.append(link.servo(servo_id))
-    readings = link.read_servos(servos, {}) if servos else ()
-    return {reading.id: reading.voltage_v for reading in readings}
 
 
 def is_taken(link: ServoBench, servo_id: int) -> bool:

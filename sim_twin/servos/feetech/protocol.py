@@ -87,13 +87,14 @@ class FeetechProtocol:
         return [row for row in rows if self.audience.listens(row)]
 
     def _broadcast(self, packet: FeetechPacket) -> list[Reply]:
-        """Let all servos obey; only STS and SMS answer, and only a ping."""
-        replies: list[Reply] = []
+        """Let all servos obey; only STS and SMS answer a ping, those of one id at once."""
+        replies: dict[int, list[Reply]] = {}
         for row in self._listening(self.audience.everyone()):
+            servo_id = self._memory.get(row, "id")
             reply = self._single(row, packet)
             if packet.code == FeetechInstruction.PING and self._memory.sheets[row].has_sync_read:
-                replies += reply
-        return replies
+                replies[servo_id] = replies.get(servo_id) or reply
+        return [reply for each in replies.values() for reply in each]
 
     def _single(self, row: int, packet: FeetechPacket) -> list[Reply]:
         if packet.code not in _SCS_KNOWS and not self._memory.sheets[row].has_sync_read:

@@ -99,12 +99,13 @@ class BusProtocol:
         rows = audience.everyone() if everyone else audience.named(packet.servo_id)
         followers = audience.followers(packet.servo_id)
         audience.feed([*rows, *followers])
-        replies: list[Reply] = []
+        replies: dict[int, list[Reply]] = {}
         for row in [row for row in (*rows, *followers) if audience.listens(row)]:
+            servo_id = self._tables[row].get("id") if everyone else packet.servo_id
             reply = self._single(row, packet)
-            if row not in followers and (everyone or not replies):
-                replies += reply
-        return replies
+            if row not in followers:
+                replies[servo_id] = replies.get(servo_id) or reply
+        return [reply for each in replies.values() for reply in each]
 
     def _single(self, row: int, packet: Packet) -> list[Reply]:
         servo_id, alert = self._tables[row].get("id"), self.speaker.alert(row)

@@ -23,7 +23,7 @@ def test_a_servo_set_to_another_speed_is_found_and_the_remedy_named(
         bench.bus.connect()
     text = str(caught.value)
     assert "2 of 2 servos do not answer at 1000000 baud" in text
-    assert "servo 1 answers at 57600 baud: set it to 1000000 (`vla-deploy servo set-baud`)" in text
+    assert "servo 1 answers at 57600 baud: set it to 1000000 (`vla-deploy servo set-baud " in text
 
 
 def test_the_speed_is_put_back_after_the_search(make_paced: MakeBench) -> None:

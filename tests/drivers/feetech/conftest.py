@@ -32,7 +32,8 @@ class Bench:
             EmulatedFeetechSpec(id=one.id, model_name=model, eeprom=(eeprom or {}).get(one.id, {}))
             for one in self.specs
         ]
-        self.servos = FreeFeetechServos(emulated, supply_v=supply_v)
+        self.servos = FreeFeetechServos(emulated)
+        self.servos.supply_v = supply_v
         self.bank = self.servos.bank
         self.rotors = self.servos.rotors
         self.sent: list[FeetechPacket] = []

@@ -21,7 +21,6 @@ from vla_deploy.robots.calibration.lerobot_conversion import exported, imported
 from vla_deploy.robots.calibration.lerobot_file import LeRobotMotor, read_lerobot, write_lerobot
 
 FORMATS: Final = ("lerobot",)
-HOMING_REGISTER: Final = "homing_offset"
 _LEROBOT_FOLDER: Final = "~/.cache/huggingface/lerobot/calibration/robots"
 _EXAMPLES: Final = f"""\
   vla-deploy servo calibration import {_LEROBOT_FOLDER}/so_follower/my_arm.json --robot so101
@@ -181,22 +180,13 @@ def _held_offsets(bus: ServoBusPort, names: Sequence[str]) -> dict[str, int]:
     """Return the homing offset that the servo of each joint holds."""
     ids = {joint: servo_id for servo_id, joint in bus.joints.items()}
     with bus.open() as link:
-        return {
-            name: next(
-                register.value
-                for register in link.registers(link.servo(ids[name], name))
-                if register.name == HOMING_REGISTER
-            )
-            for name in names
-        }
+        held = link.homing_offsets([link.servo(ids[name], name) for name in names])
+    return {name: held[ids[name]] for name in names}
 
 
 def _expected_offset(calibration: JointCalibration | None) -> int | None:
     """Return the homing offset with which a joint was calibrated; None where it is not known."""
-    origin = None if calibration is None else calibration.lerobot
-    if origin is None:
-        return None
-    return origin.homing_offset if origin.homing_in_servo else 0
+    return None if calibration is None else calibration.expected_homing_offset
 
 
 def _require_as_calibrated(

@@ -1,12 +1,12 @@
-"""`vla-deploy servo set-id | set-baud | reboot | factory-reset`: change one servo at the bench."""
+"""`vla-deploy servo set-id | set-baud | set-limits | reboot | factory-reset`: change a servo."""
 
 import argparse
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 from drivers.errors import DriverError, NoReply, ProtocolError
 from drivers.servo.joint_servo import JointServo
-from drivers.servo.tools.bench import Keep, ServoBench
+from drivers.servo.tools.bench import Keep, RegisterValue, ServoBench
 from drivers.servo.tools.scan import is_taken
 from vla_deploy.cli.commands import Run, add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
@@ -19,6 +19,8 @@ from vla_deploy.cli.devices.servo_bus import (
     servo_id,
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
+
+_LIMITS: Final = ("min_position_limit", "max_position_limit")
 
 
 def register(commands: Any) -> None:
@@ -35,6 +37,21 @@ def register(commands: Any) -> None:
     )
     set_baud.add_argument("new_baud", type=int, choices=SPEEDS, metavar="NEW_BAUD")
     set_baud.add_argument("ids", type=servo_id, nargs="+", metavar="ID")
+    set_limits = _add(
+        commands,
+        "set-limits",
+        "let a servo take goals over its whole turn, or between others; nothing moves",
+        "set-limits 3",
+        run_set_limits,
+    )
+    set_limits.add_argument("id", type=servo_id)
+    set_limits.add_argument(
+        "--pulses",
+        type=int,
+        nargs=2,
+        metavar=("LEAST", "MOST"),
+        help="these, in pulses (default: the whole turn, for the robot file bounds the goals)",
+    )
     reboot = _add(commands, "reboot", "restart a servo; it forgets its RAM", "reboot 3", run_reboot)
     reboot.add_argument("id", type=servo_id)
     reset = _add(
@@ -147,6 +164,46 @@ def _complaint(link: ServoBench, bus: ServoBusPort, servo: JointServo, baud: int
             f"set-baud {bus.baud} {servo.id} --port {bus.port} --baud {baud}"
         )
     return "" if got == baud else f"{servo}: says {got} baud, expected {baud}"
+
+
+def run_set_limits(arguments: argparse.Namespace) -> int:
+    """Write the position limits of a servo, and read them back.
+
+    Raises:
+        UsageError: the limits are none of this servo's, or its id belongs to two.
+        CommandFailed: the servo keeps others.
+        DriverError: the servo is silent or refuses.
+    """
+    bus, one = bus_of(arguments), arguments.id
+    with bus.open() as link:
+        servo = link.servo(one, bus.joint(one))
+        _require_alone(link, bus, one)
+        before = _limits(link, servo)
+        turn = 0, before["max_position_limit"].initial or 0
+        least, most = arguments.pulses or turn
+        if not turn[0] <= least < most <= turn[1]:
+            raise UsageError(
+                f"{servo}: expected limits within {turn[0]}..{turn[1]}, the lower one first, got "
+                f"{least}..{most}"
+            )
+        torque = _torque_question(link, [servo])
+        old = _range_of(before)
+        confirm(arguments, f"{servo}: position limits {old} become {least}..{most}.{torque}")
+        link.release(servo)
+        link.set_limits(servo, least, most)
+        kept = _range_of(_limits(link, servo))
+    if kept != f"{least}..{most}":
+        raise CommandFailed(f"{servo}: expected position limits {least}..{most}, got {kept}")
+    document = {"id": one, "limits": [least, most], "old_limits": old}
+    return emit(arguments, document, f"{servo}: position limits {kept} (were {old})", indent=None)
+
+
+def _limits(link: ServoBench, servo: JointServo) -> dict[str, RegisterValue]:
+    return {one.name: one for one in link.registers(servo) if one.name in _LIMITS}
+
+
+def _range_of(limits: Mapping[str, RegisterValue]) -> str:
+    return "..".join(str(limits[name].value) for name in _LIMITS)
 
 
 def run_reboot(arguments: argparse.Namespace) -> int:

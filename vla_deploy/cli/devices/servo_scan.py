@@ -12,10 +12,9 @@ from drivers.servo.tools.bench import FoundServo, ServoBench
 from drivers.servo.tools.scan import (
     ServoScan,
     SpeedReport,
-    is_model,
-    read_voltages,
     scan_speed,
 )
+from drivers.servo.trouble import TroubleLevel
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.servo_bus import (
     ProgressLine,
@@ -25,7 +24,7 @@ from vla_deploy.cli.devices.servo_bus import (
     servo_id,
 )
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.robots.supplies import voltage_mismatches
+from vla_deploy.robots.servos.survey import ServoSurvey, survey
 
 _SCAN_EXAMPLES: Final = """  vla-deploy servo scan --port /dev/ttyUSB0
   vla-deploy servo scan --robot butler --json
@@ -61,17 +60,19 @@ def run_scan(arguments: argparse.Namespace) -> int:
 
     Raises:
         CommandFailed: nothing answers, ids clash, or a declared servo is missing, is another, or
-            measures a voltage that its supply cannot give.
+            holds or measures what would keep it from torque.
     """
     bus = bus_of(arguments)
     progress = ProgressLine(quiet=arguments.json)
     reports: list[SpeedReport] = []
-    mismatches: list[str] = []
+    surveys: list[ServoSurvey] = []
     try:
         for baud in speeds_to_ask(bus):
             with bus.open(baud) as link:
-                reports.append(scan_speed(link, arguments.ids, progress))
-                mismatches += _mismatches(link, bus, reports[-1])
+                expected = () if reports else bus.declared
+                reports.append(scan_speed(link, arguments.ids, progress, expected))
+                if bus.robot is not None:
+                    surveys.append(survey(bus.robot, link, reports[-1]))
             if bus.is_pseudo_terminal and reports[-1].servos:
                 break  # servos without a speed answer at each
     finally:
@@ -82,26 +83,18 @@ def run_scan(arguments: argparse.Namespace) -> int:
         declared=bus.declared,
         is_complete=arguments.ids is None,
     )
-    document = {**_scan_document(bus, scan), "wrong_voltages": mismatches}
-    emit(arguments, document, "\n".join(_scan_lines(bus, reports)))
-    if fault := scan.fault():
-        raise CommandFailed(fault)
-    if mismatches:
-        raise CommandFailed(f"{'; '.join(mismatches)}; check converter, plugs and robot file")
+    troubles = [*scan.strays(), *(one for each in surveys for one in each.troubles)]
+    document = {
+        **_scan_document(bus, scan),
+        "wrong_voltages": [line for one in surveys for line in one.wrong_voltages],
+        "troubles": [*map(str, [*scan.troubles(), *troubles])],
+    }
+    notes = [f"note: {one}" for one in troubles if one.level is TroubleLevel.NOTE]
+    emit(arguments, document, "\n".join([*_scan_lines(bus, reports), *notes]))
+    faults = [str(one) for one in troubles if one.level > TroubleLevel.NOTE]
+    if faults := [*filter(None, [scan.fault()]), *faults]:
+        raise CommandFailed("\n".join(faults))
     return 0
-
-
-def _mismatches(link: ServoBench, bus: ServoBusPort, report: SpeedReport) -> list[str]:
-    """Return what the servos of the robot file measure and their supplies cannot give."""
-    if bus.robot is None:
-        return []
-    found = {one.servo_id: one.model_name for one in report.servos}
-    ids = [
-        servo.id
-        for servo in bus.robot.servo_bus.all_servos
-        if servo.id in found and is_model(found[servo.id], servo.model)
-    ]
-    return voltage_mismatches(bus.robot.servo_bus, read_voltages(link, ids))
 
 
 def speeds_to_ask(bus: ServoBusPort) -> Sequence[int]:

@@ -35,6 +35,7 @@ def register(commands: Any) -> None:
         commands,
         "doctor",
         "  vla-deploy doctor\n"
+        "  vla-deploy doctor --robot so101\n"
         "  vla-deploy doctor --robot butler --profile jetson_orin_nx\n"
         "  vla-deploy doctor --json | jq '.findings[] | select(.level == \"fail\")'\n",
         run,

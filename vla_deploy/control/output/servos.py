@@ -11,42 +11,16 @@ from drivers.error_budget import BudgetState
 from drivers.errors import DriverError, LinkLost, NoReply
 from drivers.opener import DeviceOpener
 from drivers.servo.bus import ServoBusDriver
-from drivers.servo.family import ServoFamily, family_of
-from drivers.servo.joint_servo import JointServo
 from drivers.servo.shadowed_bus import ShadowedBus
 from drivers.servo.state import BusState
 from platforms import Profile
 from vla_deploy.control.motion.axes import Axes, Floats
 from vla_deploy.control.output.servo_faults import ServoFaults
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.servos.declared import bus_family, servo_specs
 
 REOPEN_NS = NS_PER_S
 _FIRST_READS = 10
-
-
-def bus_family(robot: RobotDescription) -> ServoFamily:
-    """Return the family of a robot's servos, which is one for a bus.
-
-    Raises:
-        UnknownModel: no family has the model.
-    """
-    return family_of(robot.servo_bus.servos[0].model)
-
-
-def servo_specs(robot: RobotDescription) -> list[JointServo]:
-    """Return what the bus driver must know of each servo of a robot, those of shadows last."""
-    family = bus_family(robot)
-    return [
-        family.servo(
-            servo_id=servo.id,
-            model_name=servo.model,
-            joint=servo.joint,
-            sign=servo.sign,
-            offset_rad=servo.offset,
-            travel_per_rad=servo.travel_per_rad,
-        )
-        for servo in robot.servo_bus.all_servos
-    ]
 
 
 class ServoLine:

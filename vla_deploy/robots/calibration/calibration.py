@@ -74,6 +74,13 @@ class JointCalibration:
     made_at: str
     lerobot: LeRobotOrigin | None = None
 
+    @property
+    def expected_homing_offset(self) -> int | None:
+        """Return the homing offset with which the joint was calibrated; None: it is not known."""
+        if self.lerobot is None:
+            return None
+        return self.lerobot.homing_offset if self.lerobot.homing_in_servo else 0
+
 
 def read_calibration(file: Path) -> dict[str, JointCalibration]:
     """Return the calibrations by joint; none when there is no file.

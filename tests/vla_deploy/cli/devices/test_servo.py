@@ -88,7 +88,7 @@ def test_scan_of_a_range_asks_only_that(bus, servo):
     ],
 )
 def test_scan_ends_with_one_line_about_what_is_wrong(bus, servo, monkeypatch, report, words):
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         return SpeedReport(baud=57_600, **report)
 
     monkeypatch.setattr(servo_scan, "scan_speed", found)
@@ -100,7 +100,7 @@ def test_scan_asks_at_every_speed_of_a_real_line_and_tells_of_servos_at_several(
 ):
     asked = []
 
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         asked.append(link.baud)
         one = FoundServo(
             servo_id=len(asked), model_number=1020, model_name="XM430-W350", firmware="48"
@@ -119,7 +119,7 @@ def test_scan_asks_at_every_speed_of_a_real_line_and_tells_of_servos_at_several(
 def test_scan_asks_a_pseudo_terminal_again_only_where_nobody_answers(bus, servo, monkeypatch):
     asked = []
 
-    def found(link: object, ids: object, progress: object) -> SpeedReport:
+    def found(link: object, ids: object, progress: object, expected: object) -> SpeedReport:
         asked.append(link.baud)
         one = FoundServo(servo_id=1, model_number=1020, model_name="XM430-W350", firmware="48")
         return SpeedReport(baud=link.baud, servos=(one,) if link.baud == 57_600 else ())
@@ -338,6 +338,17 @@ def test_calibration_ends_in_one_line_when_the_input_does(make_bus, servo, tmp_p
         said = servo(bus, "calibrate", *words)
     assert said.code == 1
     assert said.err == "vla-deploy: the input ended; what was written before stays\n"
+
+
+@pytest.mark.parametrize("family", ["dynamixel", "feetech"])
+def test_the_limits_of_a_servo_are_set_for_its_whole_turn_or_as_said(make_bus, servo, family):
+    bus = make_bus(3) if family == "dynamixel" else make_bus.feetech(3)
+    words = (3, "--yes", "--family", family)
+    said = servo(bus, "set-limits", *words, "--pulses", 100, 3000, "--json")
+    assert (said.document["old_limits"], said.document["limits"]) == ("0..4095", [100, 3000])
+    assert bus.bank.register(3, "max_position_limit") == 3000
+    assert "position limits 0..4095 (were 100..3000)" in servo(bus, "set-limits", *words).out
+    fails(servo(bus, "set-limits", *words, "--pulses", 9, 5000), "within 0..4095")
 
 
 def test_feetech_servos_are_found_read_and_changed_like_the_others(make_bus, servo):

@@ -12,7 +12,7 @@ from drivers.serial_port import SerialPort
 from sim_twin.servos import EmulatedServoSpec
 from sim_twin.servos.server import FreeServos
 from vla_deploy.doctor import FindingLevel, live_context
-from vla_deploy.doctor.devices import servo_supplies
+from vla_deploy.doctor.servos import servos_on_the_bus
 from vla_deploy.robots import load_robot
 
 from .conftest import Bus
@@ -32,7 +32,7 @@ def bus(tmp_path: Path) -> Iterator[Bus]:
 
 def found(bus: Bus, models: Path) -> list[tuple[FindingLevel, str]]:
     robot = replace(KOCH, servo_bus=replace(KOCH.servo_bus, path=bus.port))
-    findings = servo_supplies(live_context(None, robot, models))
+    findings = servos_on_the_bus(live_context(None, robot, models))
     return [(one.level, one.measured) for one in findings]
 
 
@@ -49,7 +49,8 @@ def test_scan_names_the_supply_that_gives_another_voltage(
 
 
 def test_doctor_names_it_and_leaves_a_bus_that_is_in_use_alone(bus: Bus, tmp_path: Path) -> None:
-    assert found(bus, tmp_path) == [(FindingLevel.OK, "5.0 V to 12.0 V as declared")]
+    as_declared = "6 of 6 at 1000000 baud, 5.0 V to 12.0 V as declared"
+    assert found(bus, tmp_path) == [(FindingLevel.OK, as_declared)]
     port = SerialPort(Path(bus.port), 1_000_000, MonotonicClock())
     ((level, measured),) = found(bus, tmp_path)
     port.close()
