@@ -31,7 +31,7 @@ from drivers.feetech.table import (
     models_of,
 )
 from drivers.servo.counters import BusCounters
-from drivers.servo.errors import ServoSilent, WrongServo
+from drivers.servo.errors import CorruptReply, ServoSilent, WrongServo
 from drivers.servo.fault_policy import describe_bits
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
