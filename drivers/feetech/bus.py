@@ -115,12 +115,16 @@ class FeetechBus:
     def write_goals(self, position_rad: NDArray[np.float64]) -> None:
         """Send a goal to every servo, rounded to pulses and clamped; see `sent_goals`.
 
+        One that has not answered for 50 ms gets none until it has been read again: it would go to
+        where nobody knows how far it is.
+
         Raises:
             ValueError: a goal is not finite, or there is not one per servo.
             DriverError: the bus is not connected.
             LinkLost: the adapter is gone.
         """
-        self._connected().goals.write(position_rad)
+        cycle = self._connected()
+        cycle.goals.write(position_rad, cycle.silent_rows)
 
     @property
     def sent_goals(self) -> NDArray[np.float64]:

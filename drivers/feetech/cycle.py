@@ -21,6 +21,7 @@ from drivers.servo.patience import ReplyPatience
 from drivers.servo.roster import Roster
 from drivers.servo.state import BusState
 
+GOALS_WITHHELD_S: Final = 0.05
 _NEVER_NS: Final = -1
 _MOST_NOTICES: Final = 64
 _PROBE_EVERY_TURNS: Final = 5
@@ -82,6 +83,14 @@ class FeetechCycle:
         """Take a servo out of the block read; it rejoins when it answers again."""
         self._roster.suspend(index)
         self._block = self._new_block()
+
+    @property
+    def silent_rows(self) -> Sequence[int]:
+        """Return the servos that have not answered for too long to be sent anywhere."""
+        if self._all_fresh:
+            return ()
+        rows: list[int] = np.flatnonzero(self._state.age_s > GOALS_WITHHELD_S).tolist()
+        return rows
 
     def ask_torque(self, index: int) -> None:
         """Read in one of the next cycles whether a servo has torque."""

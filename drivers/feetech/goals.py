@@ -1,6 +1,6 @@
 """Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from typing import Final
 
@@ -72,8 +72,8 @@ class FeetechGoals:
         joint: Floats = np.array(self._pulses) * self._per_pulse + self._at_zero
         return joint
 
-    def write(self, position_rad: Floats) -> None:
-        """Send a goal to every servo.
+    def write(self, position_rad: Floats, without: Collection[int] = ()) -> None:
+        """Send a goal to every servo but those in the rows `without`, which keep what they have.
 
         Raises:
             ValueError: a goal is not finite, or there is not one per servo.
@@ -93,8 +93,21 @@ class FeetechGoals:
             frame[place + self._low_at] = word & 0xFF
             frame[place + self._high_at] = word >> 8
             place += _RECORD_BYTES
+        if without:
+            self._send_to_others(without)
+            return
         frame[-1] = check_sum(frame[len(FEETECH_HEADER) : -1])
         self._link.send(bytes(frame))
+
+    def _send_to_others(self, without: Collection[int]) -> None:
+        rows = [row for row in range(len(self._joints)) if row not in without]
+        if not rows:
+            return
+        starts = [_FIRST_RECORD + _RECORD_BYTES * row for row in rows]
+        head = self._frame[len(FEETECH_HEADER) + 3 : _FIRST_RECORD]  # address and size
+        records = (self._frame[start : start + _RECORD_BYTES] for start in starts)
+        params = bytes(head) + b"".join(records)
+        self._link.send(encode_packet(FEETECH_BROADCAST_ID, FeetechInstruction.SYNC_WRITE, params))
 
     def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the duty of servos by id, where it changed; return those that did not take it.
