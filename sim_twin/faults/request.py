@@ -96,6 +96,7 @@ _DEVICES: Final = {
     Component.MICROPHONE: "microphone",
     Component.SPEAKER: "speaker",
     Component.BATTERY: "battery",
+    Component.BROKER: "broker",
 }
 """What a component is called in the robot file, where it is no part that moves or sees."""
 _PARTS: Final = {

@@ -57,21 +57,28 @@ class JointOutput:
     def move(self, period_s: float) -> list[MotionResult]:
         """Advance the setpoints, bound them, add what gravity asks for, and send them."""
         state = self._servos.state
-        loose = ~state.torque_on | (state.watchdog < 0) | self._back()
+        loose = ~state.torque_on | (state.watchdog < 0)
         if any_of(loose):
             self.place(loose)
-        ended = self.motions.advance(period_s)
+        ended = self._take_back()
+        ended += self.motions.advance(period_s)
         sent = self._gate.limit(self.motions.state.position, period_s)
         if any_of(state.torque_on):
             self._servos.write(sent + self._gravity.at(sent))
         return ended
 
-    def _back(self) -> Flags:
-        """Return the joints that were silent, and answer again: they have missed their goals."""
+    def _take_back(self) -> list[MotionResult]:
+        """Let joints that were silent, and have missed their goals, begin where they are.
+
+        What they were to do meanwhile is over, and with it every motion.
+        """
         silent = self._servos.state.age_s > SILENT_S
         back: Flags = self._silent & ~silent
         self._silent = silent
-        return back
+        if not any_of(back):
+            return []
+        self.place(back)
+        return self.motions.stop("joints answer again after a silence")
 
     def place(self, joints: Flags) -> None:
         """Let setpoints of joints that take no goals follow them, so that arming is bumpless.
