@@ -31,8 +31,8 @@ class CameraDevice:
 
     Depth noise has sigma = `depth_sigma_per_m` * z^2, as stereo cameras have; 0 switches it off.
     `latency_s` is the time from exposure to the first byte on the line. `depth_ratio` (told over
-    true depth) and `rate_ratio` (given over asked-for rate) may be changed at any time. The depth of
-    a camera that has none is 0 everywhere.
+    true depth) and `rate_ratio` (given over asked-for rate) may be changed at any time. The depth
+    of a camera that has none is 0 everywhere.
     """
 
     def __init__(

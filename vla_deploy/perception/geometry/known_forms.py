@@ -19,6 +19,7 @@ from vla_deploy.robots.known_things import KnownThing
 from vla_deploy.world.vocabulary import CONTAINERS
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 ROUND: Final = frozenset({"bowl", "cup", "can", "bottle"})
@@ -159,6 +160,7 @@ class _Search:
         shared, _ = cv2.intersectConvexConvex(self._seen, outline)
         return float(shared / (self._area + cv2.contourArea(outline) - shared))
 
-    def _local(self, corners: Array) -> NDArray[np.float32]:
+    def _local(self, corners: Array) -> Floats:
         """Return corners in mm around the middle: OpenCV computes in single precision."""
-        return ((corners - self._around) * _MM).astype(np.float32)
+        local: Floats = ((corners - self._around) * _MM).astype(np.float32)
+        return local

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.camera.protocol import Intrinsics
 from vla_deploy.perception.geometry.cloud import Floats, Mask, PosedImage
 from vla_deploy.perception.geometry.known_forms import Array, FormPose, KnownForm
 from vla_deploy.perception.geometry.lens import ray_table
@@ -47,6 +48,9 @@ UNKNOWN_HEIGHT_M: Final = 0.01
 LEVEL_M: Final = 0.001
 MOST_LEVELS: Final = 64
 CONTENTS_LEVELS: Final = 12.0
+SHADED: Final = np.array((0.5, 1.0, 1.0), np.float32)
+"""Weights of a colour in a container, whose walls shade its bottom."""
+LEAST_SLOPE: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,10 +76,13 @@ class PlaneDepth:
     def __init__(self, reach: Reach, things: Sequence[KnownThing]) -> None:
         self._reach = reach
         self._forms = [KnownForm(thing) for thing in things]
+        self._plane: _PlaneView | None = None
 
     def of(self, image: PosedImage) -> TableImage:
         """Return an image with depth; its own depth is not looked at."""
-        plane = _PlaneView.of(image)
+        if self._plane is None or not self._plane.is_of(image):
+            self._plane = _PlaneView.of(image)  # the same for all images of a camera that stands
+        plane = self._plane
         near = self._within(plane, COLOUR_MARGIN_M)
         fault = _pose_fault(plane, near)
         if fault:
@@ -94,12 +101,10 @@ class PlaneDepth:
         scene = _Drawing(image, plane, lab, self._within(plane, THING_MARGIN_M))
         for blob in _blobs(table.is_foreign(lab) & scene.looked_at & ~image.body):
             self._add(blob, scene)
-        return TableImage(
-            image=replace(image, depth_m=scene.depth_m), sights=tuple(scene.sights)
-        )
+        return TableImage(image=replace(image, depth_m=scene.depth_m), sights=tuple(scene.sights))
 
     def _within(self, plane: "_PlaneView", margin_m: float) -> Mask:
-        x, y = plane.table_xy[..., 0], plane.table_xy[..., 1]
+        x, y = plane.x_m, plane.y_m
         reach = self._reach
         within: Mask = np.hypot(x, y) <= max(reach.distances_m) + margin_m
         within &= (np.abs(y) <= reach.most_aside_m + margin_m) & (x > reach.least_ahead_m)
@@ -147,13 +152,15 @@ class PlaneDepth:
 class _PlaneView:
     """Hold the ray of each pixel in the base frame, and where it meets the table.
 
-    `rays` are (h, w, 3) per unit of depth, `camera` (3,) is where they begin.
+    `rays` are (h, w, 3) per unit of depth.
     """
 
-    camera: Array
+    lens: Intrinsics
+    base_from_camera: Array
     rays: Array
     hits: Mask
-    table_xy: Array
+    x_m: Array
+    y_m: Array
 
     @classmethod
     def of(cls, image: PosedImage) -> "_PlaneView":
@@ -161,12 +168,27 @@ class _PlaneView:
         ahead = np.concatenate((flat, np.ones((*flat.shape[:2], 1))), axis=2)
         rays = ahead @ image.base_from_camera[:3, :3].T
         camera = image.base_from_camera[:3, 3]
-        hits = rays[..., 2] < -1e-6
+        hits = rays[..., 2] < -LEAST_SLOPE
         depth = np.where(hits, -camera[2] / np.where(hits, rays[..., 2], -1.0), 0.0)
-        hits &= depth > 0.0
         return cls(
-            camera=camera, rays=rays, hits=hits, table_xy=camera[:2] + rays[..., :2] * depth[..., None]
+            lens=image.camera,
+            base_from_camera=image.base_from_camera,
+            rays=rays,
+            hits=hits & (depth > 0.0),
+            x_m=camera[0] + rays[..., 0] * depth,
+            y_m=camera[1] + rays[..., 1] * depth,
         )
+
+    @property
+    def camera(self) -> Array:
+        """Return where the rays begin (3,)."""
+        position: Array = self.base_from_camera[:3, 3]
+        return position
+
+    def is_of(self, image: PosedImage) -> bool:
+        """Return whether an image was taken from the same place with the same lens."""
+        same_lens = self.lens == image.camera
+        return same_lens and np.array_equal(self.base_from_camera, image.base_from_camera)
 
     def depth_to(self, height_m: float, at: Mask) -> Array:
         """Return the depth at which some pixels' rays are at a height."""
@@ -210,7 +232,8 @@ class _Drawing:
         )
         contour = max(contours, key=len).reshape(-1, 2)
         filled = cv2.contourArea(contour) / max(1.0, cv2.contourArea(cv2.convexHull(contour)))
-        xy = self.plane.table_xy[contour[:, 1], contour[:, 0]]
+        at = (contour[:, 1], contour[:, 0])
+        xy = np.column_stack((self.plane.x_m[at], self.plane.y_m[at]))
         middle = xy.mean(axis=0)
         hull = cv2.convexHull(((xy - middle) * 1000.0).astype(np.float32)).reshape(-1, 2)
         return hull.astype(np.float64) / 1000.0 + middle, filled
@@ -219,9 +242,9 @@ class _Drawing:
         """Draw a known thing: for each pixel where its ray meets it first, from above."""
         middle = np.array((pose.x_m, pose.y_m))
         outline = form.outline(pose.x_m, pose.y_m, pose.yaw_rad, self.plane.camera)
-        reach_m = float(np.linalg.norm(outline - middle, axis=1).max())
-        at = np.linalg.norm(self.plane.table_xy - middle, axis=-1) <= reach_m
-        at &= self.looked_at
+        (x_min, y_min), (x_max, y_max) = outline.min(axis=0), outline.max(axis=0)
+        x, y = self.plane.x_m, self.plane.y_m
+        at = self.looked_at & (x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)
         rays, cosine, sine = self.plane.rays[at], math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
         turn = np.array(((cosine, -sine), (sine, cosine)))
         first = np.zeros(len(rays))
@@ -240,8 +263,8 @@ class _Drawing:
 
     def _hide_contents(self, container: Mask) -> None:
         """Say nothing of what has another colour in a container: its height there is not known."""
-        own = np.median(self._lab[container], axis=0)
-        other = container & (np.linalg.norm(self._lab - own, axis=-1) > CONTENTS_LEVELS)
+        off = (self._lab - np.median(self._lab[container], axis=0)) * SHADED
+        other = container & (np.einsum("hwc,hwc->hw", off, off) > CONTENTS_LEVELS**2)
         speckless = cv2.medianBlur(other.astype(np.uint8), 3) > 0
         self.depth_m[_grown(speckless, 1)] = 0.0
 
@@ -276,7 +299,8 @@ def _parts_by_colour(blob: Mask, rgb: NDArray[np.uint8]) -> Iterator[Mask]:
 
 def _grown(mask: Mask, by_px: int) -> Mask:
     kernel = np.ones((2 * by_px + 1, 2 * by_px + 1), dtype=np.uint8)
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
+    grown: Mask = cv2.dilate(mask.astype(np.uint8), kernel) > 0
+    return grown
 
 
 def _box(mask: Mask) -> tuple[int, int, int, int]:

@@ -1,6 +1,7 @@
 """Learn the colour of a table from an image in which it is what is seen most."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import cv2
@@ -8,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.perception.geometry.cloud import Floats, Mask
-
-Array = NDArray[np.float64]
 
 # A shadow changes the lightness (0..100) more than the colour.
 LIGHTNESS_WEIGHT: Final = 0.5
@@ -22,6 +21,7 @@ _SIGMA_OF_MEDIAN: Final = 1.0 / 1.1774
 """The deviation of each of two like channels over the median distance (Rayleigh)."""
 ROUNDS: Final = 3
 SAMPLES: Final = 4000
+SIZES_KEPT: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +32,7 @@ class TableColour:
     `limit` is not table. `ratio` is the share of the learned pixels that are.
     """
 
-    weights: Array
+    weights: Floats
     limit: float
     ratio: float
 
@@ -41,15 +41,17 @@ class TableColour:
         """Learn from some pixels of an image by `to_lab`; with none of them the ratio is 0."""
         places = np.flatnonzero(where)
         if not places.size:
-            return cls(weights=np.zeros((6, 3)), limit=0.0, ratio=0.0)
+            return cls(weights=np.zeros((6, 3), np.float32), limit=0.0, ratio=0.0)
         places = places[:: max(1, places.size // SAMPLES)]
-        colours = lab.reshape(-1, 3)[places].astype(np.float64)
-        terms = _terms(where.shape)[places]
+        colours = lab.reshape(-1, 3)[places]
+        terms = _terms(*where.shape)[places]
         limit = SEED_LEVELS
         near = np.linalg.norm(colours - _commonest(colours), axis=1) <= limit
-        weights = np.zeros((6, 3))
+        weights = np.zeros((6, 3), np.float32)
         for _ in range(ROUNDS):
-            weights = np.linalg.lstsq(terms[near], colours[near], rcond=None)[0]
+            known = terms[near].astype(np.float64)
+            weights = np.linalg.lstsq(known.T @ known, known.T @ colours[near], rcond=None)[0]
+            weights = weights.astype(np.float32)
             off = np.linalg.norm(colours - terms @ weights, axis=1)
             sigma = _SIGMA_OF_MEDIAN * float(np.median(off[near]))
             limit = float(np.clip(SIGMAS * sigma, LEAST_LIMIT, MOST_LIMIT))
@@ -60,8 +62,8 @@ class TableColour:
 
     def is_foreign(self, lab: Floats) -> Mask:
         """Return which pixels of an image by `to_lab` have another colour."""
-        expected = (_terms(lab.shape[:2]) @ self.weights).reshape(lab.shape)
-        foreign: Mask = np.linalg.norm(lab - expected, axis=-1) > self.limit
+        off = lab - (_terms(*lab.shape[:2]) @ self.weights).reshape(lab.shape)
+        foreign: Mask = np.einsum("hwc,hwc->hw", off, off) > self.limit**2
         return foreign
 
 
@@ -72,17 +74,20 @@ def to_lab(rgb: NDArray[np.uint8]) -> Floats:
     return lab
 
 
-def _commonest(colours: Array) -> Array:
-    bins = np.floor(colours / BIN_LEVELS).astype(np.int64)
-    _, numbers, counts = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
-    commonest: Array = np.median(colours[numbers.reshape(-1) == int(np.argmax(counts))], axis=0)
+def _commonest(colours: Floats) -> Floats:
+    bins = np.floor(colours / BIN_LEVELS).astype(np.int64) @ (1 << 16, 1 << 8, 1)
+    _, numbers, counts = np.unique(bins, return_inverse=True, return_counts=True)
+    commonest: Floats = np.median(colours[numbers == int(np.argmax(counts))], axis=0)
     return commonest
 
 
-def _terms(shape: tuple[int, ...]) -> Array:
+@lru_cache(maxsize=SIZES_KEPT)
+def _terms(height: int, width: int) -> Floats:
     """Return the terms (h * w, 6) of a quadratic over an image, from -1 to 1."""
     down, across = np.meshgrid(
-        np.linspace(-1.0, 1.0, shape[0]), np.linspace(-1.0, 1.0, shape[1]), indexing="ij"
+        np.linspace(-1.0, 1.0, height, dtype=np.float32),
+        np.linspace(-1.0, 1.0, width, dtype=np.float32),
+        indexing="ij",
     )
     u, v = across.ravel(), down.ravel()
     return np.column_stack((np.ones_like(u), u, v, u * u, u * v, v * v))

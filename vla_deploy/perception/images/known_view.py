@@ -25,8 +25,7 @@ def with_known(network: NetworkView | None, sights: Sequence[KnownSight]) -> Net
             classes=np.arange(len(sights)),
         ),
         reliabilities=tuple(
-            ClassReliability(class_name=one.class_name, precision=KNOWN_PRECISION)
-            for one in sights
+            ClassReliability(class_name=one.class_name, precision=KNOWN_PRECISION) for one in sights
         ),
     )
     return known if network is None else network.joined(known)

@@ -29,6 +29,7 @@ from vla_deploy.skills.movements.motion import pause
 from vla_deploy.skills.movements.neighbours import crowding_m
 from vla_deploy.skills.movements.swing import heights_above
 from vla_deploy.world import Query
+from vla_deploy.world.vocabulary import ANY_CLASS
 
 FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
@@ -163,10 +164,16 @@ def _choose(
     Raises:
         TryAgain: the object is out of sight.
         OutOfReach: no hand gets there.
+        NotPossible: its size is not known, or no hand opens so far.
     """
     seen = kept_in_sight(context, query)
     pose = context.link.pose
     centre = to_base(pose, seen["position_m"])
+    if seen["class"] == ANY_CLASS and not context.robot.camera.has_depth:
+        raise NotPossible(
+            f"how high the object at {centre[0]:.2f}, {centre[1]:.2f} m is, is not known: the "
+            "camera has no depth, and no [[things]] of the robot file has its outline; add its size"
+        )
     yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad
     reasons: list[str] = []
     nearer_first = sorted(hands, key=lambda name: side_of(context, name) * centre[1] < 0.0)
