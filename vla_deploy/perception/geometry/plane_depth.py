@@ -37,6 +37,8 @@ MIN_PIXELS: Final = 20
 HIDDEN_PX: Final = 3
 LEAST_AGREEMENT: Final = 0.8
 """Of the outline of a thing with that of a known one; the rest is a pixel around the edge."""
+PART_AGREEMENT: Final = 0.88
+"""Of a thing that touches another one in the image, which may hide a part of it."""
 CLEAR_LEAD: Final = 0.03
 """Two forms that agree equally well and differ by more in height leave the height unknown."""
 SAME_HEIGHT_M: Final = 0.004
@@ -114,12 +116,12 @@ class PlaneDepth:
         if scene.is_cut_off(blob):
             scene.hide(blob)
             return
-        found = self._recognise(blob, scene)
+        found = self._recognise(blob, scene, LEAST_AGREEMENT)
         if found is not None:
             scene.draw(*found)
             return
         parts = list(_parts_by_colour(blob, scene.image.rgb))
-        fits = [self._recognise(part, scene) for part in parts]
+        fits = [self._recognise(part, scene, PART_AGREEMENT) for part in parts]
         if len(parts) > 1 and all(fits):
             for one in fits:
                 assert one is not None
@@ -127,14 +129,16 @@ class PlaneDepth:
         else:
             scene.raise_unknown(blob)
 
-    def _recognise(self, blob: Mask, scene: "_Drawing") -> tuple[KnownForm, FormPose] | None:
+    def _recognise(
+        self, blob: Mask, scene: "_Drawing", least: float
+    ) -> tuple[KnownForm, FormPose] | None:
         """Return the known form that an outline has, None where none or more than one fits."""
         seen, solidity = scene.outline_of(blob)
         if solidity < LEAST_SOLIDITY:
             return None
         camera = scene.plane.camera
         fits = [(form, form.find(seen, camera)) for form in self._forms]
-        fits = [one for one in fits if one[1].agreement >= LEAST_AGREEMENT]
+        fits = [one for one in fits if one[1].agreement >= least]
         fits.sort(key=lambda one: -one[1].agreement)
         if not fits:
             return None
@@ -294,7 +298,8 @@ def _parts_by_colour(blob: Mask, rgb: NDArray[np.uint8]) -> Iterator[Mask]:
     for name in np.flatnonzero(np.bincount(names) >= max(MIN_PIXELS, PART_SHARE * names.size)):
         part = np.zeros_like(blob)
         part[blob] = names == name
-        yield part
+        # Where two meet, pixels have a colour between them.
+        yield _grown(part, 1) & blob
 
 
 def _grown(mask: Mask, by_px: int) -> Mask:
