@@ -261,6 +261,10 @@ class _Drawing:
         drawn = np.zeros_like(at)
         drawn[at] = first > 0.0
         self.depth_m[drawn] = first[first > 0.0]
+        # A ray may pass an edge between two levels: the table behind would count as the thing's.
+        missed = (cv2.medianBlur(drawn.astype(np.uint8), 3) > 0) & ~drawn & self.looked_at
+        near = cv2.dilate(np.where(drawn, self.depth_m, 0.0).astype(np.float32), _kernel(1))
+        self.depth_m[missed] = near[missed]
         self.sights.append(KnownSight(class_name=form.thing.class_name, box_px=_box(drawn)))
         if form.is_hollow:
             self._hide_contents(drawn)
@@ -303,9 +307,12 @@ def _parts_by_colour(blob: Mask, rgb: NDArray[np.uint8]) -> Iterator[Mask]:
 
 
 def _grown(mask: Mask, by_px: int) -> Mask:
-    kernel = np.ones((2 * by_px + 1, 2 * by_px + 1), dtype=np.uint8)
-    grown: Mask = cv2.dilate(mask.astype(np.uint8), kernel) > 0
+    grown: Mask = cv2.dilate(mask.astype(np.uint8), _kernel(by_px)) > 0
     return grown
+
+
+def _kernel(by_px: int) -> NDArray[np.uint8]:
+    return np.ones((2 * by_px + 1, 2 * by_px + 1), dtype=np.uint8)
 
 
 def _box(mask: Mask) -> tuple[int, int, int, int]:
