@@ -42,6 +42,8 @@ PART_AGREEMENT: Final = 0.88
 CLEAR_LEAD: Final = 0.03
 """Two forms that agree equally well and differ by more in height leave the height unknown."""
 SAME_HEIGHT_M: Final = 0.004
+EDGE_RATIO: Final = 0.5
+"""Of the contrast of a thing with the table: an edge lies where half of a pixel is covered."""
 LEAST_SOLIDITY: Final = 0.8
 """Of an outline: the share of its hull that it fills."""
 PART_SHARE: Final = 0.15
@@ -53,6 +55,8 @@ CONTENTS_LEVELS: Final = 12.0
 SHADED: Final = np.array((0.5, 1.0, 1.0), np.float32)
 """Weights of a colour in a container, whose walls shade its bottom."""
 LEAST_SLOPE: Final = 1e-6
+
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,8 +105,10 @@ class PlaneDepth:
                 ),
             )
         scene = _Drawing(image, plane, lab, self._within(plane, THING_MARGIN_M))
-        for blob in _blobs(table.is_foreign(lab) & scene.looked_at & ~image.body):
-            self._add(blob, scene)
+        contrast = table.contrast(lab)
+        foreign = (contrast > table.limit) & scene.looked_at & ~image.body
+        for blob in _blobs(foreign):
+            self._add(_sharpened(blob, contrast), scene)
         return TableImage(image=replace(image, depth_m=scene.depth_m), sights=tuple(scene.sights))
 
     def _within(self, plane: "_PlaneView", margin_m: float) -> Mask:
@@ -194,6 +200,25 @@ class _PlaneView:
         same_lens = self.lens == image.camera
         return same_lens and np.array_equal(self.base_from_camera, image.base_from_camera)
 
+    def corners_of(self, rows: Indices, columns: Indices) -> Array:
+        """Return the corners (n, 2) on the table of some pixels, none of them at the border."""
+        ways = [(down, across) for down in (-1, 1) for across in (-1, 1)]
+        return np.vstack(
+            [
+                0.25
+                * sum(
+                    np.column_stack((self.x_m[at], self.y_m[at]))
+                    for at in (
+                        (rows, columns),
+                        (rows + down, columns),
+                        (rows, columns + across),
+                        (rows + down, columns + across),
+                    )
+                )
+                for down, across in ways
+            ]
+        )
+
     def depth_to(self, height_m: float, at: Mask) -> Array:
         """Return the depth at which some pixels' rays are at a height."""
         depth: Array = (height_m - self.camera[2]) / self.rays[at][:, 2]
@@ -236,8 +261,7 @@ class _Drawing:
         )
         contour = max(contours, key=len).reshape(-1, 2)
         filled = cv2.contourArea(contour) / max(1.0, cv2.contourArea(cv2.convexHull(contour)))
-        at = (contour[:, 1], contour[:, 0])
-        xy = np.column_stack((self.plane.x_m[at], self.plane.y_m[at]))
+        xy = self.plane.corners_of(contour[:, 1], contour[:, 0])
         middle = xy.mean(axis=0)
         hull = cv2.convexHull(((xy - middle) * 1000.0).astype(np.float32)).reshape(-1, 2)
         return hull.astype(np.float64) / 1000.0 + middle, filled
@@ -294,6 +318,12 @@ def _blobs(foreign: Mask) -> Iterator[Mask]:
     for number in range(1, count):
         if stats[number, cv2.CC_STAT_AREA] >= MIN_PIXELS:
             yield labels == number
+
+
+def _sharpened(blob: Mask, contrast: Floats) -> Mask:
+    """Return a blob without its fringe: lens and compression spread colours over the edge."""
+    inner: Mask = blob & (contrast > EDGE_RATIO * float(np.median(contrast[blob])))
+    return inner
 
 
 def _parts_by_colour(blob: Mask, rgb: NDArray[np.uint8]) -> Iterator[Mask]:

@@ -60,11 +60,11 @@ class TableColour:
                 break
         return cls(weights=weights, limit=limit, ratio=float(near.mean()))
 
-    def is_foreign(self, lab: Floats) -> Mask:
-        """Return which pixels of an image by `to_lab` have another colour."""
+    def contrast(self, lab: Floats) -> Floats:
+        """Return how far each pixel of an image by `to_lab` is from the table's colour there."""
         off = lab - (_terms(*lab.shape[:2]) @ self.weights).reshape(lab.shape)
-        foreign: Mask = np.einsum("hwc,hwc->hw", off, off) > self.limit**2
-        return foreign
+        contrast: Floats = np.sqrt(np.einsum("hwc,hwc->hw", off, off))
+        return contrast
 
 
 def to_lab(rgb: NDArray[np.uint8]) -> Floats:
