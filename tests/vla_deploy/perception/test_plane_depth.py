@@ -57,6 +57,7 @@ size_m = [0.10, 0.10, 0.041]
 """
 BLOCK = KnownThing(class_name="block", size_m=(0.025, 0.025, 0.025))
 BOWL = KnownThing(class_name="bowl", size_m=(0.10, 0.10, 0.041))
+POST = KnownThing(class_name="bottle", size_m=(0.025, 0.025, 0.6))
 TILE = KnownThing(class_name="tile", size_m=(0.0255, 0.0255, 0.0125))
 THINGS = {"red_block": ("block", "red"), "blue_block": ("block", "blue"), "bowl": ("bowl", "white")}
 
@@ -218,10 +219,12 @@ def test_noise_shade_and_compression_change_little(table: StillTable) -> None:
     [
         ((BOWL,), [("bowl", "white"), ("object", "blue"), ("object", "red")]),
         ((BLOCK,), [("block", "blue"), ("block", "red"), ("object", "white")]),
+        # Higher than the camera: it is none of what is seen.
+        ((BLOCK, POST), [("block", "blue"), ("block", "red"), ("object", "white")]),
         # Seen from above, a lower and a little wider tile looks the same; aside, its side is lower.
         ((BLOCK, TILE), [("block", "red"), ("object", "blue"), ("object", "white")]),
     ],
-    ids=["no block", "no bowl", "two heights fit"],
+    ids=["no block", "no bowl", "too high", "two heights fit"],
 )
 def test_what_no_size_explains_is_an_object(
     table: StillTable, things: tuple[KnownThing, ...], expected: list[tuple[str, str]]

@@ -29,6 +29,8 @@ from vla_deploy.robots.reach import Reach
 COLOUR_MARGIN_M: Final = 0.06
 THING_MARGIN_M: Final = 0.16
 LEAST_CAMERA_HEIGHT_M: Final = 0.2
+MOST_HEIGHT_RATIO: Final = 0.7
+"""Of the camera's height: what is higher is too near to it."""
 LEAST_VIEW_RATIO: Final = 0.1
 """Share of the image that must show the reach."""
 LEAST_TABLE_RATIO: Final = 0.5
@@ -95,15 +97,12 @@ class PlaneDepth:
             return TableImage(image=image, faults=(fault,))
         lab = to_lab(image.rgb)
         table = TableColour.of(lab, near & ~image.body)
-        ratio = table.ratio
-        if ratio < LEAST_TABLE_RATIO:
-            return TableImage(
-                image=image,
-                faults=(
-                    f"table covered: {ratio:.2f} of the reach has the table's colour, least "
-                    f"{LEAST_TABLE_RATIO:g} (clear the table)",
-                ),
+        if table.ratio < LEAST_TABLE_RATIO:
+            fault = (
+                f"table covered: {table.ratio:.2f} of the reach has the table's colour, least "
+                f"{LEAST_TABLE_RATIO:g} (clear the table)"
             )
+            return TableImage(image=image, faults=(fault,))
         scene = _Drawing(image, plane, lab, self._within(plane, THING_MARGIN_M))
         contrast = table.contrast(lab)
         foreign = (contrast > table.limit) & scene.looked_at & ~image.body
@@ -143,19 +142,19 @@ class PlaneDepth:
         if solidity < LEAST_SOLIDITY:
             return None
         camera = scene.plane.camera
-        fits = [(form, form.find(seen, camera)) for form in self._forms]
+        low = (one for one in self._forms if one.height_m < MOST_HEIGHT_RATIO * camera[2])
+        fits = [(form, form.find(seen, camera)) for form in low]
         fits = [one for one in fits if one[1].agreement >= least]
         fits.sort(key=lambda one: -one[1].agreement)
         if not fits:
             return None
         form, pose = fits[0]
-        doubts = (
-            other
-            for other, fit in fits[1:]
-            if fit.agreement > pose.agreement - CLEAR_LEAD
+        is_doubtful = any(
+            fit.agreement > pose.agreement - CLEAR_LEAD
             and abs(other.height_m - form.height_m) > SAME_HEIGHT_M
+            for other, fit in fits[1:]
         )
-        return None if any(True for _ in doubts) else (form, pose)
+        return None if is_doubtful else (form, pose)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,22 +201,15 @@ class _PlaneView:
 
     def corners_of(self, rows: Indices, columns: Indices) -> Array:
         """Return the corners (n, 2) on the table of some pixels, none of them at the border."""
-        ways = [(down, across) for down in (-1, 1) for across in (-1, 1)]
         return np.vstack(
-            [
-                0.25
-                * sum(
-                    np.column_stack((self.x_m[at], self.y_m[at]))
-                    for at in (
-                        (rows, columns),
-                        (rows + down, columns),
-                        (rows, columns + across),
-                        (rows + down, columns + across),
-                    )
-                )
-                for down, across in ways
-            ]
+            [self._between(rows, columns, down, across) for down in (-1, 1) for across in (-1, 1)]
         )
+
+    def _between(self, rows: Indices, columns: Indices, down: int, across: int) -> Array:
+        """Return the middle (n, 2) of pixels and the three next to one of their corners."""
+        beside, above = columns + across, rows + down
+        at = np.stack((rows, above, rows, above)), np.stack((columns, columns, beside, beside))
+        return np.column_stack((self.x_m[at].mean(axis=0), self.y_m[at].mean(axis=0)))
 
     def depth_to(self, height_m: float, at: Mask) -> Array:
         """Return the depth at which some pixels' rays are at a height."""
