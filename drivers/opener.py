@@ -38,6 +38,14 @@ class DeviceOpener(Protocol):
         """
         ...
 
+    def video(self, name: str) -> ByteTransport | str:
+        """Return a video device's path, or open the stream that stands in its place.
+
+        Raises:
+            DeviceMissing: nothing serves the stream.
+        """
+        ...
+
     def can(self, name: str) -> can.BusABC:
         """Open a CAN bus.
 
@@ -97,6 +105,15 @@ class PathOpener:
             DeviceMissing: nothing serves it, or the robot file does not name it.
         """
         return SocketStream(Path(self._link(name).path), self._clock)
+
+    def video(self, name: str) -> ByteTransport | str:
+        """Return a video device's path, or open the stream where the path is a socket's.
+
+        Raises:
+            DeviceMissing: nothing serves the stream, or the robot file does not name it.
+        """
+        path = Path(self._link(name).path)
+        return SocketStream(path, self._clock) if path.is_socket() else str(path)
 
     def can(self, name: str) -> can.BusABC:
         """Open a CAN bus: a SocketCAN interface, or a hub where the path is one of the file system.

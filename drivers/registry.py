@@ -12,6 +12,7 @@ from typing import Any, Final, cast
 
 from drivers.base import ByteTransport
 from drivers.camera.base import Camera, RgbdFrame
+from drivers.camera.protocol import Intrinsics
 from drivers.clock import Clock
 from drivers.errors import UnknownModel
 from drivers.imu.base import Imu
@@ -28,17 +29,25 @@ class SensorKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Say which class drives a model ("module:Class"); `baud` is 0 where no serial line is used."""
+    """Say which class drives a model ("module:Class"); `baud` is 0 where no serial line is used.
+
+    `has_depth` is of cameras: whether their images come with depth.
+    """
 
     driver: str
     baud: int = 0
+    has_depth: bool = True
 
 
+RGBD_STREAM: Final = "RGBD-STREAM"
 MODELS: Final[Mapping[tuple[SensorKind, str], SensorModel]] = MappingProxyType(
     {
         (SensorKind.LIDAR, "LD19"): SensorModel("drivers.lidar.ld19:Ld19", 230_400),
         (SensorKind.IMU, "BNO085-RVC"): SensorModel("drivers.imu.bno085_rvc:Bno085Rvc", 115_200),
-        (SensorKind.CAMERA, "RGBD-STREAM"): SensorModel("drivers.camera.rgbd_stream:RgbdCamera"),
+        (SensorKind.CAMERA, RGBD_STREAM): SensorModel("drivers.camera.rgbd_stream:RgbdCamera"),
+        (SensorKind.CAMERA, "V4L2"): SensorModel(
+            "drivers.camera.colour_only:ColourOnlyCamera", has_depth=False
+        ),
     }
 )
 
@@ -85,16 +94,30 @@ def open_imu(model: str, line: ByteTransport, clock: Clock) -> Imu:
 
 
 def open_camera(
-    model: str, stream: ByteTransport, clock: Clock, *, rate_hz: float
+    model: str,
+    source: ByteTransport | str,
+    clock: Clock,
+    *,
+    rate_hz: float,
+    pinhole: Intrinsics | None = None,
 ) -> Camera[RgbdFrame]:
-    """Return the driver of an RGB-D camera, streaming at `rate_hz`.
+    """Return the driver of a camera; the depth of one that measures none is 0 everywhere.
+
+    `source` is a stream of `drivers/camera/protocol.py`, which then sends at `rate_hz`, or the path
+    of a video device, which sends at its own rate and has the lens `pinhole`.
 
     Raises:
         UnknownModel: no driver knows the model.
-        ValueError: the camera cannot have that rate.
+        ValueError: the camera cannot have that rate, or the lens of a video device is not given.
         LinkLost: the stream has gone.
     """
-    camera = _driver(SensorKind.CAMERA, model)(stream, clock)
+    sensor_model(SensorKind.CAMERA, model)
+    if isinstance(source, str):
+        if pinhole is None:
+            raise ValueError(f"camera {source}: expected a lens (`pinhole`), got None; give one")
+        return cast("Camera[RgbdFrame]", _driver(SensorKind.CAMERA, model)(source, clock, pinhole))
+    # A stream in the place of a video device speaks the one protocol that streams have.
+    camera = _driver(SensorKind.CAMERA, RGBD_STREAM)(source, clock)
     camera.start(rate_hz)
     return cast("Camera[RgbdFrame]", camera)
 

@@ -58,6 +58,14 @@ class RecordingOpener:
         """
         return self._opener.stream(name)
 
+    def video(self, name: str) -> ByteTransport | str:
+        """Return a video device, or the stream in its place; it is not recorded.
+
+        Raises:
+            DeviceMissing: nothing serves the stream.
+        """
+        return self._opener.video(name)
+
     def can(self, name: str) -> can.BusABC:
         """Open a CAN bus and record it.
 

@@ -115,6 +115,10 @@ class TestCamera(RgbdCameraContract):
         wired, devices = hardware.robot.camera, hardware.devices
         return HardwareBench(
             lambda clock: registry.open_camera(
-                wired.model, devices.stream(wired.device), clock, rate_hz=CAMERA_HZ
+                wired.model,
+                devices.stream(wired.device) if wired.has_depth else devices.video(wired.device),
+                clock,
+                rate_hz=CAMERA_HZ,
+                pinhole=wired.pinhole,
             )
         )

@@ -156,6 +156,14 @@ class MemoryOpener:
         self._expect(name, self._twin.robot.camera.device)
         return self._plugged(name, self._twin.camera_line)
 
+    def video(self, name: str) -> MemoryLine:
+        """Open the camera's stream in the place of a video device.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        return self.stream(name)
+
     def can(self, name: str) -> can.BusABC:
         """Open the CAN bus.
 

@@ -46,7 +46,13 @@ class HeadCamera:
         self._view = fixed_camera(model, camera.site)
         self._renderer: Renderer | None = None
         _check_fovy(model, camera)
-        self.device = CameraDevice(self.render, camera.pinhole, latency_s=latency_s, seed=seed)
+        self.device = CameraDevice(
+            self.render,
+            camera.pinhole,
+            latency_s=latency_s,
+            seed=seed,
+            has_depth=camera.has_depth,
+        )
 
     def open(self) -> None:
         """Open OpenGL now rather than at the first frame.

@@ -31,7 +31,8 @@ class CameraDevice:
 
     Depth noise has sigma = `depth_sigma_per_m` * z^2, as stereo cameras have; 0 switches it off.
     `latency_s` is the time from exposure to the first byte on the line. `depth_ratio` (told over
-    true depth) and `rate_ratio` (given over asked-for rate) may be changed at any time.
+    true depth) and `rate_ratio` (given over asked-for rate) may be changed at any time. The depth
+    of a camera that has none is 0 everywhere.
     """
 
     def __init__(
@@ -42,12 +43,14 @@ class CameraDevice:
         depth_sigma_per_m: float = DEPTH_SIGMA_PER_M,
         latency_s: float = 0.0,
         seed: int = 0,
+        has_depth: bool = True,
     ) -> None:
         self.depth_ratio = 1.0
         self.rate_ratio = 1.0
         self._render = render
         self._intrinsics = intrinsics
         self._sigma_per_m = depth_sigma_per_m
+        self._has_depth = has_depth
         self._latency_ns = round(latency_s * NS_PER_S)
         self._random = np.random.default_rng(seed)
         self._requests = bytearray()
@@ -121,6 +124,8 @@ class CameraDevice:
         return encode_header(header) + payload + CRC.pack(zlib.crc32(payload))
 
     def _quantised(self, depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
+        if not self._has_depth:
+            return np.zeros(depth_m.shape, dtype="<u2")
         seen = (depth_m >= MIN_DEPTH_M) & (depth_m <= MAX_DEPTH_M)
         noisy_m = depth_m
         if self._sigma_per_m:

@@ -83,6 +83,13 @@ def test_overrides_toml_and_every_key_of_ros(tmp_path: Path) -> None:
     assert set(ros) == set(ROS)
 
 
+def test_the_overrides_that_make_a_camera_a_webcam(tmp_path: Path) -> None:
+    ((text, _),) = shown("cameras")
+    folder = shutil.copytree(ROBOTS_DIR / "so101", tmp_path / "so101")
+    (folder / OVERRIDES_FILE).write_text(text)
+    assert not load_robot(folder).camera.has_depth
+
+
 def test_every_table_of_robot_toml_is_told() -> None:
     page = (DOCS / "robots.md").read_text(encoding="utf-8")
     assert [key for key in schema.ROBOT if f"`{key}`" not in page] == ["name", "mjcf"]

@@ -41,6 +41,8 @@ def test_the_models_are_driven_by_the_classes_of_their_names() -> None:
     assert isinstance(open_lidar("LD19", LINE, CLOCK), Ld19)
     assert isinstance(open_imu("BNO085-RVC", LINE, CLOCK), Bno085Rvc)
     assert isinstance(open_camera("RGBD-STREAM", LINE, CLOCK, rate_hz=5.0), RgbdCamera)
+    # A stream in the place of a video device, as the twin serves it.
+    assert isinstance(open_camera("V4L2", LINE, CLOCK, rate_hz=5.0), RgbdCamera)
     assert sensor_model(SensorKind.LIDAR, "LD19").baud == 230_400
     assert sensor_model(SensorKind.IMU, "BNO085-RVC").baud == 115_200
 

@@ -13,6 +13,7 @@ from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import BY_NAME, CellWriter, FrameWriter, SharedSpace, topics
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
+from vla_deploy.perception.geometry.plane_depth import PlaneDepth
 from vla_deploy.perception.images.detector_worker import (
     DetectorWorker,
     LoadedDetector,
@@ -84,7 +85,11 @@ class PerceptionNode:
         self._worker = DetectorWorker(executor, context.clock)
         furniture = furniture_points(robot.places)
         localiser, floor_m = self._pose_tracker.localiser, 0.0 if self._drives else None
-        self._pipeline = ImagePipeline(self._body, localiser, self._worker, furniture, floor_m)
+        has_depth = robot.camera.has_depth
+        plane_depth = None if has_depth else PlaneDepth(robot.reach, robot.things)
+        self._pipeline = ImagePipeline(
+            self._body, localiser, self._worker, furniture, floor_m, plane_depth
+        )
         self._restore_scene()
         self._rate_ratio = 1.0
         self._next_image_ns = 0

@@ -122,5 +122,11 @@ class Sensors:
 
     def _open_camera(self) -> Camera[RgbdFrame]:
         camera = self._robot.camera
-        stream = self._devices.stream(camera.device)
-        return registry.open_camera(camera.model, stream, self._clock, rate_hz=self._camera_rate_hz)
+        opens = self._devices.stream if camera.has_depth else self._devices.video
+        return registry.open_camera(
+            camera.model,
+            opens(camera.device),
+            self._clock,
+            rate_hz=self._camera_rate_hz,
+            pinhole=camera.pinhole,
+        )

@@ -1,4 +1,4 @@
-"""Describe a robot's RGB-D camera: what the robot file says of it, and what was calibrated."""
+"""Describe a robot's camera: what the robot file says of it, and what was calibrated."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from drivers.registry import SensorKind, sensor_model
 from vla_deploy.robots.kinematics.orientation import matrix
 
 
@@ -47,7 +48,7 @@ class CameraMounting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraDescription:
-    """Describe the RGB-D camera; `site` is its optical frame: x right, y down, z forward.
+    """Describe the camera; `site` is its optical frame: x right, y down, z forward.
 
     `lens` and `mounting` are what calibration measured; None means as the camera itself states,
     and as drawn in the MJCF.
@@ -62,6 +63,11 @@ class CameraDescription:
     fovy_rad: float
     lens: LensCalibration | None = None
     mounting: CameraMounting | None = None
+
+    @property
+    def has_depth(self) -> bool:
+        """Return whether its images come with depth."""
+        return sensor_model(SensorKind.CAMERA, self.model).has_depth
 
     @property
     def intrinsics(self) -> Intrinsics:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import UnknownModel
+from drivers.registry import SensorKind, model_names, sensor_model
 from drivers.servo.family import family_of
 from vla_deploy.robots.battery_settings import battery_is_usable
 from vla_deploy.runtime.table_schema import TableFault, is_number
@@ -294,6 +295,29 @@ def hands_that_see_reach(document: Document) -> Iterator[TableFault]:
                 yield TableFault(key=f"poses.{pose}", got=f"no {joint}", expected=f"it, for {key}")
 
 
+def cameras_without_depth_stand_still(document: Document) -> Iterator[TableFault]:
+    """A camera without depth is a mounted robot's, whose hands take things of known sizes."""
+    model = table(document, "camera").get("model")
+    if not isinstance(model, str) or model not in model_names(SensorKind.CAMERA):
+        return
+    if sensor_model(SensorKind.CAMERA, model).has_depth:
+        return
+    if "base" in document or "head" in document:
+        yield TableFault(
+            key="camera.model",
+            got=f"{model!r}, a camera without depth, on a robot with a base or a head",
+            expected="a camera with depth; only one that stands fixed over the table of a mounted "
+            "robot can do without",
+        )
+    if "hands" in document and not rows(document, "things"):
+        yield TableFault(
+            key="things",
+            got="nothing",
+            expected="a [[things]] table with class and size_m for each kind to take: a camera "
+            "without depth places things by their sizes",
+        )
+
+
 def head_turns_by_servos(document: Document) -> Iterator[TableFault]:
     """The joints of the head are servos', and it has a camera to turn."""
     head, joints = table(document, "head"), _joints(_servos(document))
@@ -366,6 +390,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     groups_cover_joints,
     hands_name_groups,
     hands_that_see_reach,
+    cameras_without_depth_stand_still,
     head_turns_by_servos,
     poses_are_reachable,
     places_are_distinct,

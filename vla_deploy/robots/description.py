@@ -25,6 +25,7 @@ from vla_deploy.robots.devices import (
 from vla_deploy.robots.errors import PartMissing
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
+from vla_deploy.robots.known_things import KnownThing
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.reach import Reach
@@ -210,6 +211,8 @@ class RobotDescription:
     twin: TwinSettings = USUAL_TWIN
     devices: Mapping[str, HomeDevice] = field(default_factory=dict)
     """What the robot switches in its home, by name."""
+    things: tuple[KnownThing, ...] = ()
+    """What it knows the size of."""
 
     @property
     def base(self) -> BaseGeometry:

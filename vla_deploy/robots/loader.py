@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from xml.etree import ElementTree
 
 from platforms.profile_source import merged
-from vla_deploy.robots import home_devices, protection_schema, schema, supplies
+from vla_deploy.robots import home_devices, known_things, protection_schema, schema, supplies
 from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
@@ -81,6 +81,7 @@ SHAPES: Mapping[str, Shape] = {
     "home.places.*.viewpoints": schema.FLOOR_POSE,
     "home.zones": schema.ZONE,
     "planning": schema.PLANNING,
+    "things": known_things.THING,
     "zones.*": protection_schema.ZONE,
     "workspace.*": protection_schema.WORKSPACE,
     "clearance": protection_schema.CLEARANCE,
@@ -227,6 +228,7 @@ def _build(
         planning=build(PlanBounds, document.get("planning", {})),
         twin=TwinSettings(**document.get("twin", {})),
         broker=_broker(document.get("mqtt"), directory),
+        things=known_things.read_things(document.get("things", [])),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},
     )
 

@@ -56,6 +56,7 @@ ROBOT: Shape = {
     "battery": TABLE.optional,
     "mqtt": TABLE.optional,
     "devices": TABLES.optional,
+    "things": TABLES.optional,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE.optional,

@@ -17,9 +17,11 @@ import pytest
 
 from drivers.camera.base import ColourFrame, StampSource
 from drivers.camera.capture import CaptureRequest, open_capture
+from drivers.camera.protocol import Intrinsics
 from drivers.camera.v4l2 import VideoCamera
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import DeviceMissing, DriverError, LinkLost, WrongDevice
+from drivers.registry import open_camera
 from drivers.reopening import Reopening
 from sim_twin.contracts.bench import HardwareBench
 from sim_twin.contracts.camera import ColourCameraContract
@@ -113,6 +115,20 @@ def test_a_file_gives_its_images_in_red_green_blue_and_reports_its_end(film: Pat
     assert green == pytest.approx(2 * (FRAMES - 1), abs=8)
     assert blue < 10
     camera.close()
+
+
+def test_the_registry_opens_a_device_as_a_camera_without_depth(film: Path) -> None:
+    lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=60.0, fy=60.0, cx=31.5, cy=23.5)
+    camera = open_camera("V4L2", str(film), CLOCK, rate_hz=5.0, pinhole=lens)
+    frame = until(camera.poll)
+    assert frame.rgb.shape == (HEIGHT, WIDTH, 3)
+    assert frame.depth.shape == (HEIGHT, WIDTH)
+    assert not frame.depth_m().any()
+    assert (frame.intrinsics, frame.stamp_source) == (lens, StampSource.ARRIVAL)
+    assert camera.counters.frames > 0
+    camera.close()
+    with pytest.raises(ValueError, match="expected a lens"):
+        open_camera("V4L2", str(film), CLOCK, rate_hz=5.0)
 
 
 def test_the_granted_format_is_reported(film: Path) -> None:

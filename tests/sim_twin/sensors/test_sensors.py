@@ -240,6 +240,12 @@ def test_the_camera_renders_only_when_asked() -> None:
     assert scenery.renders == 0
 
 
+def test_a_camera_without_depth_sends_colours_alone() -> None:
+    frames, _, _ = run_camera(1.0, 5.0, has_depth=False)
+    assert [int(one.rgb[0, 0, 0]) for one in frames] == list(range(1, len(frames) + 1))
+    assert not any(one.depth.any() for one in frames)
+
+
 def test_the_camera_keeps_the_asked_rate() -> None:
     frames, scenery, _ = run_camera(2.0, 5.0)
     assert len(frames) == scenery.renders == 10

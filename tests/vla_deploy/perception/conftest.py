@@ -195,6 +195,9 @@ class Rig:
     def serial(self, name: str) -> MemoryLine:
         return self.lines[name]
 
+    def video(self, name: str) -> MemoryLine:
+        return self.lines[name]
+
     def stream(self, name: str) -> MemoryLine:
         return self.lines[name]
 

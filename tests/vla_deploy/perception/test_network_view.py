@@ -47,6 +47,19 @@ def test_a_place_has_a_word_of_each_class_that_fills_the_same_box_the_surest_fir
     assert seen.votes_for((60, 10, 90, 40)) == []
 
 
+def test_views_that_are_joined_vote_side_by_side() -> None:
+    known = view(
+        ((10, 10, 30, 40), 1.0, 0),
+        reliabilities=(ClassReliability(class_name="block", precision=0.9),),
+    )
+    both = view(((12, 10, 30, 40), 0.8, 0), reliabilities=MEASURED).joined(known)
+    votes = both.votes_for((10, 10, 30, 40))
+    assert votes == [
+        ClassVote(class_name="block", chance=0.9),
+        ClassVote(class_name="cup", chance=0.7),
+    ]
+
+
 def test_an_image_in_which_nothing_was_found_has_no_word() -> None:
     assert view(reliabilities=UNMEASURED).votes_for((0, 0, 20, 20)) == []
 

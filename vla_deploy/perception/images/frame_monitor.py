@@ -70,10 +70,12 @@ class FrameMonitor:
 
     `_unmoved` is the first of the images that show the same; `_repeated` the first of those that
     share too many rows of colour to the bit. What a robot at rest sees may well be the same, so
-    both count only once the camera has moved.
+    both count only once the camera has moved. Images of a camera that measures no depth are not
+    judged by it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, has_depth: bool = True) -> None:
+        self._has_depth = has_depth
         self._before: tuple[RgbdFrame, ...] = ()
         self._unmoved: tuple[FrameSignature, ViewChange] | None = None
         self._repeated: tuple[FrameSignature, ViewChange] | None = None
@@ -104,9 +106,16 @@ class FrameMonitor:
             stale_colour_ratio=self._stale_colour_ratio(signature, view),
             unmoved_rad=self._unmoved_rad(signature, view),
         )
+        if not self._has_depth:
+            statistics = replace(statistics, hole_ratio=0.0)
         self._verdict = judge_frame(statistics)
         self._refused += self._verdict.use is ImageUse.NOTHING
         return self._verdict
+
+    def refuse(self, faults: tuple[str, ...]) -> None:
+        """Record why the image that was judged last is good for nothing after all."""
+        self._verdict = ImageVerdict(use=ImageUse.NOTHING, faults=faults)
+        self._refused += 1
 
     def document(self, now_ns: int) -> ImageStatus:
         """Return the verdict on the last image, or that none arrives, for the scene topic."""

@@ -11,9 +11,11 @@ from vla_deploy.client.place_state import PlaceState
 from vla_deploy.ipc.payloads.scene import RobotPlace, SceneDocument
 from vla_deploy.perception.geometry.cloud import PosedImage, aim_sigma_rad
 from vla_deploy.perception.geometry.geometry_grid import GeometryGrid, geometry_grid
+from vla_deploy.perception.geometry.plane_depth import PlaneDepth, TableImage
 from vla_deploy.perception.images.detector_worker import DetectorWorker
 from vla_deploy.perception.images.frame_check import ImageUse
 from vla_deploy.perception.images.frame_monitor import FrameMonitor
+from vla_deploy.perception.images.known_view import with_known
 from vla_deploy.perception.images.network_view import as_pinhole, to_camera_image
 from vla_deploy.perception.objects.body_state import Array, BodyState
 from vla_deploy.perception.objects.near_obstacles import NearObstacles
@@ -52,7 +54,8 @@ class BasePose(Protocol):
 class ImagePipeline:
     """Turn images into obstacles and a scene; one image at a time waits for the detector.
 
-    The floor is `floor_m` high in the base frame, None where the robot does not stand on it.
+    The floor is `floor_m` high in the base frame, None where the robot does not stand on it. With
+    `plane_depth`, images come without depth and get it from there.
     """
 
     def __init__(
@@ -62,14 +65,16 @@ class ImagePipeline:
         worker: DetectorWorker,
         furniture: Mapping[str, Point],
         floor_m: float | None = 0.0,
+        plane_depth: PlaneDepth | None = None,
     ) -> None:
         self.scene = Scene(furniture, floor_m)
         self.obstacles = NearObstacles()
         self._body = body
         self._localiser = localiser
         self._worker = worker
-        self._monitor = FrameMonitor()
-        self._waiting: tuple[PosedImage, GeometryGrid] | None = None
+        self._plane_depth = plane_depth
+        self._monitor = FrameMonitor(has_depth=plane_depth is None)
+        self._waiting: tuple[TableImage, GeometryGrid] | None = None
 
     def receive(self, frame: RgbdFrame, now_ns: int) -> None:
         """Record that an image has arrived, whether it is processed or not."""
@@ -88,13 +93,17 @@ class ImagePipeline:
             return False
         grid = geometry_grid(frame.intrinsics)
         turn_rad_s = self._camera_turn_rad_s(view, frame.stamp_ns)
-        image = self._posed(grid.frame(frame), positions, turn_rad_s)
+        seen = self._with_depth(self._posed(grid.frame(frame), positions, turn_rad_s))
+        if seen.faults:
+            self._monitor.refuse(seen.faults)
+            return False
+        image = seen.image
         hands = self._body.hands(positions, frame.stamp_ns)
         self.obstacles.update(image, [np.array(one.grip) for one in hands if one.hold.kind])
         # A pose that the lidar has not confirmed yet would put things where they never were.
         is_placed = turn_rad_s <= MAX_CAMERA_TURN_RAD_S and self._localiser.is_anchored
         if is_placed and verdict.use >= ImageUse.FORM and self._waiting is None:
-            self._waiting = (image, grid)
+            self._waiting = (seen, grid)
             if verdict.use >= ImageUse.ALL:
                 self._worker.ask(as_pinhole(frame))
         return True
@@ -104,8 +113,9 @@ class ImagePipeline:
         answer = self._worker.answer() if self._waiting is not None else None
         if self._waiting is None or answer is None:
             return False
-        (image, grid), self._waiting = self._waiting, None
-        self.scene.update(image, grid.view(to_camera_image(answer.view, grid.source)))
+        (seen, grid), self._waiting = self._waiting, None
+        network = grid.view(to_camera_image(answer.view, grid.source))
+        self.scene.update(seen.image, with_known(network, seen.sights))
         return True
 
     def move_held(self, positions: Array, now_ns: int) -> None:
@@ -129,6 +139,9 @@ class ImagePipeline:
             "image": self._monitor.document(now_ns),
             "away": away,
         }
+
+    def _with_depth(self, image: PosedImage) -> TableImage:
+        return TableImage(image=image) if self._plane_depth is None else self._plane_depth.of(image)
 
     def _posed(self, frame: RgbdFrame, positions: Array, turn_rad_s: float) -> PosedImage:
         return PosedImage(

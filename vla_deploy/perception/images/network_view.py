@@ -50,6 +50,19 @@ class NetworkView:
             sure_score=detection.score_threshold,
         )
 
+    def joined(self, other: "NetworkView") -> "NetworkView":
+        """Return a view with the boxes of another one, too."""
+        boxes, more = self.boxes, other.boxes
+        return replace(
+            self,
+            boxes=Boxes(
+                corners_px=np.concatenate((boxes.corners_px, more.corners_px)),
+                scores=np.concatenate((boxes.scores, more.scores)),
+                classes=np.concatenate((boxes.classes, more.classes + len(self.reliabilities))),
+            ),
+            reliabilities=(*self.reliabilities, *other.reliabilities),
+        )
+
     def at(self, corners_px: Floats) -> "NetworkView":
         """Return the same view with its boxes at other places."""
         return replace(self, boxes=replace(self.boxes, corners_px=corners_px))

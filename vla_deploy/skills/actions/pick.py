@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down, raised
 from vla_deploy.plans.knowledge import parse_object
+from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.actions.navigate import solve_near
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
@@ -29,6 +30,7 @@ from vla_deploy.skills.movements.motion import pause
 from vla_deploy.skills.movements.neighbours import crowding_m
 from vla_deploy.skills.movements.swing import heights_above
 from vla_deploy.world import Query
+from vla_deploy.world.vocabulary import ANY_CLASS
 
 FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
@@ -163,10 +165,12 @@ def _choose(
     Raises:
         TryAgain: the object is out of sight.
         OutOfReach: no hand gets there.
+        NotPossible: its size is not known, or no hand opens so far.
     """
     seen = kept_in_sight(context, query)
     pose = context.link.pose
     centre = to_base(pose, seen["position_m"])
+    require_known_height(context.robot, str(seen["class"]), centre)
     yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad
     reasons: list[str] = []
     nearer_first = sorted(hands, key=lambda name: side_of(context, name) * centre[1] < 0.0)
@@ -188,6 +192,19 @@ def _choose(
         f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
         f"{centre[2]:.2f} m is within reach: {reasons[0] if reasons else 'no grasp fits'}"
     )
+
+
+def require_known_height(robot: RobotDescription, kind: str, centre_m: Sequence[float]) -> None:
+    """Refuse what a camera without depth sees and cannot tell the height of.
+
+    Raises:
+        NotPossible: nothing of known size has its outline.
+    """
+    if kind == ANY_CLASS and not robot.camera.has_depth:
+        raise NotPossible(
+            f"how high the {kind} at {centre_m[0]:.2f}, {centre_m[1]:.2f} m is, is not known: the "
+            "camera has no depth, and no [[things]] of the robot file has its outline; add its size"
+        )
 
 
 def _plainest(
