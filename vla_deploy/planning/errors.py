@@ -25,13 +25,17 @@ class CommandUnreadable(PlanError):
 
 
 class NotUnderstood(PlanError):
-    """Say that no rule covers the command."""
+    """Say that no rule covers the command, and what a robot that `drives`, or not, understands."""
 
-    def __init__(self, text: str) -> None:
-        super().__init__(
-            f'I do not understand "{text}"; try: go to the kitchen, find the keys, '
-            "pick up the red cup and put it in the box, bring me the bottle, stop"
+    def __init__(self, text: str, *, drives: bool = True) -> None:
+        known = (
+            "go to the kitchen, find the keys, pick up the red cup and put it in the box, "
+            "bring me the bottle, stop"
+            if drives
+            else "find the red block, put the red block in the bowl, go to the ready pose, "
+            "open your hand, stop"
         )
+        super().__init__(f'I do not understand "{text}"; try: {known}')
 
 
 class CannotBeDone(PlanError):

@@ -12,6 +12,7 @@ from drivers.twin_page import TwinPace
 from vla_deploy.cli.commands import add_top_command, whole_number
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.gateways.parameter_file import with_parameters
+from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.runtime.logs import journal_stream
 from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
@@ -30,9 +31,7 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
 """
 
 _STDERR = 2
-_READY = (
-    'ready; in another terminal: vla-deploy say "go to the kitchen"; the page: vla-deploy dashboard'
-)
+_READY = 'ready; in another terminal: vla-deploy say "%s"; the page: vla-deploy dashboard'
 
 
 def register(commands: Any) -> None:
@@ -177,5 +176,5 @@ def _keep_running(options: RunOptions) -> None:
     with Supervisor(options) as supervisor:
         supervisor.start()
         if not supervisor.stop_requested:
-            print(_READY, flush=True)
+            print(_READY % load_robot(options.robot).twin.demo, flush=True)
         supervisor.run_until_stopped()

@@ -104,7 +104,7 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
     try:
         return ground_plan(pattern_plan(request), request)
     except Declined as error:
-        raise NotUnderstood(text) from error
+        raise NotUnderstood(text, drives="move" in world.skills) from error
 
 
 def _fitting(clause: str, request: PlanRequest) -> Step:
