@@ -21,6 +21,11 @@ def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
     """
     try:
         found = load_world(world)
+        if robot.parts.base is None and found.mount is None:
+            raise TwinModelMismatch(
+                f"world {world}: {robot.name} does not drive, and this world's file has no [mount] "
+                "to screw it down; take one that has, such as table"
+            )
         return compose(robot.mjcf_path, found.mjcf_path, found.mount)
     except FileNotFoundError as error:
         raise TwinModelMismatch(str(error)) from error

@@ -41,7 +41,7 @@ from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import ROS, RosSettings
-from vla_deploy.robots.twin_settings import TwinSettings
+from vla_deploy.robots.twin_settings import twin_settings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 
 P = TypeVar("P")
@@ -226,7 +226,7 @@ def _build(
         poses=subtables(document, "poses"),
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
-        twin=TwinSettings(**document.get("twin", {})),
+        twin=twin_settings(document),
         broker=_broker(document.get("mqtt"), directory),
         things=known_things.read_things(document.get("things", [])),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},

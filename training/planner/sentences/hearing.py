@@ -10,6 +10,8 @@ from training.planner.sentences.lists import read_file
 _HEARING: Final = read_file("hearing")
 MISHEARD: Final[Mapping[str, Sequence[str]]] = _HEARING["misheard"]
 _LOST: Final = frozenset(_HEARING["lost"])
+_KEPT: Final = frozenset({"them", "this", "that", "these", "those", "there", "here"})
+"""A plan may repeat these though nobody said them of its things; each is read letter by letter."""
 
 
 def misheard(sentence: list[SaidWord], random: Random) -> list[SaidWord]:
@@ -29,7 +31,7 @@ def _one(word: SaidWord, strength: float, random: Random) -> list[SaidWord]:
         return []
     if chance < strength and word.text in MISHEARD:
         return [SaidWord(random.choice(MISHEARD[word.text]), word.owner)]
-    if chance < 0.35 * strength and len(word.text) > 3:
+    if chance < 0.35 * strength and len(word.text) > 3 and word.text not in _KEPT:
         return [SaidWord(_mistyped(word.text, random), word.owner)]
     if chance > 1.0 - 0.15 * strength and word.owner is None:
         return [word, word]

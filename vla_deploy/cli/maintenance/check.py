@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sized
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,7 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     profile = load_profile(arguments.profile)
     require_environment(robot)
     lines = [
-        f"robot {robot.name}: {len(robot.joint_names)} servos, {len(robot.places)} places: ok",
+        f"robot {robot.name}: {_count(robot.joint_names, 'servo')}, "
+        f"{_count(robot.places, 'place')}: ok",
         f"profile {profile.name}: ok",
     ]
     document = {"robot": robot.name, "profile": profile.name}
@@ -80,3 +81,7 @@ def run_schema(arguments: argparse.Namespace) -> int:
     """Print the schema."""
     print(json.dumps(SCHEMAS[arguments.what](), indent=2))
     return 0
+
+
+def _count(things: Sized, name: str) -> str:
+    return f"{len(things)} {name}{'' if len(things) == 1 else 's'}"

@@ -10,16 +10,22 @@ from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.runtime.table_schema import TableFault, is_number
 
 Document = Mapping[str, Any]
+_ROOT = "base"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfNames:
-    """List what an MJCF file offers to a robot file; `mimics` gives each follower its leader."""
+    """List what an MJCF file offers to a robot file; `mimics` gives each follower its leader.
+
+    `is_free` says that the root body has a free joint.
+    """
 
     root_bodies: tuple[str, ...]
     joint_ranges: Mapping[str, tuple[float, float] | None]
     sites: frozenset[str]
     geoms: frozenset[str]
+    actuators: frozenset[str]
+    is_free: bool
     mimics: Mapping[str, str]
 
 
@@ -37,6 +43,11 @@ def read_mjcf_names(path: Path) -> MjcfNames:
             joint.get("name", ""): _range_of(joint) for joint in root.findall("worldbody//joint")
         },
         sites=frozenset(site.get("name", "") for site in root.findall("worldbody//site")),
+        actuators=frozenset(one.get("name", "") for one in root.findall("actuator/*")),
+        is_free=any(
+            root.find(f"worldbody/body/{one}") is not None
+            for one in ("freejoint", "joint[@type='free']")
+        ),
         geoms=frozenset(geom.get("name", "") for geom in root.findall("worldbody//geom")),
         mimics={
             couple.get("joint1", ""): couple.get("joint2", "")
@@ -56,6 +67,8 @@ def _range_of(joint: ElementTree.Element) -> tuple[float, float] | None:
 def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[TableFault]:
     """Yield what the robot file says and the MJCF does not bear out."""
     yield from _one_root_body(mjcf)
+    yield from _root_moves_as_declared(document, mjcf)
+    yield from _named(_motor_names(document), "an actuator of the MJCF", mjcf.actuators)
     yield from _named(_joint_names(document), "a joint of the MJCF", mjcf.joint_ranges)
     yield from _named(_site_names(document), "a site of the MJCF", mjcf.sites)
     yield from _named(_geom_names(document), "a geom of the MJCF", mjcf.geoms)
@@ -67,6 +80,22 @@ def _one_root_body(mjcf: MjcfNames) -> Iterator[TableFault]:
     if len(mjcf.root_bodies) != 1:
         got = f"{len(mjcf.root_bodies)} root bodies ({', '.join(mjcf.root_bodies)})"
         yield TableFault(key="mjcf", got=got, expected="a file with exactly one root body")
+
+
+def _root_moves_as_declared(document: Document, mjcf: MjcfNames) -> Iterator[TableFault]:
+    """The twin places a root body of this name, which moves where the robot drives."""
+    if len(mjcf.root_bodies) == 1 and mjcf.root_bodies[0] != _ROOT:
+        got = f"a root body {mjcf.root_bodies[0]!r}"
+        yield TableFault(key="mjcf", got=got, expected=f"one named {_ROOT!r}")
+    if mjcf.is_free != ("base" in document):
+        got = "a root body with a free joint" if mjcf.is_free else "a root body that stands fast"
+        expected = "none, of a robot without [base]" if mjcf.is_free else "a free joint for [base]"
+        yield TableFault(key="mjcf", got=got, expected=expected)
+
+
+def _motor_names(document: Document) -> Iterator[tuple[str, object]]:
+    for i, row in enumerate(rows(table(document, "servo_bus"), "servos")):
+        yield f"servo_bus.servos[{i}].joint", row.get("joint")
 
 
 def _named(
