@@ -42,6 +42,7 @@ ABOVE_FLOOR_M = 0.04
 ABOVE_CONTENTS_M = 0.015
 ABOVE_SURFACE_M = 0.008
 YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
+CLEAR_OF_RIM_M = 0.01
 LOST_OPENING_M = 0.012
 LOOK_AT_TABLE = (0.0, 0.85)
 LET_GO_M = 0.03
@@ -184,7 +185,7 @@ def _over_object(
         raise NotPossible(f"a {seen['class']} is no container; put things in a {known}")
     lower_m = below_rim_m(context, seen, held) if relation == IN else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
-    return _solve_above(context, hand, point_m, held)
+    return _solve_above(context, hand, point_m, held, lower_m + CLEAR_OF_RIM_M)
 
 
 def below_rim_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
@@ -212,9 +213,15 @@ def _filled_m(context: SkillContext, container: Mapping[str, Any], held: Held) -
 
 
 def _solve_above(
-    context: SkillContext, hand: str, release_m: tuple[float, float, float], held: Held
+    context: SkillContext,
+    hand: str,
+    release_m: tuple[float, float, float],
+    held: Held,
+    least_m: float = 0.0,
 ) -> Release:
     """Return the posture above a release point that moves the arm least and can descend.
+
+    It is at least `least_m` above it: what is held swings in over the rim of a container.
 
     Raises:
         OutOfReach: no yaw of the hand gets there.
@@ -222,9 +229,8 @@ def _solve_above(
     now, reasons = context.link.setpoints, [""]
     aside_m = context.robot.hands[hand].middle_m(held.width_m)
     grips = [hand_down(release_m, yaw_rad, aside_m) for yaw_rad in YAWS_RAD]
-    for above_m in heights_above(
-        context, release_m, held.below_grip_m, context.robot.reach.above_m
-    ):
+    least_m = max(context.robot.reach.above_m, least_m)
+    for above_m in heights_above(context, release_m, held.below_grip_m, least_m):
         found = [
             Release(grip=grip, above=above, above_m=above_m)
             for grip in grips
