@@ -5,7 +5,7 @@ import json
 import os
 import select
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -85,7 +85,6 @@ class TwinProcess:
         self._ready = devices / READY_FILE
         self._ready.unlink(missing_ok=True)
         robot = load_robot(options.robot)
-        options = replace(options, world=options.world or robot.twin.world)
         self._twin = _build_twin(options, robot)
         if self._twin.battery is not None:
             self._twin.battery.serve(devices)

@@ -57,7 +57,7 @@ class Twin:
             ModelMismatch: there is no such world, or robot and world do not fit together.
         """
         self.robot = robot
-        self.engine = load_engine(robot, world or robot.twin.world, seed)
+        self.engine = load_engine(robot, world, seed)
         self.person = WorldPerson(self.engine)
         shafts = self.engine.servos
         coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)

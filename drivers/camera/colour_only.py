@@ -12,7 +12,7 @@ DEPTH_UNIT_M = 0.001
 
 
 class ColourOnlyCamera:
-    """Be the camera of a video device, with a lens that the robot file or a calibration states."""
+    """Read the camera of a video device, with the lens of the robot file or of a calibration."""
 
     def __init__(self, source: str, clock: Clock, pinhole: Intrinsics) -> None:
         """Begin to open the device at the size of the lens; `poll` tells what became of it.

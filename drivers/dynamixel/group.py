@@ -14,7 +14,7 @@ from drivers.dynamixel.tables.layout import CLIMATE, MOTION, STATUS, Block
 from drivers.dynamixel.wire.block import BlockRead, decode
 from drivers.dynamixel.wire.codec import ALERT
 from drivers.dynamixel.wire.sync_read import Entry
-from drivers.servo.state import BusState
+from drivers.servo.state import BusState, Floats
 
 _ROWS: Final = MOTION + CLIMATE
 """What `BusState.readings` holds, row by row."""
@@ -108,8 +108,7 @@ class Group:
         np.multiply(values, self._units, values)
         np.add(self._positions, self._zeros, self._positions)
         if self._at_supply:
-            at = self._at_supply
-            values[2, at] = motor_current_ratio(values[2, at], values[1, at] / self._no_load)
+            _find_motor_currents(values, self._at_supply, self._no_load)
         if not self._fills_rows:
             self._state.readings[: len(values), self.members] = values
         errors = self.read.errors
@@ -149,9 +148,7 @@ class Group:
         chosen = [n for n, place in enumerate(self._at_supply) if place in places]
         if chosen:
             rows = [self.members[self._at_supply[n]] for n in chosen]
-            readings = self._state.readings
-            speeds = readings[1, rows] / self._no_load[chosen]
-            readings[2, rows] = motor_current_ratio(readings[2, rows], speeds)
+            _find_motor_currents(self._state.readings, rows, self._no_load[chosen])
 
     def forget_status(self) -> None:
         """Store the status of the next reply even if it is that of the last."""
@@ -187,6 +184,12 @@ class Group:
         self._state.torque_on[rows] = [value != 0 for value in torque]
         self._state.error[rows] = error
         self._state.watchdog[rows] = watchdog
+
+
+def _find_motor_currents(readings: Floats, servos: Sequence[int], no_load: Floats) -> None:
+    """Replace what some servos draw from the supply by their motors' currents, in place."""
+    speed_ratio = readings[1, servos] / no_load
+    readings[2, servos] = motor_current_ratio(readings[2, servos], speed_ratio)
 
 
 def _alike(block: Block, names: Sequence[str]) -> Iterator[tuple[int, int]]:

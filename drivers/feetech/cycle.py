@@ -19,9 +19,8 @@ from drivers.feetech.table import TorqueSwitch, hardware_errors
 from drivers.servo.journal import BusJournal
 from drivers.servo.patience import ReplyPatience
 from drivers.servo.roster import Roster
-from drivers.servo.state import BusState
+from drivers.servo.state import SILENT_S, BusState
 
-GOALS_WITHHELD_S: Final = 0.05
 _NEVER_NS: Final = -1
 _MOST_NOTICES: Final = 64
 _PROBE_EVERY_TURNS: Final = 5
@@ -89,7 +88,7 @@ class FeetechCycle:
         """Return the servos that have not answered for too long to be sent anywhere."""
         if self._all_fresh:
             return ()
-        rows: list[int] = np.flatnonzero(self._state.age_s > GOALS_WITHHELD_S).tolist()
+        rows: list[int] = np.flatnonzero(self._state.age_s > SILENT_S).tolist()
         return rows
 
     def ask_torque(self, index: int) -> None:

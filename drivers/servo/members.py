@@ -9,7 +9,7 @@ from drivers.servo.joint_servo import JointServo
 
 
 class BusMembers:
-    """Know the servos of a bus by their ids."""
+    """Look up the servos of a bus by their ids."""
 
     def __init__(self, servos: Sequence[JointServo]) -> None:
         """Take the servos in the order of the bus.

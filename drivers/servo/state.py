@@ -12,6 +12,8 @@ from drivers.servo.joint_servo import JointServo
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+SILENT_S: Final = 0.05
+"""A servo whose values are older has missed goals: it gets none, and begins where it is found."""
 _READINGS: Final = 5
 
 

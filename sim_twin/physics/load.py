@@ -14,17 +14,17 @@ REST_POSE = "rest"
 
 
 def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
-    """Compose robot and world.
+    """Compose robot and world, "" for that of the robot file.
 
     Raises:
         ModelMismatch: there is no such world, or the two do not fit together.
     """
     try:
-        found = load_world(world)
+        found = load_world(world or robot.twin.world)
         if robot.parts.base is None and found.mount is None:
             raise TwinModelMismatch(
-                f"world {world}: {robot.name} does not drive, and this world's file has no [mount] "
-                "to screw it down; take one that has, such as table"
+                f"world {found.name}: {robot.name} does not drive, and this world's file has no "
+                "[mount] to screw it down; take one that has, such as table"
             )
         return compose(robot.mjcf_path, found.mjcf_path, found.mount)
     except FileNotFoundError as error:
@@ -42,7 +42,7 @@ def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
         start = robot.start_pose
         engine.place(ROBOT_ROOT, start.x_m, start.y_m, 0.0, start.yaw_rad)
     engine.pose(robot.poses.get(REST_POSE, {}))
-    for name, pose in draw_poses(world, seed).items():
+    for name, pose in draw_poses(world or robot.twin.world, seed).items():
         engine.place(name, *pose.position_m, pose.yaw_rad)
     return engine
 

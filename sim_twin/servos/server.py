@@ -60,7 +60,7 @@ class FreeBank:
 
 
 class FreeServos(FreeBank):
-    """Be Dynamixel servos whose shafts turn on their own.
+    """Emulate Dynamixel servos whose shafts turn on their own.
 
     Without `supply_v` for all of them, each has the voltage that it is made for.
     """
@@ -78,7 +78,7 @@ class FreeServos(FreeBank):
 
 
 class FreeFeetechServos(FreeBank):
-    """Be FEETECH servos whose shafts turn on their own.
+    """Emulate FEETECH servos whose shafts turn on their own.
 
     Without `supply_v` for all of them, each has the voltage that it is made for.
     """

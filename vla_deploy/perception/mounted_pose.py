@@ -12,7 +12,7 @@ from vla_deploy.robots.floor_pose import Pose2D
 
 
 class MountedPose:
-    """Be the pose and publish it, as PoseTracker and its localiser do for a robot with a base."""
+    """Give and publish the pose, as PoseTracker and its localiser do for a robot with a base."""
 
     state: Final = PlaceState.TRACKING
     is_anchored: Final = True

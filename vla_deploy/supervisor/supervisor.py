@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from drivers.clock import NS_PER_S, Clock
@@ -71,7 +70,7 @@ class Supervisor:
         self.profile = load_profile(options.profile)
         """The profile in force."""
         self._robot = load_robot(options.robot)
-        self._options = replace(options, world=options.world or self._robot.twin.world)
+        self._options = options
         self._table = table
         self._given_clock = clock
         self._notify = own_target() if notify is None else notify

@@ -37,7 +37,7 @@ class JogWish:
 
 
 class JogInput(Protocol):
-    """Be a keyboard or a gamepad."""
+    """Declare what a keyboard and a gamepad give."""
 
     def wish(self) -> JogWish:
         """Return what is asked for now; nothing without the dead-man control.
@@ -49,7 +49,7 @@ class JogInput(Protocol):
 
 
 class JogHand:
-    """Be a pose that moves as somebody asks, from where the joints stand."""
+    """Give a pose that moves as somebody asks, from where the joints stand."""
 
     def __init__(
         self,

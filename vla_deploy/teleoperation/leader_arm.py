@@ -25,7 +25,7 @@ _VELOCITY_SAMPLES: Final = 4
 
 
 class LeaderArm:
-    """Be moved by hand, and give the pose as joint values of the robot that follows."""
+    """Declare what a person moves by hand: a pose in joint values of the robot that follows."""
 
     def __init__(
         self, bench: ServoBench, clock: Clock, servos: Sequence[JointServo], scale: LeaderScale

@@ -57,13 +57,13 @@ def choreography_of(robot: RobotDescription) -> Choreography:
         return _BUTLERS
     hand = next(iter(robot.hands))
     joints, gripper = robot.group(robot.hands[hand].arm).joints, robot.gripper_joint(hand)
-    ready, aside = robot.poses["ready"], robot.poses["aside"]
+    ready, aside = ({name: robot.poses[one][name] for name in joints} for one in ("ready", "aside"))
     return Choreography(
         payload="red_block",
         hand=hand,
-        hold={name: ready[name] for name in joints},
-        reach={name: ready[name] for name in joints},
-        carry_reach={name: aside[name] for name in joints},
+        hold=ready,
+        reach=ready,
+        carry_reach=aside,
         servos=(joints[2], gripper),
         phases=(Phase.IDLE, Phase.REACHING, Phase.CARRYING),
     )

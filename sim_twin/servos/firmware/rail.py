@@ -12,7 +12,7 @@ SupplyVolts = float | tuple[float, ...]
 
 
 class Rails:
-    """Be the power lines of one bus: each supply is ideal behind a resistance of its own.
+    """Model the power lines of one bus: each supply is ideal behind a resistance of its own.
 
     A motor's current is stall * (duty * volts / nominal - speed / no-load speed), and an ideal
     bridge draws duty times that from its rail. Current that motors return is lost: it does not

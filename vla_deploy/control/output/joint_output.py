@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from drivers.servo.state import SILENT_S
 from vla_deploy.control.judging.thresholds import contact_torque
 from vla_deploy.control.motion.axes import Flags, Floats, any_of
 from vla_deploy.control.motion.motions import MotionResult, MotionSet
@@ -19,8 +20,6 @@ EASED_RATIO: Final = 0.5
 # Of the joint's top speed: slower than what counts as motion while the robot has to stand.
 EASING_RATIO: Final = 0.05
 UNWINDING_RATIO: Final = 0.3
-# A stop begins where answers are missing for so long; its setpoints go on without the joint.
-SILENT_S: Final = 0.05
 
 
 class JointOutput:

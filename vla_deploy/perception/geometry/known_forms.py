@@ -46,7 +46,7 @@ class FormPose:
 
 @dataclass(frozen=True)
 class KnownForm:
-    """Be the shape of a known thing that stands upright."""
+    """Hold the shape of a known thing that stands upright."""
 
     thing: KnownThing
 
