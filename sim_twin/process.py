@@ -114,6 +114,7 @@ class TwinProcess:
             "things": self._things,
             "take": self._take,
             "put": self._put,
+            "walk": self._walk,
             **FaultServer(self._twin.faults, robot).operations,
             **SoundServer(self._twin, devices, options.seed, self._clock_ns).operations,
         }
@@ -315,6 +316,10 @@ class TwinProcess:
 
     def _put(self, request: Mapping[str, Any]) -> dict[str, Any]:
         self._twin.person.put(str(request.get("object")), request)
+        return self._twin.person.document()
+
+    def _walk(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        self._twin.person.walk(request.get("way_m"), request.get("speed_m_s"))
         return self._twin.person.document()
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:

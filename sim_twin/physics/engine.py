@@ -46,19 +46,35 @@ class Engine:
         """Return what an IMU at the model's site would feel."""
         return MotionProbe(self.model, self.data)
 
+    @cached_property
+    def brought(self) -> tuple[str, ...]:
+        """Return the names of the bodies that are where somebody puts them (mocap)."""
+        model = self.model
+        return tuple(model.body(i).name for i in range(model.nbody) if model.body_mocapid[i] >= 0)
+
     def place(self, body: str, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> None:
-        """Put a free body somewhere, at rest.
+        """Put a body that is free, or only where it is put (mocap), somewhere, at rest.
 
         Raises:
-            ModelMismatch: the model has no such body, or it is not free.
+            ModelMismatch: the model has no such body, or it is neither.
         """
-        joint = self._free_joint(body)
-        place, speed = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
         half = yaw_rad / 2.0
         pose = (x_m, y_m, z_m, math.cos(half), 0.0, 0.0, math.sin(half))
-        self.data.qpos[place : place + 7] = pose
-        self.data.qvel[speed : speed + 6] = 0.0
+        if body in self.brought:
+            index = int(self.model.body(body).mocapid[0])
+            self.data.mocap_pos[index], self.data.mocap_quat[index] = pose[:3], pose[3:]
+        else:
+            joint = self._free_joint(body)
+            place, speed = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
+            self.data.qpos[place : place + 7] = pose
+            self.data.qvel[speed : speed + 6] = 0.0
         mujoco.mj_forward(self.model, self.data)
+
+    def move(self, body: str, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """Move a body that is where somebody puts it along the floor, for the next step."""
+        index, half = int(self.model.body(body).mocapid[0]), yaw_rad / 2.0
+        self.data.mocap_pos[index, :2] = x_m, y_m
+        self.data.mocap_quat[index] = math.cos(half), 0.0, 0.0, math.sin(half)
 
     def pose(self, joints: Mapping[str, float]) -> None:
         """Set joints, and those coupled to them, before the simulation runs.

@@ -1,4 +1,4 @@
-"""Be a person in the twin's world: take things, also out of the robot's hands, and put them down.
+"""Be a person in the twin's world: walk about, take things, also from the robot, put them down.
 
 A thing that a hand holds is pulled at ever harder, away from the robot, until the hand lets go or
 the person gives up; the robot feels it in its joints as it would feel a real pull.
@@ -22,8 +22,12 @@ MOST_N: Final = 8.0
 PATIENCE_S: Final = 5.0
 FREE_S: Final = 0.05
 """The fingers may touch a thing again just after they have opened."""
+NOWHERE_M: Final = (100.0, -4.0)
 AWAY_M: Final = (100.0, 0.0)
 """Where things are that the person keeps: on the ground, far from every wall."""
+BODY: Final = "person"
+"""The mocap body of a world that has a person to be seen."""
+FASTEST_M_S: Final = 3.0
 REACH_M: Final = 50.0
 """The map's bounds: nothing is put further away."""
 
@@ -42,8 +46,12 @@ class WorldPerson:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._pull: _Pull | None = None
-        self._taken: list[str] = []
+        self._furniture = tuple(one for one in engine.brought if one != BODY)
+        self._taken: list[str] = list(self._furniture)
         self._told = ""
+        self._at: NDArray[np.float64] | None = None
+        self._way: list[NDArray[np.float64]] = []
+        self._speed_m_s = 0.0
 
     @property
     def taken(self) -> tuple[str, ...]:
@@ -64,6 +72,8 @@ class WorldPerson:
             "held_by_robot": truth["held"],
             "taken": list(self._taken),
             "pulls_at": self.pulls_at,
+            "at_m": None if self._at is None else self._at.tolist(),
+            "walks": bool(self._way),
             "told": self._told,
         }
 
@@ -73,9 +83,12 @@ class WorldPerson:
         Raises:
             RefereeRefusal: there is no such thing, or the person has it, or pulls at another.
         """
-        truth = self._truth_with(name)
         if name in self._taken:
             raise RefereeRefusal(f"the person has the {name} already; put it somewhere first")
+        if name in self._furniture:
+            self._put_away(name)
+            return
+        truth = self._truth_with(name)
         if self._pull is not None:
             raise RefereeRefusal(f"the person pulls at {self._pull.name}; wait until that ends")
         self._told = ""
@@ -91,19 +104,41 @@ class WorldPerson:
         Raises:
             RefereeRefusal: there is no such thing, the place is no place, or the robot holds it.
         """
-        self._truth_with(name)
+        if name not in self._furniture:
+            self._truth_with(name)
         numbers = [place.get(key) for key in ("x_m", "y_m", "z_m", "yaw_rad")]
-        if not all(isinstance(one, int | float) and abs(one) <= REACH_M for one in numbers):
+        if not all(map(_is_near, numbers)):
             raise RefereeRefusal(
                 f"expected x_m, y_m, z_m and yaw_rad within {REACH_M:g}, got {dict(place)}"
             )
-        if self.pulls_at == name or self._engine.referee.touches_robot(name):
+        is_thing = name not in self._furniture
+        if self.pulls_at == name or (is_thing and self._engine.referee.touches_robot(name)):
             raise RefereeRefusal(f"the robot touches the {name}; take it first")
         self._engine.place(name, *(float(one) for one in numbers if one is not None))
         self._taken = [one for one in self._taken if one != name]
 
+    def walk(self, way_m: Any, speed_m_s: Any) -> None:
+        """Appear at the first of (n, 2) points of the map, and walk on along the others.
+
+        No points: go away. The legs do not swing.
+
+        Raises:
+            RefereeRefusal: the world has no person to be seen, or the way is none.
+        """
+        if BODY not in self._engine.brought:
+            raise RefereeRefusal("this world has no person that is seen; the flat has")
+        if not isinstance(way_m, list | tuple) or not all(map(_is_point, way_m)):
+            raise RefereeRefusal(f"expected points x, y within {REACH_M:g} m, got {way_m!r}")
+        if not _is_near(speed_m_s) or not 0.0 < speed_m_s <= FASTEST_M_S:
+            raise RefereeRefusal(f"expected a speed up to {FASTEST_M_S:g} m/s, got {speed_m_s!r}")
+        self._way = [np.array(point, dtype=np.float64) for point in way_m]
+        self._speed_m_s, self._at = float(speed_m_s), self._way.pop(0) if self._way else None
+        x_m, y_m = NOWHERE_M if self._at is None else self._at.tolist()
+        self._engine.place(BODY, x_m, y_m, 0.0, 0.0)
+
     def step(self) -> None:
-        """Pull a little harder, keep what has come free, or give up."""
+        """Walk on; pull a little harder, keep what has come free, or give up."""
+        self._walk_on()
         if (pull := self._pull) is None:
             return
         pull.for_s += STEP_S
@@ -117,6 +152,20 @@ class WorldPerson:
             body = self._engine.model.body(pull.name).id
             force_n = min(MOST_N, PULL_N_S * pull.for_s)
             self._engine.data.xfrc_applied[body, :3] = force_n * pull.direction
+
+    def _walk_on(self) -> None:
+        if self._at is None or not self._way:
+            return
+        left = self._way[0] - self._at
+        left_m, step_m = float(np.hypot(*left)), self._speed_m_s * STEP_S
+        self._at = self._way.pop(0) if left_m <= step_m else self._at + left * (step_m / left_m)
+        if left_m > 0.0:
+            heading_rad = math.atan2(left[1], left[0])
+            self._engine.move(BODY, float(self._at[0]), float(self._at[1]), heading_rad)
+
+    def _put_away(self, name: str) -> None:
+        self._engine.place(name, AWAY_M[0], -float(len(self._taken)) - 2.0, 0.0, 0.0)
+        self._taken.append(name)
 
     def _keep(self) -> None:
         if (pull := self._pull) is None:
@@ -149,3 +198,11 @@ class WorldPerson:
         if not all(map(math.isfinite, things[name]["position_m"])):
             raise RefereeRefusal(f"the {name} is nowhere: the physics has lost it")
         return truth
+
+
+def _is_near(number: object) -> bool:
+    return isinstance(number, int | float) and abs(number) <= REACH_M
+
+
+def _is_point(point: object) -> bool:
+    return isinstance(point, list | tuple) and len(point) == 2 and all(map(_is_near, point))

@@ -48,7 +48,8 @@ def draw_map(model: mujoco.MjModel, extent: Extent) -> Image:
 
 def _is_obstacle(model: mujoco.MjModel, geom: int) -> bool:
     collides = bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
-    immovable = model.body_weldid[model.geom_bodyid[geom]] == 0
+    body = model.geom_bodyid[geom]
+    immovable = model.body_weldid[body] == 0 and model.body_mocapid[body] < 0
     return collides and immovable and model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE
 
 

@@ -25,6 +25,7 @@ else:
 MAX_JOINTS = 32
 SCAN_BEAMS = 360
 OBSTACLE_POINTS = 256
+MOVERS = 8
 
 
 class TopicKind(Enum):
@@ -272,6 +273,24 @@ NEAR_OBSTACLES = Topic(
         PackedField("x_m", "f4", OBSTACLE_POINTS, "m"),
         PackedField("y_m", "f4", OBSTACLE_POINTS, "m"),
         PackedField("z_m", "f4", OBSTACLE_POINTS, "m"),
+    ),
+)
+LIVE_OBSTACLES = Topic(
+    name="live_obstacles",
+    kind=TopicKind.CELL,
+    owner="perception",
+    rate_hz=10,
+    deadline_s=1.0,
+    summary="what lidar and depth camera see beside the map, nearest first, and what of it moves",
+    fields=(
+        PackedField("count", "u4"),
+        PackedField("x_m", "f4", OBSTACLE_POINTS, "m, of a cell's middle in the map frame"),
+        PackedField("y_m", "f4", OBSTACLE_POINTS, "m"),
+        PackedField("mover_count", "u4"),
+        PackedField("mover_x_m", "f4", MOVERS, "m, in the map frame"),
+        PackedField("mover_y_m", "f4", MOVERS, "m"),
+        PackedField("mover_vx_m_s", "f4", MOVERS, "m/s"),
+        PackedField("mover_vy_m_s", "f4", MOVERS, "m/s"),
     ),
 )
 IMU = Topic(

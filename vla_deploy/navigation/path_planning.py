@@ -2,6 +2,7 @@
 
 import heapq
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -64,6 +65,20 @@ class PathPlanner:
         clearance = DistanceField(self._clearance_m, grid.resolution_m, grid.origin_m)
         near_m = clearance.nearest(points)
         return (near_m < MAPPED_M) | np.isinf(near_m)
+
+    def around(self, points: NDArray[np.float64], aside_m: float) -> "PathPlanner":
+        """Return a planner that keeps `aside_m` more than its clearance from (n, 2) map points."""
+        grid, blocked = self._grid, self._grid.blocked.astype(np.uint8)
+        radius = max(1, round(aside_m / grid.resolution_m))
+        for x_m, y_m in points.tolist():
+            row, column = grid.world_to_cell(x_m, y_m)
+            cv2.circle(blocked, (column, row), radius, 1, thickness=cv2.FILLED)
+        return PathPlanner(replace(grid, blocked=blocked.astype(np.bool_)), self._radius_m)
+
+    @property
+    def radius_m(self) -> float:
+        """Return the clearance that every path keeps."""
+        return self._radius_m
 
     def plan(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
         """Return the way from start to goal as (n, 2) points in the map frame.

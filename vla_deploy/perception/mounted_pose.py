@@ -8,7 +8,7 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import CellWriter, SharedSpace, topics
-from vla_deploy.robots.floor_pose import Pose2D
+from vla_deploy.robots.floor_pose import Points, Pose2D
 
 
 class MountedPose:
@@ -52,5 +52,5 @@ class MountedPose:
             doubt=Doubt.NONE,
         )
 
-    def correct(self, scan: Scan) -> None:
+    def correct(self, scan: Scan, seen_by_depth: Points) -> None:
         """Leave a scan aside."""

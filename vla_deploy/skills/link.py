@@ -11,7 +11,12 @@ from vla_deploy.client.place_state import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.motion_ids import motion_ids
 from vla_deploy.ipc.payloads.motion import ControlStatus, GoalMotion, TrajectoryMotion
-from vla_deploy.ipc.payloads.scene import HandDocument, SurfaceDocument, ThingDocument
+from vla_deploy.ipc.payloads.scene import (
+    BystanderDocument,
+    HandDocument,
+    SurfaceDocument,
+    ThingDocument,
+)
 from vla_deploy.ipc.payloads.supervision import BatteryDocument
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.robots import RobotDescription
@@ -24,6 +29,8 @@ POSE_AGE_S = 0.5
 # A loaded machine may hold perception up for a moment.
 PATIENCE_S = 3.0
 JOINT_AGE_S = 0.25
+_POINT = ("x_m", "y_m")
+_MOVER = ("mover_x_m", "mover_y_m", "mover_vx_m_s", "mover_vy_m_s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,10 +42,23 @@ class EndedMotion:
     is_interrupted: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LiveView:
+    """Hold what is seen beside the map: cells' middles, (n, 2), and movers, (k, 4) x, y, vx, vy."""
+
+    stamp_ns: int
+    points: NDArray[np.float64]
+    movers: NDArray[np.float64]
+
+
 def _direction(twist: Twist) -> Direction:
     if twist.v_m_s:
         return Direction.FORWARD if twist.v_m_s > 0.0 else Direction.BACKWARD
     return Direction.TURN_LEFT if twist.w_rad_s > 0.0 else Direction.TURN_RIGHT
+
+
+def _rows(data: np.void, count: int, names: Sequence[str]) -> NDArray[np.float64]:
+    return np.column_stack([np.asarray(data[name], dtype=np.float64)[:count] for name in names])
 
 
 class SkillLink:
@@ -51,6 +71,7 @@ class SkillLink:
         self._pose = space.cell_reader(topics.POSE)
         self._scene = space.cell_reader(topics.SCENE)
         self._scan = space.cell_reader(topics.SCAN)
+        self._live = space.cell_reader(topics.LIVE_OBSTACLES)
         self._control_status = space.cell_reader(topics.CONTROL_STATUS)
         self._battery = space.cell_reader(topics.BATTERY)
         self._results_in = space.ring_reader(topics.MOTION_RESULT, from_start=False)
@@ -177,6 +198,24 @@ class SkillLink:
         if sample is None or sample.age_s(self.clock.now_ns()) > POSE_AGE_S:
             return None
         return np.asarray(sample.data["range_m"], dtype=np.float64)
+
+    def live_obstacles(self) -> LiveView | None:
+        """Return what perception sees beside the map; None while it tells nothing."""
+        sample = self._live.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > topics.LIVE_OBSTACLES.deadline_s:
+            return None
+        data = sample.data
+        return LiveView(
+            stamp_ns=sample.stamp_ns,
+            points=_rows(data, int(data["count"]), _POINT),
+            movers=_rows(data, int(data["mover_count"]), _MOVER),
+        )
+
+    @property
+    def bystanders(self) -> Sequence[BystanderDocument]:
+        """Return the people and chairs that perception saw last."""
+        sample = self._scene.latest()
+        return () if sample is None else sample.document().get("bystanders", ())
 
     @property
     def objects(self) -> Sequence[ThingDocument]:

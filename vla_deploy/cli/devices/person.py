@@ -1,4 +1,4 @@
-"""`vla-deploy person list | take | put`: be a person in the world of a running twin."""
+"""`vla-deploy person list | take | put | walk`: be a person in the world of a running twin."""
 
 import argparse
 from typing import Any, Final
@@ -11,12 +11,24 @@ from vla_deploy.cli.twin import ask_twin
 _EXAMPLES: Final = """  vla-deploy say "bring me the red cup"      it then asks to be relieved of it
   vla-deploy person take red_cup            in another terminal: pull until it lets go
   vla-deploy person put red_cup 2.2 1.6 0.4975
+  vla-deploy person put chair 3.1 2.4 0      a chair in the robot's way
+  vla-deploy person walk 4,1 4,3 2,3         appear at 4, 1 and walk; no points: go away
   vla-deploy person list                    what there is, and who has it
 """
 _LONGEST_S: Final = 30.0
 """A person gives up sooner, in the twin's time, which may be slower than ours."""
 _METRES: Final = number_within(-50.0, 50.0, "metres from -50 to 50")
 _RADIANS: Final = number_within(-6.3, 6.3, "radians from -6.3 to 6.3")
+
+
+_SPEED: Final = number_within(0.05, 3.0, "m/s from 0.05 to 3")
+
+
+def _point(text: str) -> tuple[float, float]:
+    x_text, comma, y_text = text.partition(",")
+    if not comma:
+        raise argparse.ArgumentTypeError(f'expected a point such as "4.2,1.5", got {text!r}')
+    return _METRES(x_text), _METRES(y_text)
 
 
 def register(commands: Any) -> None:
@@ -37,6 +49,16 @@ def register(commands: Any) -> None:
         run_put,
         as_json,
     )
+    walk = add_command(
+        actions,
+        "walk",
+        "walk about, seen by the robot",
+        "  vla-deploy person walk 4,1 4,3 2,3 --speed 0.7\n  vla-deploy person walk\n",
+        run_walk,
+        as_json,
+    )
+    walk.add_argument("way", nargs="*", type=_point, metavar="X,Y", help="metres, in the map")
+    walk.add_argument("--speed", type=_SPEED, default=1.0, metavar="N", help="m/s (default: 1)")
     for action in (take, put):
         action.add_argument("thing", help="see: vla-deploy person list")
     for name in ("x_m", "y_m", "z_m"):
@@ -86,3 +108,12 @@ def run_put(arguments: argparse.Namespace) -> int:
         **place,
     )
     return emit(arguments, answer, f"put {arguments.thing} down")
+
+
+def run_walk(arguments: argparse.Namespace) -> int:
+    """Appear in the world, walk about in it, or go away."""
+    run_dir = attach(arguments.runtime_base).run_dir
+    answer = ask_twin(run_dir, "walk", way_m=arguments.way, speed_m_s=arguments.speed)
+    at_m = answer["at_m"]
+    told = "gone" if at_m is None else f"at {at_m[0]:.2f}, {at_m[1]:.2f} m"
+    return emit(arguments, answer, told)

@@ -49,6 +49,8 @@ class Localiser:
 
     def __init__(self, start: Pose2D, grid: GridMap, lidar: Pose2D | None = None) -> None:
         self.match_ratio = 0.0
+        self.seen: ScanPoints | None = None
+        """The newest scan in the map frame; None where it did not bear out the pose."""
         self._lidar = lidar or ORIGIN
         self._field = DistanceField.of(grid)
         self._filter = PoseFilter(start)
@@ -101,7 +103,7 @@ class Localiser:
 
     def correct(self, range_m: NDArray[np.float32], beam_stamp_ns: NDArray[np.int64]) -> bool:
         """Pull the pose towards where the scan fits the map; return whether it was used."""
-        stamp_ns = int(beam_stamp_ns.max(initial=0))
+        stamp_ns, self.seen = int(beam_stamp_ns.max(initial=0)), None
         scan = placed_beams(self._filter.track, self._lidar, range_m, beam_stamp_ns)
         if len(scan) < MIN_POINTS or self._is_frozen(range_m):
             self.match_ratio = 0.0
@@ -118,6 +120,7 @@ class Localiser:
             if self._is_astray(float(match.shift[2])):
                 self._filter.doubt(match.shift)
             self._filter.correct(match.shift, noise)
+            self.seen = scan.placed(self._filter.map_from_track)
         self._judge_scan(stamp_ns, doubt)
         return doubt is Doubt.NONE
 

@@ -59,14 +59,18 @@ class NearObstacles:
 
     def around(self, pose: Pose2D, now_ns: int) -> Array:
         """Return what stands near the base, (n, 3) in the base frame, the nearest first."""
-        self._cells = {
-            cell: kept for cell, kept in self._cells.items() if now_ns - kept[3] <= KEPT_NS
-        }
-        points = _to_base(self._points(), pose)
+        points = _to_base(self.on_map(now_ns), pose)
         distance = np.linalg.norm(points[:, :2], axis=1)
         order = np.argsort(distance, kind="stable")[:OBSTACLE_POINTS]
         near: Array = points[order[distance[order] <= KEPT_WITHIN_M]]
         return near
+
+    def on_map(self, now_ns: int) -> Array:
+        """Return all that is remembered, (n, 3) in the map frame."""
+        self._cells = {
+            cell: kept for cell, kept in self._cells.items() if now_ns - kept[3] <= KEPT_NS
+        }
+        return self._points()
 
     def _points(self) -> Array:
         kept = [cell[:3] for cell in self._cells.values()]

@@ -27,6 +27,7 @@ from vla_deploy.skills.actions.beyond import navigation_request, pursue, server_
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.movements.bearings import find_myself
+from vla_deploy.skills.movements.detour import Detour
 
 # Cruise below what the drives can do, so that tracking errors can be made up.
 CRUISE_RATIO = 0.9
@@ -144,19 +145,25 @@ def follow(
     until: Callable[[], bool] = lambda: False,
     speed_m_s: float | None = None,
 ) -> Skill:
-    """Follow points of the map frame; wait for what stands in the way, and give up on it.
+    """Follow points of the map frame, around what is in the way but not on the map.
+
+    Where no way leads around it, wait for it to go away, and give up on it.
 
     Raises:
         TryAgain: the way stayed blocked.
     """
-    follower = PathFollower(points, limits_of(context, speed_m_s), final_yaw_rad)
+    limits = limits_of(context, speed_m_s)
+    follower, detour = PathFollower(points, limits, final_yaw_rad), Detour(context, points)
     patience = _Patience(context)
     context.way_m = points
     try:
         while follower.phase is not FollowerPhase.ARRIVED and not until():
             pose = context.link.pose
+            if detour.revise(pose):
+                context.way_m = detour.way
+                follower = PathFollower(detour.way, limits, final_yaw_rad)
             twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
-            hindrance = _hindrance(context, twist, _distance(pose, points[-1]))
+            hindrance = detour.closed_by or _hindrance(context, twist, _distance(pose, points[-1]))
             context.link.drive(patience.pass_on(twist, hindrance))
             yield
     finally:

@@ -1,0 +1,57 @@
+"""What is on no map stands or walks in the robot's way: judged by MuJoCo's own distances."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
+
+pytestmark = [pytest.mark.gl, pytest.mark.timeout(240)]
+
+ON_THE_WAY = {"x_m": 3.1, "y_m": 2.4, "z_m": 0.0, "yaw_rad": 0.5}
+LONGEST_S = 90.0
+LOOK_S = 0.1
+GAP_M = 0.1
+"""The overhang zone and the way to standstill of a robot that creeps."""
+
+
+@pytest.fixture
+def stack(tmp_path: Path, coarse: str) -> Iterator[LockstepStack]:
+    with armed_lockstep(tmp_path, profile=coarse) as made:
+        yield made
+
+
+def closest_on_the_way(stack: LockstepStack, text: str, body: str) -> float:
+    """Say a command, and return how near a body came to the robot before it had succeeded."""
+    engine = stack.lockstep.twin.engine
+    model, data = engine.model, engine.data
+    ours, theirs = (_solid_geoms(model, name) for name in ("base", body))
+    command_id, closest_m, line = stack.give(text=text), 9.0, np.zeros(6)
+    while (outcome := stack.outcome(command_id)) is None and stack.lockstep.now_s < LONGEST_S:
+        stack.lockstep.run_for(LOOK_S)
+        gaps_m = (
+            mujoco.mj_geomDistance(model, data, a, b, 2.0, line) for a in ours for b in theirs
+        )
+        closest_m = min(closest_m, *gaps_m)
+    assert outcome is not None
+    assert outcome["success"], outcome
+    return closest_m
+
+
+def _solid_geoms(model: mujoco.MjModel, body: str) -> list[int]:
+    root = model.body_rootid[model.body(body).id]
+    bodies = model.body_rootid[model.geom_bodyid]
+    return [int(one) for one in np.flatnonzero((bodies == root) & (model.geom_contype != 0))]
+
+
+def test_it_goes_around_a_chair(stack: LockstepStack) -> None:
+    stack.lockstep.twin.person.put("chair", ON_THE_WAY)
+    assert 0.0 < closest_on_the_way(stack, "go to the kitchen", "chair") < 0.6
+
+
+def test_it_lets_somebody_pass_and_arrives(stack: LockstepStack) -> None:
+    stack.lockstep.twin.person.walk([(3.1, 0.9), (3.1, 4.2), (3.1, 3.4)], 0.5)
+    assert GAP_M < closest_on_the_way(stack, "go to the kitchen", "person") < 1.0
