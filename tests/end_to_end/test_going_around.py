@@ -1,5 +1,6 @@
-"""What is on no map stands or walks in the robot's way: judged by MuJoCo's own distances."""
+"""What is on no map stands or walks around the robot: judged by MuJoCo's own distances."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -55,3 +56,25 @@ def test_it_goes_around_a_chair(stack: LockstepStack) -> None:
 def test_it_lets_somebody_pass_and_arrives(stack: LockstepStack) -> None:
     stack.lockstep.twin.person.walk([(3.1, 0.9), (3.1, 4.2), (3.1, 3.4)], 0.5)
     assert GAP_M < closest_on_the_way(stack, "go to the kitchen", "person") < 1.0
+
+
+def test_it_follows_somebody_at_a_distance_and_tells_when_they_are_gone(
+    stack: LockstepStack,
+) -> None:
+    person, now_s = stack.lockstep.twin.person, stack.lockstep.now_s
+    followed = stack.give(text="follow me")
+    stack.lockstep.run_for(1.5)
+    person.walk([(1.7, 2.5), (4.4, 2.3)], 0.3)
+    distances_m = []
+    while stack.lockstep.now_s < now_s + 10.0:
+        stack.lockstep.run_for(0.5)
+        robot = stack.lockstep.truth()["robot"]
+        distances_m.append(math.dist((robot["x_m"], robot["y_m"]), person.document()["at_m"]))
+    assert min(distances_m) > 0.8
+    assert max(distances_m[-6:]) < 1.6, distances_m
+    person.walk([], 1.0)
+    assert stack.lockstep.run_until(lambda: stack.outcome(followed) is not None, 20.0)
+    outcome = stack.outcome(followed)
+    assert outcome is not None
+    assert not outcome["success"]
+    assert "I lost whom I followed" in str(outcome)

@@ -30,7 +30,8 @@ class RobotActivity(StrEnum):
 
 BY_SKILL: Final[Mapping[str, RobotActivity]] = {
     **dict.fromkeys(
-        ("navigate_to", "charge", "move", "turn", "find_object"), RobotActivity.NAVIGATING
+        ("navigate_to", "charge", "follow_person", "sweep", "move", "turn", "find_object"),
+        RobotActivity.NAVIGATING,
     ),
     **dict.fromkeys(
         ("pick_up", "place", "hand_over", "open_gripper", "close_gripper", "move_arm"),

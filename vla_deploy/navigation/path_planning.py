@@ -40,12 +40,13 @@ class PathPlanner:
     def __init__(self, grid: GridMap, body_radius_m: float) -> None:
         self._grid = grid
         self._radius_m = body_radius_m
-        self._clearance_m = clearance_of(grid)
-        near = np.clip((body_radius_m + COMFORT_M - self._clearance_m) / COMFORT_M, 0.0, 1.0)
+        self.clearance_m = clearance_of(grid)
+        """Each cell's distance to what blocks."""
+        near = np.clip((body_radius_m + COMFORT_M - self.clearance_m) / COMFORT_M, 0.0, 1.0)
         self._cost = 1.0 + (WALL_COST - 1.0) * near
         # The search runs on one list of cells with a border around the map, so that it need not
         # look for the edge: the cost per cell of way, infinite where the body does not fit.
-        fits = self._clearance_m >= body_radius_m
+        fits = self.clearance_m >= body_radius_m
         tolls = np.pad(np.where(fits, self._cost, np.inf), 1, constant_values=np.inf)
         self._stride = int(tolls.shape[1])
         self._tolls: list[float] = tolls.ravel().tolist()
@@ -57,12 +58,12 @@ class PathPlanner:
     def room_m(self, x_m: float, y_m: float) -> float:
         """Return the distance from a point of the map frame to what blocks; 0 off the map."""
         cell = self._grid.world_to_cell(x_m, y_m)
-        return float(self._clearance_m[cell]) if self._inside(cell) else 0.0
+        return float(self.clearance_m[cell]) if self._inside(cell) else 0.0
 
     def is_mapped(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which of (n, 2) points of the map frame the map shows as blocked, or nearly."""
         grid = self._grid
-        clearance = DistanceField(self._clearance_m, grid.resolution_m, grid.origin_m)
+        clearance = DistanceField(self.clearance_m, grid.resolution_m, grid.origin_m)
         near_m = clearance.nearest(points)
         return (near_m < MAPPED_M) | np.isinf(near_m)
 
@@ -74,6 +75,11 @@ class PathPlanner:
             row, column = grid.world_to_cell(x_m, y_m)
             cv2.circle(blocked, (column, row), radius, 1, thickness=cv2.FILLED)
         return PathPlanner(replace(grid, blocked=blocked.astype(np.bool_)), self._radius_m)
+
+    @property
+    def grid(self) -> GridMap:
+        """Return the map that is planned on."""
+        return self._grid
 
     @property
     def radius_m(self) -> float:
@@ -89,7 +95,7 @@ class PathPlanner:
             NoPath: the goal is off the map or too tight, or nothing leads there.
         """
         start_cell, goal_cell = self._grid.world_to_cell(*start), self._grid.world_to_cell(*goal)
-        if not self._inside(goal_cell) or self._clearance_m[goal_cell] < self._radius_m:
+        if not self._inside(goal_cell) or self.clearance_m[goal_cell] < self._radius_m:
             raise NoPath(
                 f"the goal {goal[0]:.2f}, {goal[1]:.2f} m leaves less than the "
                 f"{self._radius_m:.2f} m of clearance that the body needs; choose another point"
@@ -104,13 +110,13 @@ class PathPlanner:
         return np.vstack((start, centres[1:] if start_cell == cells[0] else centres))
 
     def _inside(self, cell: Cell) -> bool:
-        rows, columns = self._clearance_m.shape
+        rows, columns = self.clearance_m.shape
         return bool(0 <= cell[0] < rows and 0 <= cell[1] < columns)
 
     def _way_out(self, cell: Cell) -> Cell:
-        if self._clearance_m[cell] >= self._radius_m:
+        if self.clearance_m[cell] >= self._radius_m:
             return cell
-        rows, columns = np.nonzero(self._clearance_m >= self._radius_m)
+        rows, columns = np.nonzero(self.clearance_m >= self._radius_m)
         if not rows.size:
             raise NoPath("the map has no place where the body fits")
         nearest = int(np.argmin((rows - cell[0]) ** 2 + (columns - cell[1]) ** 2))
@@ -167,7 +173,7 @@ class PathPlanner:
         length = math.dist(start, end)
         samples = np.linspace(start, end, max(2, math.ceil(2 * length)))
         rows, columns = np.rint(samples).astype(np.intp).T
-        if (self._clearance_m[rows, columns] < self._radius_m).any():
+        if (self.clearance_m[rows, columns] < self._radius_m).any():
             return math.inf
         return length * float(self._cost[rows, columns].mean())
 

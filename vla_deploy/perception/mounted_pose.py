@@ -8,7 +8,8 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import CellWriter, SharedSpace, topics
-from vla_deploy.robots.floor_pose import Points, Pose2D
+from vla_deploy.perception.objects.near_obstacles import NearObstacles
+from vla_deploy.robots.floor_pose import Pose2D
 
 
 class MountedPose:
@@ -52,5 +53,5 @@ class MountedPose:
             doubt=Doubt.NONE,
         )
 
-    def correct(self, scan: Scan, seen_by_depth: Points) -> None:
+    def correct(self, scan: Scan, obstacles: NearObstacles) -> None:
         """Leave a scan aside."""

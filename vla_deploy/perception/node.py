@@ -177,8 +177,7 @@ class PerceptionNode:
         if scan is not None and self._clock.now_ns() - scan.stamp_ns <= STALE_SCAN_NS:
             ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
             self._writers["scan"].put(range_m=scan.range_m, beam_age_s=ages_s)
-            low = self._pipeline.obstacles.on_map(self._clock.now_ns())
-            self._pose_tracker.correct(scan, low[:, :2])
+            self._pose_tracker.correct(scan, self._pipeline.obstacles)
 
     def _read_camera(self) -> None:
         frame, now_ns = self._sensors.image(), self._clock.now_ns()

@@ -13,6 +13,7 @@ from vla_deploy.ipc import CellReader, CellWriter, SharedSpace, topics
 from vla_deploy.ipc.topics import MOVERS, OBSTACLE_POINTS
 from vla_deploy.navigation.localising.localisation import Localiser
 from vla_deploy.navigation.obstacles.live_obstacles import LiveObstacles
+from vla_deploy.perception.objects.near_obstacles import NearObstacles
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.floor_pose import Points, Pose2D
 from vla_deploy.robots.kinematics.model import RobotModel, full_positions
@@ -67,16 +68,20 @@ class PoseTracker:
             doubt=self.localiser.doubt,
         )
 
-    def correct(self, scan: Scan, seen_by_depth: Points) -> None:
-        """Correct the pose by a scan, and publish what it and (n, 2) map points show beside it."""
+    def correct(self, scan: Scan, obstacles: NearObstacles) -> None:
+        """Correct the pose by a scan, and publish what it and the depth camera show beside the map.
+
+        What the camera remembers of somebody whom the lidar has seen walk away is forgotten.
+        """
         localiser = self.localiser
         localiser.correct(scan.range_m, scan.beam_stamp_ns)
         if localiser.seen is not None and localiser.state is PlaceState.TRACKING:
             self._live.see(localiser.seen, scan.stamp_ns)
         pose = localiser.pose
         at = np.array((pose.x_m, pose.y_m))
-        low = seen_by_depth[self._live.unmapped(seen_by_depth)]
-        points = np.vstack((low, self._live.around(at, scan.stamp_ns)))
+        obstacles.forget_left(self._live.left(scan.stamp_ns))
+        low = obstacles.on_map(scan.stamp_ns)[:, :2]
+        points = np.vstack((low[self._live.unmapped(low)], self._live.around(at, scan.stamp_ns)))
         points = points[np.argsort(np.hypot(*(points - at).T), kind="stable")][:OBSTACLE_POINTS]
         movers = np.array(self._live.movers[:MOVERS], dtype=np.float64).reshape(-1, 4)
         self._live_writer.put(

@@ -13,7 +13,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
-from vla_deploy.planning.builders.tidying import REACH_M
 from vla_deploy.planning.errors import CannotBeDone, NotAble
 from vla_deploy.planning.interfaces import (
     Forbidden,
@@ -31,6 +30,8 @@ from vla_deploy.runtime.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 from vla_deploy.world.vocabulary import ANY_CLASS
 
+REACH_M: Final = 1.0
+"""What is this near to a place is there: the pose of a place says not where it ends."""
 FILE_NAME: Final = "prohibitions.json"
 MOST: Final = 32
 _log = logging.getLogger(__name__)

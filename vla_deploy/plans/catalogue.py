@@ -129,6 +129,22 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             estimated_duration_s=20.0,
             retryable=True,
         ),
+        "follow_person": SkillSpec(
+            kind=SkillKind.NAVIGATION,
+            summary="follow the person who walks nearby, for a while or until told otherwise",
+            parameters={"duration_s": _number(0, 1800, required=False)},
+            resources=("base", "head", "camera", "arms"),
+            own_timeout_s=2000.0,
+            estimated_duration_s=60.0,
+        ),
+        "sweep": SkillSpec(
+            kind=SkillKind.NAVIGATION,
+            summary="drive over all the floor of a place, and tell which share was covered",
+            parameters={"place": SkillParameter(type=Type.PLACE)},
+            resources=("base", "head", "camera", "arms"),
+            own_timeout_s=1800.0,
+            estimated_duration_s=150.0,
+        ),
         "move": SkillSpec(
             kind=SkillKind.MOVEMENT,
             summary="drive straight, forward or (negative) backward",

@@ -127,12 +127,16 @@ class Head:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Name a pose to drive to, and the poses from which its furniture can be searched."""
+    """Name a pose to drive to, and the poses from which its furniture can be searched.
+
+    `floor_m` bounds the floor that belongs to it, such as a room's, as a polygon in the map frame.
+    """
 
     name: str
     pose: Pose2D
     aliases: tuple[str, ...]
     viewpoints: tuple[Pose2D, ...]
+    floor_m: tuple[tuple[float, float], ...] = ()
 
 
 _HERE: Final = Pose2D(x_m=0.0, y_m=0.0, yaw_rad=0.0)

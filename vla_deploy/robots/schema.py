@@ -201,7 +201,12 @@ REACH: Shape = {
 }
 HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}
-PLACE: Shape = {**FLOOR_POSE, "aliases": TEXTS, "viewpoints": TABLES}
+PLACE: Shape = {
+    **FLOOR_POSE,
+    "aliases": TEXTS,
+    "viewpoints": TABLES,
+    "floor_m": POLYGON.optional,
+}
 ZONE: Shape = {"name": TEXT, "reason": TEXT, "polygon_m": POLYGON}
 MAP_BOUNDS = ValueCheck(
     expected="the least x and y and the most x and y in m, such as [-10.0, -10.0, 10.0, 10.0]",

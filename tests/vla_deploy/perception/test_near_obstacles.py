@@ -152,3 +152,18 @@ def test_no_more_points_are_told_than_the_topic_holds() -> None:
     for step in range(12):
         look(seen, post(1.0, 0.0, half_m=1.0), Pose2D(0.0, 0.0, step * math.pi / 6))
     assert len(seen.around(HERE, 0)) <= OBSTACLE_POINTS
+
+
+def test_who_walked_away_is_forgotten_and_what_stood_there_before_is_kept() -> None:
+    seen = NearObstacles()
+    look(seen, post(1.0, 0.4), stamp_ns=0)
+    with_them = np.minimum(post(1.0, 0.4), post(1.0, -0.3))
+    look(seen, with_them, stamp_ns=NS_PER_S)
+    assert len(seen.on_map(NS_PER_S))
+    left = np.array(((NS_PER_S, 1.0, -0.1),))
+    seen.forget_left(left)
+    points = seen.on_map(NS_PER_S)
+    assert len(points)
+    assert (points[:, 1] > 0.0).all()
+    seen.forget_left(np.array(((5.0 * NS_PER_S, 1.0, 0.4),)))
+    assert len(seen.on_map(NS_PER_S)) == len(points), "seen at another moment"

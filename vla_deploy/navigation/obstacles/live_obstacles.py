@@ -70,6 +70,10 @@ class LiveObstacles:
         order = np.argsort(np.hypot(*(middles - at).T), kind="stable")
         return middles[order]
 
+    def left(self, stamp_ns: int) -> Points:
+        """Return rows of stamp (ns), x, y: where what moves has been, and is no more."""
+        return self._tracks.left(stamp_ns)
+
     def unmapped(self, points: Points) -> NDArray[np.bool_]:
         """Return which of (n, 2) points of the map frame the map does not show."""
         return self._is_unmapped(points, np.zeros(len(points)))

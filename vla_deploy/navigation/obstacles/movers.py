@@ -5,7 +5,7 @@ where it is expected is followed, and moves when it has left where it was first 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,8 +22,12 @@ LOST_NS: Final = NS_PER_S
 GAIN: Final = 0.5
 SPEED_GAIN: Final = 0.3
 """Of an alpha-beta filter at ten scans a second: legs swing, and their middle with them."""
-MOVES_M_S: Final = 0.25
+MOVES_M_S: Final = 0.15
 LEFT_M: Final = 0.3
+BODY_M: Final = 0.5
+"""What the camera sees of somebody is this near to the middle of their legs."""
+TRAIL_NS: Final = 8 * NS_PER_S
+"""As long as the depth camera's cells are kept: what it saw of somebody who has gone is no more."""
 STANDS_NS: Final = 2 * NS_PER_S
 """What has stood still for so long is what stands there."""
 
@@ -37,13 +41,14 @@ class Mover(NamedTuple):
     vy_m_s: float
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Track:
     at: Points
     velocity: Points
     first_at: Points
     stamp_ns: int
     moved_ns: int | None = None
+    trail: list[tuple[int, Points]] = field(default_factory=list)
 
     def expected(self, stamp_ns: int) -> Points:
         return self.at + self.velocity * ((stamp_ns - self.stamp_ns) / NS_PER_S)
@@ -54,6 +59,8 @@ class _Track:
         self.at = expected + GAIN * (seen - expected)
         self.velocity = self.velocity + SPEED_GAIN * (seen - expected) / gap_s
         self.stamp_ns = stamp_ns
+        self.trail = [one for one in self.trail if stamp_ns - one[0] <= TRAIL_NS]
+        self.trail.append((stamp_ns, self.at))
         has_left = math.dist(self.at, self.first_at) > LEFT_M
         if has_left and math.hypot(*self.velocity) > MOVES_M_S:
             self.moved_ns = stamp_ns
@@ -66,10 +73,13 @@ class MoverTracks:
 
     def __init__(self) -> None:
         self._tracks: list[_Track] = []
+        self._gone: list[_Track] = []
 
     def see(self, points: Points, stamp_ns: int) -> tuple[Mover, ...]:
         """Take in the points of a scan that the map does not show; return what moves."""
-        self._tracks = [one for one in self._tracks if stamp_ns - one.stamp_ns <= LOST_NS]
+        gone = [one for one in self._tracks if stamp_ns - one.stamp_ns > LOST_NS]
+        self._tracks = [one for one in self._tracks if one not in gone]
+        self._gone = [one for one in self._gone + gone if stamp_ns - one.stamp_ns <= TRAIL_NS]
         for middle in _middles(points):
             free = [one for one in self._tracks if one.stamp_ns != stamp_ns]
             away_m = [math.dist(one.expected(stamp_ns), middle) for one in free]
@@ -82,6 +92,17 @@ class MoverTracks:
             for one in self._tracks
             if one.moved_ns is not None
         )
+
+    def left(self, stamp_ns: int) -> Points:
+        """Return rows of stamp (ns), x, y: where what moves was, and is no more, in TRAIL_NS."""
+        rows = [
+            (stamp, *at.tolist())
+            for one in self._tracks + self._gone
+            if one.moved_ns is not None
+            for stamp, at in one.trail
+            if math.dist(at, one.expected(stamp_ns)) > LEFT_M + BODY_M
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def _middles(points: Points) -> list[Points]:

@@ -5,12 +5,14 @@ are kept in cells of the map frame until they are seen to be gone or are too old
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
+from vla_deploy.navigation.obstacles.movers import BODY_M
 from vla_deploy.perception.geometry.cloud import PosedImage, sparse_points
 from vla_deploy.perception.geometry.lens import project
 from vla_deploy.robots.floor_pose import Pose2D
@@ -27,6 +29,8 @@ MIN_PIXELS = 2
 SEEN_WITHIN_M = 2.5
 KEPT_WITHIN_M = 1.5
 KEPT_NS = 8 * NS_PER_S
+# An image and a scan of one moment are up to a period of either apart.
+SAME_MOMENT_NS = NS_PER_S // 4
 # A cup hides the table close behind it; what is in view is seen anew wherever it stays.
 GONE_M = 0.04
 MIN_DEPTH_M = 0.2
@@ -36,11 +40,17 @@ HELD_M = 0.22
 TAKEN_M = 0.1
 
 
+class _Seen(NamedTuple):
+    at: tuple[float, float, float]
+    last_ns: int
+    first_ns: int
+
+
 class NearObstacles:
     """Hold the cells that stand up from the floor, each with its newest point."""
 
     def __init__(self) -> None:
-        self._cells: dict[Cell, tuple[float, float, float, int]] = {}
+        self._cells: dict[Cell, _Seen] = {}
 
     def update(self, image: PosedImage, grips: Sequence[Array]) -> None:
         """Process an image; `grips` are points of full hands in the base frame."""
@@ -55,7 +65,9 @@ class NearObstacles:
         for index in first[counts >= MIN_PIXELS]:
             x_m, y_m, z_m = turned[index].tolist()
             column, row = keys[index].tolist()
-            self._cells[column, row] = (x_m, y_m, z_m, image.stamp_ns)
+            before = self._cells.get((column, row))
+            first_ns = image.stamp_ns if before is None else before.first_ns
+            self._cells[column, row] = _Seen((x_m, y_m, z_m), image.stamp_ns, first_ns)
 
     def around(self, pose: Pose2D, now_ns: int) -> Array:
         """Return what stands near the base, (n, 3) in the base frame, the nearest first."""
@@ -65,15 +77,32 @@ class NearObstacles:
         near: Array = points[order[distance[order] <= KEPT_WITHIN_M]]
         return near
 
+    def forget_left(self, left: Array) -> None:
+        """Drop what was never seen but with somebody there who has walked away since.
+
+        `left` are rows of stamp (ns), x, y of the map frame, where they were.
+        """
+        if not self._cells or not len(left):
+            return
+        points = self._points()[:, :2]
+        by_them = np.linalg.norm(points[:, None] - left[None, :, 1:], axis=2) < BODY_M
+        gone = np.ones(len(points), dtype=np.bool_)
+        for stamps in zip(
+            *((one.first_ns, one.last_ns) for one in self._cells.values()), strict=True
+        ):
+            then = np.abs(np.array(stamps)[:, None] - left[None, :, 0]) < SAME_MOMENT_NS
+            gone &= (by_them & then).any(axis=1)
+        self._forget(gone)
+
     def on_map(self, now_ns: int) -> Array:
         """Return all that is remembered, (n, 3) in the map frame."""
         self._cells = {
-            cell: kept for cell, kept in self._cells.items() if now_ns - kept[3] <= KEPT_NS
+            cell: kept for cell, kept in self._cells.items() if now_ns - kept.last_ns <= KEPT_NS
         }
         return self._points()
 
     def _points(self) -> Array:
-        kept = [cell[:3] for cell in self._cells.values()]
+        kept = [cell.at for cell in self._cells.values()]
         return np.array(kept, dtype=np.float64).reshape(-1, 3)
 
     def _forget_gone(self, image: PosedImage) -> None:

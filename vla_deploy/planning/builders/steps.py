@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.builders import answering
-from vla_deploy.planning.builders.tidying import STORE, look_around, patrol, tidy
+from vla_deploy.planning.builders.tidying import STORE, look_around, tidy
 from vla_deploy.planning.command_parser.grammar import CHARGING, Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotAble
@@ -291,9 +291,15 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
         ("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})
     ],
     "stop": lambda _spoken, _step: [("stop", {})],
+    "follow": lambda spoken, step: [
+        ("follow_person", {"duration_s": spoken.amount(step, "s", 0.0)} if "by" in step else {})
+    ],
     "ask": _answer,
     "tidy": lambda spoken, step: tidy(spoken.fields(step, "where", "except"), spoken.request),
-    "patrol": lambda spoken, step: patrol(step["where"], spoken.request),
+    "patrol": lambda _spoken, step: [
+        one for name in ("where", "then") if name in step for one in look_around(step[name])
+    ],
+    "sweep": lambda _spoken, step: [("sweep", {"place": step["where"]})],
     "await": lambda _spoken, _step: [],
     "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),
     "permit": _refused(CannotBeDone, "say by itself what I may do again"),

@@ -1,11 +1,10 @@
-"""Clean with what there is: put things away, and drive over the floor around a place."""
+"""Clean with what there is: put things away; look around places."""
 
 from collections.abc import Mapping
 from typing import Final
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, require_fit
-from vla_deploy.planning.errors import NotAble
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
@@ -19,8 +18,6 @@ STORE: Final = "box"
 MOST_THINGS: Final = 6
 EVERYWHERE: Final = frozenset({"", "up", "mess", "room", "place", "house", "flat", "home",
                                "everything", "things", "apartment", "here"})  # fmt: skip
-REACH_M: Final = 1.0
-"""Half the side of the square around a place that belongs to it."""
 
 
 def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
@@ -89,27 +86,3 @@ def look_around(place: str | None = None) -> list[Skill]:
     """Look to all sides, at a place if one is said."""
     there: list[Skill] = [] if place is None else [("navigate_to", {"place": place})]
     return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
-
-
-def patrol(place: str, request: PlanRequest) -> list[Skill]:
-    """Drive towards the corners of the square around a place, as far as the floor is free.
-
-    Raises:
-        NotAble: no map is at hand, or no floor is free there.
-    """
-    site = request.world.sites.get(match_place(place, request.world.places) or "")
-    is_free = request.world.is_free
-    if site is None:
-        raise NotAble(f'I do not know the area "{place}"')
-    if is_free is None:
-        raise NotAble("without a map I cannot drive over an area")
-    steps: list[Skill] = []
-    for right, up in ((-1, -1), (-1, 1), (1, 1), (1, -1)):
-        for reach_m in (REACH_M, 0.5 * REACH_M):
-            x_m, y_m = site.pose.x_m + right * reach_m, site.pose.y_m + up * reach_m
-            if is_free(x_m, y_m):
-                steps.append(("navigate_to", {"x_m": round(x_m, 3), "y_m": round(y_m, 3)}))
-                break
-    if not steps:
-        raise NotAble(f"the map shows no free floor around the {site.name}")
-    return steps

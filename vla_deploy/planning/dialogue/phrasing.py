@@ -65,6 +65,8 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
     "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
     "charge": lambda given: "go and charge",
+    "sweep": lambda given: f"drive over the floor of {_the(given['place'])}",
+    "follow_person": lambda given: "follow you",
     "hand_over": lambda given: "hand it over",
     "open_gripper": lambda given: f"open my {_hand(given)}",
     "close_gripper": lambda given: f"close my {_hand(given)}",

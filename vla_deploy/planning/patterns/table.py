@@ -41,6 +41,7 @@ WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
 _METRES: Final = rf"{NUMBER}(?: of a| an?)? ?(?:m|met(?:er|re)s?|cm|centimet(?:er|re)s?)"
 _ANGLE: Final = rf"{NUMBER} ?(?:degrees?|deg|°|rad|radians?)"
 _SECONDS: Final = rf"{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment)"
+_SOMEBODY: Final = "him|her|them|(?:that|the) (?:person|man|woman|boy|girl)"
 _HAND: Final = r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|hands|grippers)"
 _IS_THING: Final = re.compile(_KNOWN)
 _THINGS: Final = rf"(?P<what>{_SEVERAL_THINGS})"
@@ -65,6 +66,8 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     # --- go, turn
     ("(?:go|drive|come) back|return", "go", {"where": "back"}),
     (r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", "go", {"where": "here"}),
+    (rf"(?:follow|come (?:along )?(?:with|after)) (?:me|us|{_SOMEBODY})"
+     rf"(?: for (?P<by>{_SECONDS}))?", "follow", {}),
     (r"dock|(?:go (?:and |to )?)?(?:re)?charge(?: yourself| your battery)?|go (?:and )?dock", "go",
      {"where": "charging station"}),
     (rf"(?:{_GO}|step) {_WAY}(?:(?: by)? (?P<by>{_METRES}|{_LITTLE}))?", "move", {}),
@@ -103,7 +106,9 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"{_TAKE} {_THINGS}(?: with {_HAND})?|(?:pick|lift) {_THINGS} up", "pick", {}),
     # --- tidy
     (rf"(?:clean|tidy|clear)(?: up)?(?: {_WHERE})?", "tidy", {}),
-    (rf"patrol {_WHERE}", "patrol", {}),
+    (rf"(?:clean|sweep|vacuum|hoover|mop) (?:the )?floor (?:of|in) {_WHERE}|"
+     rf"(?:sweep|vacuum|hoover|mop)(?: up)? {_WHERE}", "sweep", {}),
+    (rf"patrol {_WHERE}(?:(?:,| and|, and) (?P<then>{WORDS}))?", "patrol", {}),
     # --- say, wait, answer
     (r"say (?P<text>[^,;:]+)|(?P<text>hello|hi|good (?:morning|evening)|goodbye|bye)", "say", {}),
     (rf"wait(?: here)?(?:(?: for)? (?P<by>{_SECONDS}))?", "wait", {}),

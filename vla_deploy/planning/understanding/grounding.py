@@ -171,6 +171,8 @@ class _Grounder:
                 yield from self._navigate(given)
             case "charge":
                 yield "charge", {"place": self._station(given.get("place"))}
+            case "sweep" if isinstance(given.get("place"), str):
+                yield "sweep", {"place": resolve_place(given["place"], self.resolver)}
             case "place":
                 yield from self._place(given)
             case "find_object" | "look_at" if isinstance(given.get("object"), str):

@@ -162,6 +162,12 @@ _FORMS: Final = (
                skill="navigate_to", parameters=(_OBJECT, *_TO)),
     ActionForm(names=("charge", "recharge", "dock"), skill="charge",
                parameters=(_Form(("place", "station", "location"), values.text("place")),)),
+    ActionForm(names=("follow_person", "follow"), skill="follow_person",
+               parameters=(_DURATION,)),
+    ActionForm(names=("sweep", "execute_cleaning", "cover_area"), skill="sweep", parameters=(
+        _Form(("place", "area", "location", "room"), values.text("place")),
+        _Form(("coverage_type",), unused("it drives in lanes, and then to what they have left")),
+    )),
     ActionForm(names=("move",), skill="move",
                parameters=(_Form(("distance_m", "distance"), values.distance), _SPEED)),
     ActionForm(names=("move_forward",), skill="move", default={"distance_m": 1.0},
@@ -203,12 +209,10 @@ _FORMS: Final = (
 FORMS: Final[Mapping[str, ActionForm]] = MappingProxyType(
     {name: form for form in _FORMS for name in form.names}
 )
-_CLEANING: Final = 'no plan cleans; say it as a command: vla-deploy say "tidy up the kitchen"'
+_CLEANING: Final = "execute_cleaning looks, plans its lanes and drives them: write that alone"
 REFUSED: Final[Mapping[str, str]] = MappingProxyType(
     {
-        **dict.fromkeys(
-            ("scan_cleaning_area", "plan_cleaning_path", "execute_cleaning"), _CLEANING
-        ),
+        **dict.fromkeys(("scan_cleaning_area", "plan_cleaning_path"), _CLEANING),
         **dict.fromkeys(
             ("manipulation", "interaction", "perception", "movement"),
             "this is a kind of action, not one; name it under action, such as pick_up",

@@ -60,6 +60,11 @@ def turns(state: SymbolicState, setting: Setting) -> SymbolicState:
     return replace(state, at="", pose=(x_m, y_m, yaw_rad))
 
 
+def strays(state: SymbolicState, _: Setting) -> SymbolicState:
+    """Stand wherever somebody has led."""
+    return replace(state, at="", spot=None, pose=None)
+
+
 def finds(state: SymbolicState, setting: Setting) -> SymbolicState:
     """Know where the thing is; the search may have led anywhere unless it was in the scene."""
     subject = setting.subject("object")
@@ -68,7 +73,7 @@ def finds(state: SymbolicState, setting: Setting) -> SymbolicState:
     found = state.found | {subject.key}
     if subject.thing is not None or subject.others:
         return replace(state, found=found)
-    return replace(state, found=found, at="", spot=None, pose=None)
+    return strays(replace(state, found=found), setting)
 
 
 def takes(state: SymbolicState, setting: Setting) -> SymbolicState:
@@ -144,6 +149,8 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
             },
             effect=moves,
         ),
+        "follow_person": Logic(needs={}, effect=strays),
+        "sweep": Logic(needs={"area allowed": conditions.may_go_there}, effect=strays),
         "turn": Logic(needs={}, effect=turns),
         "look_at": Logic(needs={KNOWN: conditions.is_known}),
         "find_object": Logic(needs={}, effect=finds),

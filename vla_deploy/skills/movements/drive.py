@@ -119,7 +119,7 @@ def _have_driven(
         TryAgain: the robot did not know its place for too long, or is elsewhere in the end.
         SkillFailed: Nav2 rejected the pose or gave it up, or nobody knows how it ended.
     """
-    patience = _Patience(context)
+    patience = Patience(context)
 
     def hindrance() -> str:
         why = _why_blind(context)
@@ -154,7 +154,7 @@ def follow(
     """
     limits = limits_of(context, speed_m_s)
     follower, detour = PathFollower(points, limits, final_yaw_rad), Detour(context, points)
-    patience = _Patience(context)
+    patience = Patience(context)
     context.way_m = points
     try:
         while follower.phase is not FollowerPhase.ARRIVED and not until():
@@ -163,7 +163,9 @@ def follow(
                 context.way_m = detour.way
                 follower = PathFollower(detour.way, limits, final_yaw_rad)
             twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
-            hindrance = detour.closed_by or _hindrance(context, twist, _distance(pose, points[-1]))
+            hindrance = detour.closed_by or hindrance_of(
+                context, twist, _distance(pose, points[-1])
+            )
             context.link.drive(patience.pass_on(twist, hindrance))
             yield
     finally:
@@ -196,7 +198,7 @@ def straight(context: SkillContext, distance_m: float, speed_m_s: float | None =
     limits = limits_of(context)
     most_m_s = limits.speed_m_s / 2 if speed_m_s is None else min(limits.speed_m_s, speed_m_s)
     sign = math.copysign(1.0, distance_m)
-    patience = _Patience(context)
+    patience = Patience(context)
     while True:
         pose = context.link.pose
         left_m = abs(distance_m) - sign * _ahead_m(start, pose)
@@ -207,7 +209,7 @@ def straight(context: SkillContext, distance_m: float, speed_m_s: float | None =
         if _leaves_free_floor(context, sign):
             context.link.drive(AT_REST)
             raise NotPossible(f"the map shows no room for the last {left_m:.2f} m")
-        hindrance = _hindrance(context, twist, left_m, planned=False)
+        hindrance = hindrance_of(context, twist, left_m, planned=False)
         context.link.drive(patience.pass_on(twist, hindrance))
         yield
     context.link.drive(AT_REST)
@@ -236,7 +238,7 @@ def turn_by(context: SkillContext, angle_rad: float) -> Skill:
 
 
 def _turn(context: SkillContext, angle_rad: float, turned: "_Turned") -> Skill:
-    limits, patience = limits_of(context), _Patience(context)
+    limits, patience = limits_of(context), Patience(context)
     while abs(left_rad := angle_rad - turned.by_rad()) > 0.02:
         rate = min(limits.turn_rate_rad_s, 2.0 * abs(left_rad))
         twist = Twist(0.0, math.copysign(max(rate, 0.06), left_rad))
@@ -276,7 +278,7 @@ class _Turned:
         return self._sum_rad
 
 
-class _Patience:
+class Patience:
     """Hold the base while something hinders it, and give up when that stays.
 
     What control holds back by itself is asked for on and on: it goes on as soon as control lets it.
@@ -312,7 +314,7 @@ class _Patience:
             raise TryAgain(reason)
 
 
-def _hindrance(
+def hindrance_of(
     context: SkillContext, twist: Twist, remaining_m: float, planned: bool = True
 ) -> str:
     """Say what forbids to go on: no scan, one off the map, or something in the strip to be swept.

@@ -38,6 +38,11 @@ def does(text: str, *turns: ConversationTurn) -> str:
         ("go and charge", "charge"),
         ("charge yourself", "charge"),
         ("go to the charging station", "charge"),
+        ("follow me", "follow_person"),
+        ("Please come with me for two minutes.", "follow_person 120.0"),
+        ("follow that person", "follow_person"),
+        ("vacuum the kitchen", "sweep the kitchen"),
+        ("clean the floor of the living room", "sweep the living room"),
         ("move back a bit", "move -0.2"),
         ("turn right a bit", "turn -0.3490658503988659"),
         ("drive forward 50 cm", "move 0.5"),
@@ -57,6 +62,11 @@ def does(text: str, *turns: ConversationTurn) -> str:
         ),
         ("turn off the lamp and the socket", "turn_off lamp; turn_off socket"),
         ("go to the kitchen and switch on the plug", "navigate_to the kitchen; turn_on socket"),
+        (
+            "patrol the kitchen and the bedroom",
+            "navigate_to the kitchen; look_at left; look_at ahead; look_at right; look_at down; "
+            "navigate_to the bedroom; look_at left; look_at ahead; look_at right; look_at down",
+        ),
         ("look up", "look_at up"),
         ("look at the blue cup", "look_at the blue cup"),
         ("find my keys", "find_object my keys"),

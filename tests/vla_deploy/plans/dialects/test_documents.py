@@ -147,6 +147,9 @@ ROWS: list[tuple[Json, list[tuple[str, Json]], str]] = [
     ({"action": "turn", "angle_rad": 0.5}, [("turn", {"angle_rad": 0.5})], ""),
     ({"action": "go_to", "pose": [1, 2, 0.5]},
      [("navigate_to", {"x_m": 1.0, "y_m": 2.0, "yaw_rad": 0.5})], ""),
+    (task("execute_cleaning", area="kitchen", coverage_type="grid"),
+     [("sweep", {"place": "kitchen"})], "coverage_type"),
+    (task("follow", duration=20), [("follow_person", {"duration_s": 20.0})], ""),
     ({"action": "go_to", "location": {"x": 5.0, "y": 2.0, "yaw": 1.57}},
      [("navigate_to", {"x_m": 5.0, "y_m": 2.0, "yaw_rad": pytest.approx(1.57)})], ""),
 ]  # fmt: skip
@@ -175,9 +178,8 @@ REFUSALS: list[tuple[Any, str]] = [
     ({}, 'action "a1": it names no action; got no keys, write "action": "pick_up"'),
     ({"action": ["pick_up"]}, 'it names no action; got action ['),
     ({"type": "manipulation"}, 'type "manipulation": this is a kind of action, not one'),
-    (task("scan_cleaning_area", scan_radius=3.0, area="kitchen"), "say it as a command"),
-    (task("plan_cleaning_path", coverage_type="grid", area="kitchen"), "say it as a command"),
-    (task("execute_cleaning", area="kitchen"), "say it as a command"),
+    (task("scan_cleaning_area", scan_radius=3.0, area="kitchen"), "write that alone"),
+    (task("plan_cleaning_path", coverage_type="grid", area="kitchen"), "write that alone"),
     ({"action": "turn_left", "action_type": "turn_right"},
      'action "turn_left" and action_type "turn_right" differ; leave one out'),
     (terse("go_to", location=[1]), 'location must be a point [x, y] or [x, y, z], or {"x": ..., '

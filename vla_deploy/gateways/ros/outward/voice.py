@@ -109,7 +109,9 @@ _INTENTS: Final = frozenset(
     {"navigation", "manipulation", "cleaning", "search", "assist", "stop", "question"}
 )
 _BY_SKILL: Final = {
-    **dict.fromkeys(("navigate_to", "charge", "move", "turn"), "navigation"),
+    **dict.fromkeys(
+        ("navigate_to", "charge", "follow_person", "sweep", "move", "turn"), "navigation"
+    ),
     **dict.fromkeys(("pick_up", "place", "open_gripper", "close_gripper"), "manipulation"),
     **dict.fromkeys(("find_object", "look_at"), "search"),
     **dict.fromkeys(("speak", "hand_over", "wait", "turn_on", "turn_off"), "assist"),
