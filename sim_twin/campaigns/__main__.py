@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import demos, load, missions, soak
+from sim_twin.campaigns import demos, load, missions, navigation, soak
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
@@ -25,6 +25,7 @@ CAMPAIGNS: Final[
     "kills": kills.run,
     "load": load.run,
     "missions": missions.run,
+    "navigation": navigation.run,
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,

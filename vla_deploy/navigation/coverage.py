@@ -80,11 +80,9 @@ class FloorCoverage:
         return nearest
 
     def leave_out(self, x_m: float, y_m: float) -> None:
-        """Send the body near a point no more, whether it has got there or not."""
+        """Send the body to that very spot no more, whether it has got there or not."""
         row, column = self._grid.world_to_cell(x_m, y_m)
-        spot = np.zeros(self._centres.shape, dtype=np.uint8)
-        cv2.circle(spot, (column, row), self._reach, 1, thickness=cv2.FILLED)
-        self._centres &= ~spot.astype(np.bool_)
+        self._centres[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2] = False
 
     def _all_lanes(self) -> list[Lane]:
         rows, columns = np.nonzero(self._centres)

@@ -18,7 +18,7 @@ from vla_deploy.skills.movements.gaze import DRIVING_GAZE, turn_head
 AROUND_M: Final = 2.0
 """Half the side of the square that belongs to a place whose floor no robot file bounds."""
 ENOUGH_RATIO: Final = 0.98
-MOST_CORNERS: Final = 60
+MOST_CORNERS: Final = 100
 """After the lanes, single spots: each costs a way."""
 
 
