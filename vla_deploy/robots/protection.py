@@ -70,12 +70,14 @@ class ClearanceLimits:
 class TipOver:
     """Bound the lean, and how much may be used up of the way to the support polygon's edge.
 
-    `min_ratio` of the margin must be left: it is 1 standing level and 0 at tipping.
+    `min_ratio` of the margin must be left: it is 1 standing level and 0 at tipping. Below
+    `slow_below_ratio`, if that is not 0, the base goes ever slower.
     """
 
     support_m: Corners
     max_lean_rad: float
     min_ratio: float = 0.2
+    slow_below_ratio: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -69,7 +69,12 @@ ZONE: Shape = {
 }
 WORKSPACE: Shape = {"min_m": POINT_3, "max_m": POINT_3}
 CLEARANCE: Shape = {"self_m": NOT_NEGATIVE, "floor_m": NOT_NEGATIVE, "allow": PAIRS}
-TIP_OVER: Shape = {"support_m": POLYGON, "max_lean_rad": LEAN, "min_ratio": RATIO}
+TIP_OVER: Shape = {
+    "support_m": POLYGON,
+    "max_lean_rad": LEAN,
+    "min_ratio": RATIO,
+    "slow_below_ratio": RATIO.optional,
+}
 CONTACT: Shape = {"torque_nm": TABLE}
 
 # What a kind of zone cannot do without, and what it has no use for.
@@ -128,6 +133,15 @@ def workspaces_bound_hands(document: Document) -> Iterator[TableFault]:
                 )
 
 
+def it_slows_before_it_stops(document: Document) -> Iterator[TableFault]:
+    """What slows a leaning base comes before what stops it."""
+    row = table(document, "tip_over")
+    slow, stop = row.get("slow_below_ratio"), row.get("min_ratio")
+    if RATIO.holds(slow) and RATIO.holds(stop) and not slow > stop:
+        key, expected = "tip_over.slow_below_ratio", f"more than min_ratio {stop}"
+        yield TableFault(key=key, got=repr(slow), expected=expected)
+
+
 def contact_torques_fit_servos(document: Document) -> Iterator[TableFault]:
     """A contact threshold is that of a servo joint, and below what the servo can give."""
     models = subtables(document, "servo_models")
@@ -161,6 +175,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     zones_fit_their_kind,
     workspaces_bound_hands,
     contact_torques_fit_servos,
+    it_slows_before_it_stops,
     support_holds_centre,
 )
 

@@ -68,6 +68,7 @@ class Cause(Enum):
     STALE_COMMAND = "stale_command"
     KEEP_OUT_ZONE = "keep_out_zone"
     OBSTACLE_STOP_ZONE = "obstacle_stop_zone"
+    TIP_MARGIN = "tip_margin"
     OBSTACLE_SLOW_ZONE = "obstacle_slow_zone"
     OBSTACLE_LIMIT_ZONE = "obstacle_limit_zone"
     OBSTACLE_APPROACH = "obstacle_approach"
@@ -162,6 +163,8 @@ RULES: tuple[CauseRule, ...] = (
          around.keep_out, "drive out of the area"),
     CauseRule(Cause.OBSTACLE_STOP_ZONE,      Reaction.BASE_BLOCK,      Latch.NEVER,     1,   25,
          around.in_zone(ZoneKind.STOP), "clear the way, or drive the other way"),
+    CauseRule(Cause.TIP_MARGIN,              Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,
+         around.tip_margin, "drive more gently there, and bring the arms in"),
     CauseRule(Cause.OBSTACLE_SLOW_ZONE,      Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,
          around.in_zone(ZoneKind.SLOW), "clear the way"),
     CauseRule(Cause.OBSTACLE_LIMIT_ZONE,     Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,

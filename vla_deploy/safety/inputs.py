@@ -114,3 +114,4 @@ class SafetyLimits:
     approach_m_s: float
     tip_margin_ratio: float
     external_torque_nm: Floats
+    tip_slow_below_ratio: float = 0.0

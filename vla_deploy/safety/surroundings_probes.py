@@ -114,6 +114,25 @@ def tip_over(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     )
 
 
+def tip_margin(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a robot that has used up so much of that margin that its base must go slower.
+
+    Where nothing but the rest is left that it must keep, its speed is 0.
+    """
+    around = inputs.surroundings
+    margin, slow_below = around.tip_margin_ratio, limits.tip_slow_below_ratio
+    way = slow_below - limits.tip_margin_ratio
+    if margin is None or margin >= slow_below or way <= 0.0:
+        return None
+    return Finding(
+        subject="balance",
+        measured=margin,
+        limit=slow_below,
+        age_s=_told_age_s(around.imu_age_s),
+        speed_ratio=max(0.0, (margin - limits.tip_margin_ratio) / way),
+    )
+
+
 def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that something outside the robot pushes harder than allowed."""
     torque = inputs.surroundings.external_torque_nm

@@ -65,6 +65,7 @@ LIMITS = SafetyLimits(
     environment_clearance_m=0.01,
     approach_m_s=0.005,
     tip_margin_ratio=0.25,
+    tip_slow_below_ratio=0.5,
     external_torque_nm=np.array([2.0, np.inf]),
 )
 LEFT = DriveSample(
@@ -403,6 +404,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         around(tip_margin_ratio=0.25),
         "balance",
     ),
+    (
+        Cause.TIP_MARGIN,
+        around(tip_margin_ratio=0.5 - ULP),
+        around(tip_margin_ratio=0.5),
+        "balance",
+    ),
     (Cause.STALE_SCAN, around(scan_age_s=0.5 + ULP), around(scan_age_s=0.5), "scan"),
     (
         Cause.STALE_SCAN,
@@ -484,6 +491,7 @@ SWEEPS: tuple[tuple[Cause, Callable[[float], dict[str, Any]], float, int], ...] 
     (Cause.WORKSPACE, lambda excess_m: excess(excess_m, 0.1), 0.0, 1),
     (Cause.WORKSPACE, lambda rate: excess(0.1, rate), 0.005, 1),
     (Cause.TIP_OVER, lambda margin: around(tip_margin_ratio=margin), 0.25, -1),
+    (Cause.TIP_MARGIN, lambda margin: around(tip_margin_ratio=margin), 0.5, -1),
     (Cause.KEEP_OUT_ZONE, lambda depth_m: within(depth_m), 0.0, 1),
 )
 # Causes that no number decides: somebody says so, or nobody does.
@@ -548,12 +556,17 @@ def test_a_cause_is_found_just_beyond_its_limit(
     assert verdict.text.endswith(rule.advice)
 
 
+# What has slowed the base before this cause stops it.
+BEFORE = {Cause.TIP_OVER: Cause.TIP_MARGIN}
+
+
 @cases
 def test_a_cause_is_not_found_at_its_limit(
     cause: Cause, bad: dict[str, Any], good: dict[str, Any], subject: str
 ) -> None:
     _, verdict = ticks(SafetyState(), BY_CAUSE[cause].debounce_samples, **good)
-    assert verdict is CLEAR
+    assert verdict.cause is BEFORE.get(cause, Cause.NONE)
+    assert verdict is CLEAR or cause in BEFORE
 
 
 def test_every_cause_that_a_number_decides_is_swept() -> None:
@@ -575,7 +588,7 @@ def test_a_cause_begins_exactly_beyond_its_limit(
 @rules
 def test_a_cause_acts_only_after_its_debounce(rule: CauseRule) -> None:
     state, verdict = ticks(SafetyState(), rule.debounce_samples - 1, **SPOILERS[rule.cause])
-    assert verdict.reaction is Reaction.NONE
+    assert verdict.cause is BEFORE.get(rule.cause, Cause.NONE)
     _, verdict = tick(state, **SPOILERS[rule.cause])
     assert verdict.reaction is rule.reaction
 
@@ -585,7 +598,7 @@ def test_one_good_sample_starts_the_debounce_again(rule: CauseRule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples - 1, **SPOILERS[rule.cause])
     state, _ = tick(state)
     _, verdict = ticks(state, rule.debounce_samples - 1, **SPOILERS[rule.cause])
-    assert verdict.reaction is Reaction.NONE
+    assert verdict.cause is BEFORE.get(rule.cause, Cause.NONE)
 
 
 @rules
@@ -869,6 +882,7 @@ OLD = {"sample_age_s": np.array([0.0, 0.015]), "climate_age_s": np.array([0.0, 0
         (excess(0.1, 0.1), 0.015),
         (within(0.1), 0.3),
         (around(tip_margin_ratio=0.1), 0.07),
+        (around(tip_margin_ratio=0.4), 0.07),
         ({"temperature_c": np.array([30.0, 90.0])}, 0.6),
         ({"voltage_v": np.array([12.0, 5.0])}, 0.6),
         (right(fault_code=3, age_s=0.05), 0.05),
@@ -1081,3 +1095,23 @@ def test_the_speed_that_is_left_is_the_least_of_all_zones(ratios: list[float]) -
         zone(kinds[n % 3], f"zone {n}", speed_ratio=ratio) for n, ratio in enumerate(ratios)
     )
     assert tick(SafetyState(), **around(zones=zones))[1].speed_ratio == min(ratios)
+
+
+@pytest.mark.parametrize(
+    ("margin", "speed_ratio"), [(0.5, 1.0), (0.4375, 0.75), (0.375, 0.5), (0.28125, 0.125)]
+)
+def test_the_less_is_left_of_the_margin_against_tipping_the_slower_the_base(
+    margin: float, speed_ratio: float
+) -> None:
+    _, verdict = tick(SafetyState(), **around(tip_margin_ratio=margin))
+    assert verdict.speed_ratio == speed_ratio
+    assert (verdict.cause is Cause.TIP_MARGIN) == (speed_ratio < 1.0)
+
+
+@pytest.mark.parametrize("slow_below", [0.0, 0.25])
+def test_a_base_that_is_not_to_slow_before_it_stops_does_not(slow_below: float) -> None:
+    limits = replace(LIMITS, tip_slow_below_ratio=slow_below)
+    _, verdict = evaluate(SafetyState(), inputs_with(around(tip_margin_ratio=0.26)), limits)
+    assert verdict is CLEAR
+    _, verdict = evaluate(SafetyState(), inputs_with(around(tip_margin_ratio=0.24)), limits)
+    assert verdict.cause is not Cause.TIP_MARGIN

@@ -80,6 +80,7 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         approach_m_s=_APPROACH_M_S,
         tip_margin_ratio=tip_over.min_ratio if tip_over else 0.0,
         external_torque_nm=contact_torque(robot),
+        tip_slow_below_ratio=tip_over.slow_below_ratio if tip_over else 0.0,
     )
 
 

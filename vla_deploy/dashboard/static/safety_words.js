@@ -63,6 +63,7 @@ const CAUSES = {
   obstacle_slow_zone: "Something is in the slow-down zone",
   obstacle_limit_zone: "Something is in the limit zone",
   obstacle_approach: "It approaches something",
+  tip_margin: "It leans, and drives slower",
 };
 
 const REACTIONS = {
