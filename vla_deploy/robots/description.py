@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.servo.tools.travel import StopApproach
 from vla_deploy.robots.battery_settings import BatterySettings
 from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.devices import (
@@ -213,6 +214,8 @@ class RobotDescription:
     """What the robot switches in its home, by name."""
     things: tuple[KnownThing, ...] = ()
     """What it knows the size of."""
+    against_stops: Mapping[str, StopApproach] = field(default_factory=dict)
+    """Which joints may be calibrated by driving them against their stops, and how."""
 
     @property
     def base(self) -> BaseGeometry:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 from platforms.profile_source import merged
 from vla_deploy.robots import home_devices, known_things, protection_schema, schema, supplies
 from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
+from vla_deploy.robots.calibration import stop_approach
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
 from vla_deploy.robots.camera import CameraDescription
@@ -88,6 +89,7 @@ SHAPES: Mapping[str, Shape] = {
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
     **home_devices.SHAPES,
+    **stop_approach.SHAPES,
 }
 """What each table of a robot file holds, by its path."""
 
@@ -182,7 +184,13 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     yield from check_record(document, "", schema.ROBOT)
     yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
-    for check in (*CHECKS, *supplies.CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
+    for check in (
+        *CHECKS,
+        *supplies.CHECKS,
+        *protection_schema.CHECKS,
+        *home_devices.CHECKS,
+        *stop_approach.CHECKS,
+    ):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
@@ -197,6 +205,7 @@ def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableF
         yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
+        yield from stop_approach.missing_stops(document, mjcf)
 
 
 def _build(
@@ -227,6 +236,7 @@ def _build(
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
         twin=twin_settings(document),
+        against_stops=stop_approach.read_approaches(document),
         broker=_broker(document.get("mqtt"), directory),
         things=known_things.read_things(document.get("things", [])),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},

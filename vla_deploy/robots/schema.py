@@ -70,6 +70,7 @@ ROBOT: Shape = {
     "clearance": TABLE.optional,
     "tip_over": TABLE.optional,
     "contact": TABLE.optional,
+    "calibration": TABLE.optional,
 }
 SERVO_BUS: Shape = {
     "device": TEXT,
