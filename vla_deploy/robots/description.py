@@ -192,6 +192,8 @@ class RobotDescription:
     """
 
     name: str
+    folder: Path
+    """Where its file is, and what belongs to this one robot of its kind, as its calibration."""
     mjcf_path: Path
     servo_bus: ServoBus
     servo_models: Mapping[str, ServoModel]
@@ -208,6 +210,8 @@ class RobotDescription:
     battery: BatterySettings | None = None
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
+    read_only: bool = False
+    """A person moves its joints: it never has torque, and nothing moves it."""
     broker: MqttBroker | None = None
     twin: TwinSettings = USUAL_TWIN
     devices: Mapping[str, HomeDevice] = field(default_factory=dict)
@@ -295,6 +299,11 @@ class RobotDescription:
                 f"{self.name} has no {name.replace('_', ' ')}: [{name}] is not in its file"
             )
         return part
+
+    @property
+    def never_moves(self) -> str:
+        """Say why nothing moves it, "" where it may be moved."""
+        return f"{self.name} is a leader: it is only read" if self.read_only else ""
 
     @property
     def gripper_joints(self) -> frozenset[str]:

@@ -14,7 +14,7 @@ from vla_deploy.robots.calibration import stop_approach
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
 from vla_deploy.robots.camera import CameraDescription
-from vla_deploy.robots.consistency import CHECKS, missing_files, subtables
+from vla_deploy.robots.consistency import CHECKS, missing_files, mjcf_file, subtables
 from vla_deploy.robots.description import (
     BaseGeometry,
     Hand,
@@ -197,10 +197,10 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
 
 def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableFault]:
     name = document.get("mjcf")
-    if not isinstance(name, str) or not (directory / name).is_file():
+    if not isinstance(name, str) or not (file := mjcf_file(name, directory)).is_file():
         return
     try:
-        mjcf = read_mjcf_names(directory / name)
+        mjcf = read_mjcf_names(file)
     except ElementTree.ParseError as error:
         yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
@@ -213,7 +213,9 @@ def _build(
 ) -> RobotDescription:
     return RobotDescription(
         name=document["name"],
-        mjcf_path=directory / document["mjcf"],
+        folder=directory,
+        mjcf_path=mjcf_file(document["mjcf"], directory),
+        read_only=document.get("read_only", False),
         servo_bus=build(ServoBus, document["servo_bus"]),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
         parts=_parts(document, directory, camera),

@@ -40,6 +40,7 @@ _IDS = ValueCheck(
 ROBOT: Shape = {
     "name": TEXT,
     "mjcf": TEXT,
+    "read_only": one_of(False, True).optional,
     "servo_bus": TABLE,
     "servo_models": TABLE,
     "can_bus": TABLE.optional,

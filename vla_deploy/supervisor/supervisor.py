@@ -129,7 +129,7 @@ class Supervisor:
         except BaseException:
             self.stop(power_off=False)
             raise
-        if self._options.arm and not self.stop_requested:
+        if self._options.arm and not (self.stop_requested or self._robot.read_only):
             _arm(self._run.space)
 
     def step(self) -> None:

@@ -110,7 +110,7 @@ def calibrate(
     _require_turns(joints)
     _require_values(joints, pose, arguments)
     watched = answering_servos(robot, link, names)
-    record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
+    record = CalibrationRecord(arguments.output or robot.folder / CALIBRATION_FILE)
     failures = []
     if by_stops:
         _announce_drive(arguments, robot, names)
