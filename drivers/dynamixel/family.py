@@ -59,6 +59,7 @@ class DynamixelFamily:
                 initial("min_voltage_limit") * VOLTAGE_UNIT_V,
                 initial("max_voltage_limit") * VOLTAGE_UNIT_V,
             ),
+            has_watchdog=True,
             protocol="dynamixel 2",
         )
 

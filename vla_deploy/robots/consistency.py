@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import UnknownModel
+from drivers.power_relay.open_relay import PULSED
 from drivers.registry import SensorKind, model_names, sensor_model
 from drivers.servo.family import family_of
 from vla_deploy.robots.battery_settings import battery_is_usable
@@ -18,7 +19,7 @@ from vla_deploy.runtime.table_schema import TableFault, is_number
 Document = Mapping[str, Any]
 DEVICES = (
     *("servo_bus", "can_bus", "lidar", "imu", "camera"),
-    *("estop", "microphone", "speaker"),
+    *("estop", "power_relay", "microphone", "speaker"),
 )
 
 
@@ -378,6 +379,20 @@ def ros_is_on_where_needed(document: Document) -> Iterator[TableFault]:
             )
 
 
+def relays_fall_by_themselves(document: Document) -> Iterator[TableFault]:
+    """A relay on GPIO says how long its board holds it; one that is told has no such time."""
+    relay = table(document, "power_relay")
+    if not relay:
+        return
+    is_pulsed = relay.get("model") == PULSED
+    if is_pulsed and "hold_s" not in relay:
+        expected = "how long the board's monostable holds the relay after a pulse"
+        yield TableFault(key="power_relay.hold_s", got="nothing", expected=expected)
+    if not is_pulsed and "hold_s" in relay:
+        expected = f"nothing: only a board that falls without pulses has it, on {PULSED}"
+        yield TableFault(key="power_relay.hold_s", got=repr(relay["hold_s"]), expected=expected)
+
+
 def leaders_have_no_power(document: Document) -> Iterator[TableFault]:
     """A robot that is only read keeps no power through a stop, and has nothing that drives it."""
     if document.get("read_only") is not True:
@@ -411,6 +426,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     ros_is_on_where_needed,
     battery_is_usable,
     leaders_have_no_power,
+    relays_fall_by_themselves,
 )
 
 

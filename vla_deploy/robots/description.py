@@ -18,6 +18,7 @@ from vla_deploy.robots.devices import (
     Audio,
     CanBus,
     EstopButtonDescription,
+    PowerRelayDescription,
     SerialSensor,
     ServoBus,
     ServoModel,
@@ -203,6 +204,8 @@ class RobotDescription:
     hands: Mapping[str, Hand]
     poses: Mapping[str, Mapping[str, float]]
     estop: EstopButtonDescription | None = None
+    power_relay: PowerRelayDescription | None = None
+    """It stands in the servos' supply, and is closed while it is fed."""
     microphone: Audio | None = None
     speaker: Audio | None = None
     voice: VoiceSettings = USUAL_VOICE
@@ -410,8 +413,8 @@ class RobotDescription:
         """
         parts = self.parts
         devices = (self.servo_bus, parts.can_bus, parts.lidar, parts.imu, parts.camera)
-        sound = (self.estop, self.microphone, self.speaker)
-        paths = {device.device: device.path for device in (*devices, *sound) if device}
+        others = (self.estop, self.power_relay, self.microphone, self.speaker)
+        paths = {device.device: device.path for device in (*devices, *others) if device}
         if name not in paths:
             raise KeyError(f"{self.name} has no device {name!r}; it has {', '.join(paths)}")
         return paths[name] if devices_dir is None else str(devices_dir / name)

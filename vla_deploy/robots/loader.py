@@ -31,6 +31,7 @@ from vla_deploy.robots.devices import (
     Audio,
     CanBus,
     EstopButtonDescription,
+    PowerRelayDescription,
     SerialSensor,
     ServoBus,
     ServoModel,
@@ -66,6 +67,7 @@ SHAPES: Mapping[str, Shape] = {
     "imu": schema.IMU,
     "camera": schema.CAMERA,
     "estop": schema.ESTOP,
+    "power_relay": schema.POWER_RELAY,
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
@@ -220,6 +222,9 @@ def _build(
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
         parts=_parts(document, directory, camera),
         estop=EstopButtonDescription(**document["estop"]) if "estop" in document else None,
+        power_relay=(
+            PowerRelayDescription(**document["power_relay"]) if "power_relay" in document else None
+        ),
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
