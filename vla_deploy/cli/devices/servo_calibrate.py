@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.tools.bench import ServoBench
@@ -37,6 +37,7 @@ from vla_deploy.robots.joint_calibration import (
 )
 
 _TRIES: Final = 3
+_ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXAMPLES = """  vla-deploy servo calibrate --robot butler --joint left_elbow
   vla-deploy servo calibrate --robot butler --method mark --at 0
   vla-deploy servo calibrate --robot so101 --method stops
@@ -255,22 +256,25 @@ def _release(arguments: argparse.Namespace, link: ServoBench, servos: Sequence[J
 def _signals_interrupt() -> Iterator[None]:
     """Let the signals that end a program act like Ctrl-C, so that a driven servo is let go.
 
-    Outside of the main thread nothing is changed.
+    Only the first one counts: letting go is not interrupted. Outside of the main thread nothing is
+    changed.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {one: signal.signal(one, _interrupt) for one in (signal.SIGTERM, signal.SIGHUP)}
+    interrupted: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        interrupted.append(number)
+        if len(interrupted) == 1:
+            raise KeyboardInterrupt
+
+    before = {one: signal.signal(one, interrupt) for one in _ENDING_SIGNALS}
     try:
         yield
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
-
-
-def _interrupt(number: int, frame: object) -> NoReturn:
-    del number, frame
-    raise KeyboardInterrupt
 
 
 def _read_pose(robot: RobotDescription, text: str) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Calibrate emulated arms by driving their joints against their stops; nobody moves a joint."""
 
 import shutil
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -154,10 +155,20 @@ def test_what_are_not_the_stops_is_refused(make_arm, joint, low_rad, high_rad, w
     assert (arm.holds(joint, "torque_enable"), arm.holds(joint, "torque_limit")) == (0, 1000)
 
 
+class ImpatientWire(Wire):
+    """Send a signal with the 400th transaction, and with each of those that follow."""
+
+    def write(self, data: bytes) -> None:
+        self.ends_after -= 1
+        if self.ends_after <= 0:
+            signal.raise_signal(signal.SIGINT if self.ends_after % 2 else signal.SIGTERM)
+        self.line.write(data)
+
+
 @pytest.mark.parametrize("name", FULL)
-def test_an_interrupt_ends_with_the_servo_as_it_was(make_arm, name):
+def test_signals_end_with_the_servo_as_it_was_however_many_come(make_arm, name):
     arm = make_arm(name)
-    arm.wire.ends_after, arm.wire.ending, arm.wire.keeps_ending = 400, KeyboardInterrupt(), False
+    arm.wire = ImpatientWire(arm.wire.line, ends_after=400)
     with pytest.raises(KeyboardInterrupt):
         arm.calibrate("--joint", "gripper")
     register, full = FULL[name]
