@@ -29,7 +29,7 @@ from sim_twin.servos.server import (
     make_specs,
     serve,
 )
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotFileError, load_robot
 
 _EXAMPLE = """examples:
   python -m sim_twin.servos --robot so101 --link /tmp/servos
@@ -113,6 +113,11 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    if options.robot is not None:
+        try:
+            options.robot = load_robot(options.robot)
+        except RobotFileError as error:
+            parser.error(f"--robot: {error}")
     family = _FAMILIES[options.family]
     if not 1 <= options.servos <= family.max_id:
         parser.error(f"--servos: expected 1..{family.max_id}, got {options.servos}")
@@ -138,7 +143,7 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 def _build(options: argparse.Namespace) -> FreeBank:
     if options.robot is not None:
         return FreeRobotServos(
-            load_robot(options.robot), _timing(options), horn_off_pulses=options.horn_off_pulses
+            options.robot, _timing(options), horn_off_pulses=options.horn_off_pulses
         )
     family = _FAMILIES[options.family]
     eeprom = {}

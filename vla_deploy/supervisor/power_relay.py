@@ -100,7 +100,7 @@ class PowerRelayFeed:
             _log.warning("power relay: %s", "fed again" if fed else "no more pulses")
             self._fed = fed
         try:
-            relay = self._relay or self._opened()
+            relay = self._relay or self._opened(control)
             if relay is not None:
                 (relay.feed if fed else relay.cut)()
         except DriverError as error:
@@ -127,8 +127,9 @@ class PowerRelayFeed:
             reset_asked="reset" in acts,
         )
 
-    def _opened(self) -> PowerRelay | None:
-        if self._clock.now_ns() < self._open_ns:
+    def _opened(self, control: ProcessState) -> PowerRelay | None:
+        """Open the relay, not before control's turn to start: the twin's comes with the twin."""
+        if control is ProcessState.WAITING or self._clock.now_ns() < self._open_ns:
             return None
         declared = self._declared
         self._relay = open_relay(
