@@ -119,7 +119,7 @@ def _counted(session: RobotSession) -> TickWatch:
 
 def _robot(folder: Path) -> Path:
     """Copy the robot, with the rates that are measured."""
-    shutil.copytree(load_robot("butler").mjcf_path.parent, folder)
+    shutil.copytree(load_robot("butler").folder, folder)
     file = folder / "robot.toml"
     file.write_text(file.read_text(encoding="utf-8") + _ROS, encoding="utf-8")
     return folder

@@ -14,6 +14,9 @@ from drivers.errors import DeviceMissing
 from drivers.estop.gpio_button import Contact
 from drivers.estop.gpio_contact import GpioContact
 from drivers.estop.input_device import InputDevice
+from drivers.gpio import GpioOutput
+from drivers.power_relay.base import LevelOutput
+from drivers.power_relay.streamed_level import StreamedLevel
 from drivers.serial_port import SerialPort
 from drivers.socket_stream import SocketStream
 
@@ -144,6 +147,18 @@ class PathOpener:
             DeviceBusy: another process holds the line.
         """
         return GpioContact(self._link(name).path, offset)
+
+    def gpio_output(self, name: str, offset: int) -> LevelOutput:
+        """Open a line of the chip that the robot file gives, or a socket that carries its levels.
+
+        Raises:
+            DeviceMissing: there is no such chip or line, or the robot file does not name it.
+            DeviceBusy: another process holds the line.
+        """
+        path = Path(self._link(name).path)
+        if path.is_socket():
+            return StreamedLevel(SocketStream(path, self._clock))
+        return GpioOutput(str(path), offset, active_low=False)
 
     def _link(self, name: str) -> DeviceLink:
         if name not in self._links:

@@ -25,6 +25,7 @@ from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.servos import Coupling, WireTiming
+from sim_twin.servos.power_relay import LcusRelayDevice, PulsedRelayDevice, emulated_relay
 from sim_twin.servos.robot_bank import robot_bank, supply_volts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySource
@@ -80,11 +81,16 @@ class Twin:
             self._looking.append(imu)
             self.serial_devices[parts.imu.device] = imu
             frame_bytes[parts.imu.device] = bno085_rvc.FRAME_BYTES
+        self.relay = None if robot.power_relay is None else emulated_relay(robot.power_relay)
+        if robot.power_relay is not None and isinstance(self.relay, LcusRelayDevice):
+            self.serial_devices[robot.power_relay.device] = self.relay
         self.lines = {
             name: LineTamper(device, self._now_ns, frame_bytes.get(name))
             for name, device in self.serial_devices.items()
         }
         self.streamed_devices = streamed_devices(robot, seed)
+        if robot.power_relay is not None and isinstance(self.relay, PulsedRelayDevice):
+            self.streamed_devices[robot.power_relay.device] = self.relay
         self.stream_lines = {
             name: LineTamper(device, self._now_ns) for name, device in self.streamed_devices.items()
         }
@@ -216,7 +222,13 @@ class Twin:
 
     def truth(self) -> dict[str, Any]:
         """Return what the physics knows, and what is on in the home."""
-        return {**self.engine.referee.truth(), "switched_on": list(self.switched_on)}
+        truth = {**self.engine.referee.truth(), "switched_on": list(self.switched_on)}
+        return truth if self.relay is None else {**truth, "servo_supply": self.has_servo_supply}
+
+    @property
+    def has_servo_supply(self) -> bool:
+        """Return whether the relay in the servos' supply is closed, if there is one."""
+        return self.relay is None or self.relay.is_closed(self.now_ns)
 
     def announce(self, stream: str) -> None:
         """Let a streamed device begin anew for its next host.
@@ -299,12 +311,12 @@ class Twin:
 
     def _drive_motors(self) -> None:
         engine, now_ns = self.engine, self.engine.now_ns
-        shafts = engine.servos
+        shafts, is_fed = engine.servos, self.has_servo_supply
         duty = self.servos.advance(
             now_ns,
             shafts.joint_motion(),
             shafts.joint_effort(),
-            tuple(supply.volts(now_ns) for supply in self.servo_supplies.values()),
+            tuple(supply.volts(now_ns) * is_fed for supply in self.servo_supplies.values()),
         )
         shafts.command(duty)
         engine.drives.command_each(now_ns, self._drive_laws)

@@ -15,18 +15,12 @@ from drivers.dynamixel.tables.control_table import (
     VOLTAGE_UNIT_V,
 )
 from drivers.dynamixel.tools.bench import DynamixelBench
+from drivers.dynamixel.torque import HOLD_GAINS
 from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.joint_servo import JointServo
 
-HOLD_GAINS: Final = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
-"""Written whenever a servo is powered, since a reboot forgets them.
-
-P is what the gravity offset reckons with. With the factory's 800 and no D a loaded elbow rings for
-half a second after a stop; with these it stands in half of that, and trails its setpoint half as
-far.
-"""
 FULL_DUTY_ERROR_RAD: Final = PWM_FULL * 128.0 / HOLD_GAINS["position_p_gain"] * PULSE_RAD
 """e-manual: duty in PWM units is the error in pulses times P / 128."""
 
@@ -65,6 +59,7 @@ class DynamixelFamily:
                 initial("min_voltage_limit") * VOLTAGE_UNIT_V,
                 initial("max_voltage_limit") * VOLTAGE_UNIT_V,
             ),
+            has_watchdog=True,
             protocol="dynamixel 2",
         )
 

@@ -52,6 +52,7 @@ class FeetechFamily:
                 9.0 if sheet.voltage_v > 9.0 else sheet.voltage_range_v[0],
                 sheet.registers["max_voltage_limit"].initial * FEETECH_VOLTAGE_UNIT_V,
             ),
+            has_watchdog=False,
             protocol=f"feetech {sheet.byte_order}-endian",
         )
 

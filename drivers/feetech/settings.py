@@ -99,13 +99,21 @@ def write_kept_settings(
 
 def _set_up(link: FeetechLink, servo: FeetechServo, image: FeetechImage) -> FeetechSetup:
     written = tuple(text for text in write_kept_settings(link, servo, image.eeprom) if text)
+    limit = image.value(servo, "max_torque_limit")
+    return setup_of(servo, image, torque_limit=limit, written=written)
+
+
+def setup_of(
+    servo: FeetechServo, image: FeetechImage, *, torque_limit: int, written: tuple[str, ...] = ()
+) -> FeetechSetup:
+    """Return what was found in a servo, with the torque limit that it is to have."""
     minimum, maximum = position_limits(servo, image.eeprom)
     return FeetechSetup(
         firmware=image.firmware,
         model_number=image.value(servo, "model_number"),
         minimum_pulse=minimum,
         maximum_pulse=maximum,
-        torque_limit=image.value(servo, "max_torque_limit"),
+        torque_limit=torque_limit,
         shutdown=hardware_errors(image.value(servo, "shutdown")),
         torque_on=image.value(servo, "torque_enable") == TorqueSwitch.ON,
         error=hardware_errors(image.value(servo, "hardware_error_status")),

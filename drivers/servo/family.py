@@ -26,6 +26,8 @@ class ServoFacts:
     nominal_v: float
     """The voltage that the servo is made for: the datasheet's figures are of it."""
     voltage_limits_v: tuple[float, float]
+    has_watchdog: bool
+    """It stops by itself when the bus falls silent."""
     protocol: str
     """What is spoken on its wire: servos of one bus have the same."""
 

@@ -13,6 +13,8 @@ import can
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
 from drivers.estop.gpio_button import Contact
+from drivers.power_relay.base import LevelOutput
+from drivers.power_relay.streamed_level import StreamedLevel
 from sim_twin.can import MemoryBus
 from sim_twin.device import WireDevice
 from sim_twin.faults import FaultInjector
@@ -197,6 +199,15 @@ class MemoryOpener:
         raise DeviceMissing(
             f"{name}: the twin has no GPIO lines; declare the e-stop as HID to run it in the twin"
         )
+
+    def gpio_output(self, name: str, offset: int) -> LevelOutput:
+        """Open the line of the relay in the servos' supply.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        del offset
+        return StreamedLevel(self.input_events(name))
 
     def _plugged(self, name: str, device: WireDevice) -> MemoryLine:
         plug = self._twin.plugs[name]

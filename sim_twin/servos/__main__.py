@@ -23,13 +23,16 @@ from sim_twin.servos.protocol.timing import WireTiming
 from sim_twin.servos.server import (
     FreeBank,
     FreeFeetechServos,
+    FreeRobotServos,
     FreeServos,
     make_feetech_specs,
     make_specs,
     serve,
 )
+from vla_deploy.robots import RobotFileError, load_robot
 
 _EXAMPLE = """examples:
+  python -m sim_twin.servos --robot so101 --link /tmp/servos
   python -m sim_twin.servos --link /tmp/servos --baud 1000000 --return-delay-us 0
   python -m sim_twin.servos --family feetech --servos 6 --models STS3215-C018 --link /tmp/servos"""
 _MAX_RETURN_DELAY_US = 508
@@ -80,6 +83,12 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--link", type=Path, required=True, help="path of the link to the terminal")
+    parser.add_argument(
+        "--robot", help="be this robot's servos, each on a free shaft with the stops of its MJCF"
+    )
+    parser.add_argument(
+        "--horn-off-pulses", type=float, default=0.0, help="how far the robot's horns sit wrong"
+    )
     parser.add_argument("--family", choices=_FAMILIES, default="dynamixel")
     parser.add_argument("--servos", type=int, default=16, help="how many, with ids from 1")
     parser.add_argument(
@@ -104,6 +113,11 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    if options.robot is not None:
+        try:
+            options.robot = load_robot(options.robot)
+        except RobotFileError as error:
+            parser.error(f"--robot: {error}")
     family = _FAMILIES[options.family]
     if not 1 <= options.servos <= family.max_id:
         parser.error(f"--servos: expected 1..{family.max_id}, got {options.servos}")
@@ -127,22 +141,30 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 
 
 def _build(options: argparse.Namespace) -> FreeBank:
+    if options.robot is not None:
+        return FreeRobotServos(
+            options.robot, _timing(options), horn_off_pulses=options.horn_off_pulses
+        )
     family = _FAMILIES[options.family]
     eeprom = {}
     if options.return_delay_us is not None:
         eeprom["return_delay_time"] = options.return_delay_us // 2
-    timing = None
     if options.baud is not None:
         eeprom["baud_rate"] = {rate: value for value, rate in family.baud_rates.items()}[
             options.baud
         ]
-        timing = WireTiming(
-            baud=options.baud,
-            latency_timer_s=options.latency_timer_ms / 1e3,
-            jitter_s=options.jitter_us / 1e6,
-            seed=options.seed,
-        )
-    return family.build(options.servos, options.models, eeprom, timing)
+    return family.build(options.servos, options.models, eeprom, _timing(options))
+
+
+def _timing(options: argparse.Namespace) -> WireTiming | None:
+    if options.baud is None:
+        return None
+    return WireTiming(
+        baud=options.baud,
+        latency_timer_s=options.latency_timer_ms / 1e3,
+        jitter_s=options.jitter_us / 1e6,
+        seed=options.seed,
+    )
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -11,16 +11,23 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.tables.control_table import MODELS
+from drivers.dynamixel.tables.control_table import MODELS, PULSE_RAD
+from drivers.feetech.table import FEETECH_MODELS
 from sim_twin.ports.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.feetech import EmulatedFeetechSpec, FeetechBank, FeetechOptions
+from sim_twin.servos.firmware.coupling import Coupling
 from sim_twin.servos.firmware.rail import SupplyVolts
 from sim_twin.servos.firmware.rotor import FreeRotors, MotorFigures
 from sim_twin.servos.protocol.timing import WireTiming
+from sim_twin.servos.robot_bank import robot_bank, supply_volts
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.wire_bank import WireBank
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 STEP_S: Final = 0.002
 _STEP_NS: Final = round(STEP_S * NS_PER_S)
@@ -93,6 +100,34 @@ class FreeFeetechServos(FreeBank):
         models = [spec.datasheet for spec in specs]
         volts, feeds = _supplies_for(models, supply_v)
         super().__init__(FeetechBank(specs, options, timing, feeds=feeds), models, volts)
+
+
+class FreeRobotServos(FreeBank):
+    """Emulate a robot's servos without the robot: ids, models and supplies are those of its file.
+
+    Shafts begin in the middle of their turn, or at a stop that is before it, and end where the
+    MJCF's joints do, as the signs and offsets of the file have it; horns may be mounted
+    `horn_off_pulses` of the encoder further, which the file does not know.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        timing: WireTiming | None = None,
+        horn_off_pulses: float = 0.0,
+    ) -> None:
+        servos = robot.servo_bus.all_servos
+        coupling = Coupling.direct(len(servos))
+        models = [MODELS.get(one.model) or FEETECH_MODELS[one.model] for one in servos]
+        volts = tuple(supply_volts(robot.servo_bus).values())
+        super().__init__(robot_bank(robot.servo_bus, timing, coupling), models, volts)
+        ranges = read_mjcf_names(robot.mjcf_path).joint_ranges
+        for row, servo in enumerate(servos):
+            if (ends := ranges.get(servo.joint)) is not None:
+                per_joint = servo.sign * servo.travel_per_rad
+                angles = sorted((end - servo.offset) / per_joint for end in ends)
+                self.rotors.stops_rad[:, row] = np.array(angles) + horn_off_pulses * PULSE_RAD
+        self.rotors.position_rad[:] = np.clip(0.0, *self.rotors.stops_rad)
 
 
 def _supplies_for(

@@ -21,6 +21,8 @@ def refusal_of(status: Mapping[str, Any] | None) -> str | None:
     """
     if status is None:
         return SILENT
+    if status.get("never_moves"):
+        return str(status["never_moves"])
     remedy = REMEDIES.get(str(status["state"]))
     if remedy is None:
         return None

@@ -81,11 +81,18 @@ class ControlNode:
             )
         self._judging = Judging(space, robot, servos, wheels, clock)
         self._stopping = Stopping(robot, servos, wheels, self._joints, self._base, self._payload)
-        self._modes = Modes(Arming(servos, wheels, clock), self._stopping, self._motions)
+        self._modes = Modes(
+            Arming(servos, wheels, clock),
+            self._stopping,
+            self._motions,
+            never_moves=robot.never_moves,
+        )
         self._commands = space.ring_reader(topics.MOTION_COMMAND, from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
         self._status = Status(
-            self._ticks, self._modes, self._judging, self._inbox, self._motions, servos, wheels
+            *(self._ticks, self._modes, self._judging, self._inbox, self._motions),
+            *(servos, wheels),
+            never_moves=robot.never_moves,
         )
 
     def start(self) -> None:

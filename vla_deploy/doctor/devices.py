@@ -45,6 +45,7 @@ _GROUPS: Mapping[str, str] = {
     "imu": "dialout",
     "camera": "video",
     "estop": "input",
+    "power_relay": "gpio",
     "microphone": "audio",
     "speaker": "audio",
 }

@@ -19,10 +19,12 @@ from vla_deploy.doctor.context import DoctorContext
 from vla_deploy.doctor.finding import DoctorFinding, fail, missing, ok, warn
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.servos.declared import bus_family
+from vla_deploy.robots.servos.guard import GUARD_PAGE, GUARD_REMEDY, unguarded_servos
 from vla_deploy.robots.servos.survey import ServoSurvey, survey
 
 _PORT: Final = "servo port"
 _SERVOS: Final = "servo bus"
+_GUARD: Final = "servo guard"
 _COMMAND: Final = re.compile("`(vla-deploy [^`]+)`")
 _GRABBERS: Final = {
     "ModemManager": "sudo systemctl disable --now ModemManager",
@@ -66,6 +68,19 @@ def servos_on_the_bus(context: DoctorContext) -> Iterator[DoctorFinding]:
             f"{low_v:.1f} V to {high_v:.1f} V as declared"
         )
         yield ok(_SERVOS, measured)
+
+
+def servo_guard(context: DoctorContext) -> Iterator[DoctorFinding]:
+    """Check that something ends the servos' torque where the computer dies."""
+    if context.robot is None:
+        return
+    if lacks := unguarded_servos(context.robot):
+        yield warn(_GUARD, lacks, f"see {GUARD_PAGE}   # {GUARD_REMEDY}")
+    else:
+        relay, by = context.robot.power_relay, "stopped by their bus watchdog"
+        if relay is not None and relay.hold_s is not None:
+            by = f"without supply {relay.hold_s:g} s after the last pulse"
+        yield ok(_GUARD, "only read" if context.robot.read_only else by)
 
 
 def _finding(trouble: ServoTrouble, robot: RobotDescription) -> DoctorFinding:

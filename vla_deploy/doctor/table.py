@@ -40,6 +40,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Devices", "device files", devices.device_files),
     Check("Devices", "servo port", servos.port_users, live=True),
     Check("Devices", "servo bus", servos.servos_on_the_bus, live=True),
+    Check("Devices", "servo guard", servos.servo_guard),
     Check("Devices", "camera calibration", devices.camera_calibration),
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import UnknownModel
+from drivers.power_relay.open_relay import PULSED
 from drivers.registry import SensorKind, model_names, sensor_model
 from drivers.servo.family import family_of
 from vla_deploy.robots.battery_settings import battery_is_usable
@@ -18,7 +19,7 @@ from vla_deploy.runtime.table_schema import TableFault, is_number
 Document = Mapping[str, Any]
 DEVICES = (
     *("servo_bus", "can_bus", "lidar", "imu", "camera"),
-    *("estop", "microphone", "speaker"),
+    *("estop", "power_relay", "microphone", "speaker"),
 )
 
 
@@ -378,6 +379,34 @@ def ros_is_on_where_needed(document: Document) -> Iterator[TableFault]:
             )
 
 
+def relays_fall_by_themselves(document: Document) -> Iterator[TableFault]:
+    """A relay on GPIO says how long its board holds it; one that is told has no such time."""
+    relay = table(document, "power_relay")
+    if not relay:
+        return
+    is_pulsed = relay.get("model") == PULSED
+    if is_pulsed and "hold_s" not in relay:
+        expected = "how long the board's monostable holds the relay after a pulse"
+        yield TableFault(key="power_relay.hold_s", got="nothing", expected=expected)
+    if not is_pulsed and "hold_s" in relay:
+        expected = f"nothing: only a board that falls without pulses has it, on {PULSED}"
+        yield TableFault(key="power_relay.hold_s", got=repr(relay["hold_s"]), expected=expected)
+
+
+def leaders_have_no_power(document: Document) -> Iterator[TableFault]:
+    """A robot that is only read keeps no power through a stop, and has nothing that drives it."""
+    if document.get("read_only") is not True:
+        return
+    for key in (one for one in ("base", "head", "hands", "calibration") if one in document):
+        yield TableFault(key=key, got="a table", expected="nothing: the robot is only read")
+    for name, row in subtables(document, "groups").items():
+        if (category := row.get("stop_category")) != 0:
+            expected = "0, no power: the robot is only read"
+            yield TableFault(
+                key=f"groups.{name}.stop_category", got=repr(category), expected=expected
+            )
+
+
 CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     nothing_used_twice,
     parts_come_together,
@@ -396,14 +425,27 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     places_are_distinct,
     ros_is_on_where_needed,
     battery_is_usable,
+    leaders_have_no_power,
+    relays_fall_by_themselves,
 )
+
+
+def mjcf_file(name: str, directory: Path) -> Path:
+    """Return an MJCF in a robot's folder, or one of a robot that comes with the stack.
+
+    So an arm of another's geometry names that one's file, such as `so101/so101.xml`.
+    """
+    own = directory / name
+    shared = Path(__file__).parent / name
+    return shared if shared.is_file() and not own.is_file() else own
 
 
 def missing_files(document: Document, directory: Path) -> Iterator[TableFault]:
     """Yield a fault for each file that the robot file names and that is not there."""
     can_bus = table(document, "can_bus")
+    if isinstance(name := document.get("mjcf"), str) and not mjcf_file(name, directory).is_file():
+        yield TableFault(key="mjcf", got=repr(name), expected=f"a file under {directory}")
     named = (
-        ("mjcf", document.get("mjcf")),
         ("home.map", table(document, "home").get("map")),
         ("can_bus.eds", can_bus.get("eds")),
         ("can_bus.endpoints", can_bus.get("endpoints")),

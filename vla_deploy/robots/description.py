@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.servo.tools.travel import StopApproach
 from vla_deploy.robots.battery_settings import BatterySettings
 from vla_deploy.robots.camera import CameraDescription
 from vla_deploy.robots.devices import (
@@ -17,6 +18,7 @@ from vla_deploy.robots.devices import (
     Audio,
     CanBus,
     EstopButtonDescription,
+    PowerRelayDescription,
     SerialSensor,
     ServoBus,
     ServoModel,
@@ -195,6 +197,8 @@ class RobotDescription:
     """
 
     name: str
+    folder: Path
+    """Where its file is, and what belongs to this one robot of its kind, as its calibration."""
     mjcf_path: Path
     servo_bus: ServoBus
     servo_models: Mapping[str, ServoModel]
@@ -204,6 +208,8 @@ class RobotDescription:
     hands: Mapping[str, Hand]
     poses: Mapping[str, Mapping[str, float]]
     estop: EstopButtonDescription | None = None
+    power_relay: PowerRelayDescription | None = None
+    """It stands in the servos' supply, and is closed while it is fed."""
     microphone: Audio | None = None
     speaker: Audio | None = None
     voice: VoiceSettings = USUAL_VOICE
@@ -211,12 +217,16 @@ class RobotDescription:
     battery: BatterySettings | None = None
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
+    read_only: bool = False
+    """A person moves its joints: it never has torque, and nothing moves it."""
     broker: MqttBroker | None = None
     twin: TwinSettings = USUAL_TWIN
     devices: Mapping[str, HomeDevice] = field(default_factory=dict)
     """What the robot switches in its home, by name."""
     things: tuple[KnownThing, ...] = ()
     """What it knows the size of."""
+    against_stops: Mapping[str, StopApproach] = field(default_factory=dict)
+    """Which joints may be calibrated by driving them against their stops, and how."""
 
     @property
     def base(self) -> BaseGeometry:
@@ -296,6 +306,11 @@ class RobotDescription:
                 f"{self.name} has no {name.replace('_', ' ')}: [{name}] is not in its file"
             )
         return part
+
+    @property
+    def never_moves(self) -> str:
+        """Say why nothing moves it, "" where it may be moved."""
+        return f"{self.name} is a leader: it is only read" if self.read_only else ""
 
     @property
     def gripper_joints(self) -> frozenset[str]:
@@ -402,8 +417,8 @@ class RobotDescription:
         """
         parts = self.parts
         devices = (self.servo_bus, parts.can_bus, parts.lidar, parts.imu, parts.camera)
-        sound = (self.estop, self.microphone, self.speaker)
-        paths = {device.device: device.path for device in (*devices, *sound) if device}
+        others = (self.estop, self.power_relay, self.microphone, self.speaker)
+        paths = {device.device: device.path for device in (*devices, *others) if device}
         if name not in paths:
             raise KeyError(f"{self.name} has no device {name!r}; it has {', '.join(paths)}")
         return paths[name] if devices_dir is None else str(devices_dir / name)

@@ -125,6 +125,27 @@ class EstopButtonDescription:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PowerRelayDescription:
+    """Describe the relay in the servos' supply; `number` is a GPIO line's offset, or a channel.
+
+    Its board opens it by itself `hold_s` after the last pulse; None is a board without a timer. It
+    gets no pulses when control has been silent for `control_silence_s`.
+    """
+
+    device: str
+    path: str
+    model: str
+    number: int
+    hold_s: float | None = None
+    control_silence_s: float = 10.0
+
+    @property
+    def is_fail_safe(self) -> bool:
+        """Return whether it opens where the computer dies."""
+        return self.hold_s is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Audio:
     """Describe a microphone or a speaker; `path` is its name at the sound system, or a socket."""
 

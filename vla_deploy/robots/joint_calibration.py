@@ -22,13 +22,16 @@ from vla_deploy.robots.kinematics.mjcf import read_mjcf_names
 
 
 def guided_joints(robot: RobotDescription, names: Sequence[str]) -> list[GuidedJoint]:
-    """Describe joints by robot file and MJCF; a joint without a range there has its limits."""
-    ranges = read_mjcf_names(robot.mjcf_path).joint_ranges
+    """Describe joints by robot file and MJCF; a joint without a range there has its limits.
+
+    So has one of a leader, whose MJCF may be that of the arm that follows it.
+    """
+    ranges = {} if robot.read_only else read_mjcf_names(robot.mjcf_path).joint_ranges
     joints = []
     for name in names:
         servo = robot.servo_bus.servos[robot.joint_index[name]]
         limits = (robot.limits[name].min, robot.limits[name].max)
-        low, high = ranges[name] or limits
+        low, high = ranges.get(name) or limits
         joints.append(
             GuidedJoint(
                 servo=family_of(servo.model).servo(

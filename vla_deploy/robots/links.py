@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from drivers.opener import DeviceLink
+from drivers.power_relay.lcus_relay import LCUS_BAUD
 from drivers.registry import SensorKind, sensor_model
 from vla_deploy.robots.description import RobotDescription
 
@@ -19,6 +20,8 @@ def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> di
         bauds[parts.lidar.device] = sensor_model(SensorKind.LIDAR, parts.lidar.model).baud
     if parts.imu is not None:
         bauds[parts.imu.device] = sensor_model(SensorKind.IMU, parts.imu.model).baud
+    if robot.power_relay is not None:
+        bauds[robot.power_relay.device] = LCUS_BAUD
     optional = (parts.camera, robot.estop, robot.microphone, robot.speaker)
     bauds.update({device.device: 0 for device in optional if device})
     return {

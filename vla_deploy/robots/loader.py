@@ -10,10 +10,11 @@ from xml.etree import ElementTree
 from platforms.profile_source import merged
 from vla_deploy.robots import home_devices, known_things, protection_schema, schema, supplies
 from vla_deploy.robots.battery_settings import BATTERY, BatterySettings
+from vla_deploy.robots.calibration import stop_approach
 from vla_deploy.robots.calibration.calibration import calibrated
 from vla_deploy.robots.calibration.camera_calibration import with_calibration
 from vla_deploy.robots.camera import CameraDescription
-from vla_deploy.robots.consistency import CHECKS, missing_files, subtables
+from vla_deploy.robots.consistency import CHECKS, missing_files, mjcf_file, subtables
 from vla_deploy.robots.description import (
     BaseGeometry,
     Hand,
@@ -30,6 +31,7 @@ from vla_deploy.robots.devices import (
     Audio,
     CanBus,
     EstopButtonDescription,
+    PowerRelayDescription,
     SerialSensor,
     ServoBus,
     ServoModel,
@@ -65,6 +67,7 @@ SHAPES: Mapping[str, Shape] = {
     "imu": schema.IMU,
     "camera": schema.CAMERA,
     "estop": schema.ESTOP,
+    "power_relay": schema.POWER_RELAY,
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
@@ -88,6 +91,7 @@ SHAPES: Mapping[str, Shape] = {
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
     **home_devices.SHAPES,
+    **stop_approach.SHAPES,
 }
 """What each table of a robot file holds, by its path."""
 
@@ -182,21 +186,28 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     yield from check_record(document, "", schema.ROBOT)
     yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
-    for check in (*CHECKS, *supplies.CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
+    for check in (
+        *CHECKS,
+        *supplies.CHECKS,
+        *protection_schema.CHECKS,
+        *home_devices.CHECKS,
+        *stop_approach.CHECKS,
+    ):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
 
 def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[TableFault]:
     name = document.get("mjcf")
-    if not isinstance(name, str) or not (directory / name).is_file():
+    if not isinstance(name, str) or not (file := mjcf_file(name, directory)).is_file():
         return
     try:
-        mjcf = read_mjcf_names(directory / name)
+        mjcf = read_mjcf_names(file)
     except ElementTree.ParseError as error:
         yield TableFault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
     else:
         yield from mjcf_faults(document, mjcf)
+        yield from stop_approach.missing_stops(document, mjcf)
 
 
 def _build(
@@ -204,11 +215,16 @@ def _build(
 ) -> RobotDescription:
     return RobotDescription(
         name=document["name"],
-        mjcf_path=directory / document["mjcf"],
+        folder=directory,
+        mjcf_path=mjcf_file(document["mjcf"], directory),
+        read_only=document.get("read_only", False),
         servo_bus=build(ServoBus, document["servo_bus"]),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
         parts=_parts(document, directory, camera),
         estop=EstopButtonDescription(**document["estop"]) if "estop" in document else None,
+        power_relay=(
+            PowerRelayDescription(**document["power_relay"]) if "power_relay" in document else None
+        ),
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
@@ -227,6 +243,7 @@ def _build(
         protection=protection_schema.build_protection(document),
         planning=build(PlanBounds, document.get("planning", {})),
         twin=twin_settings(document),
+        against_stops=stop_approach.read_approaches(document),
         broker=_broker(document.get("mqtt"), directory),
         things=known_things.read_things(document.get("things", [])),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},

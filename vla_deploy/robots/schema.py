@@ -1,6 +1,7 @@
 """Declare which keys a robot file has and what each may hold."""
 
 from drivers.estop.open_estop import MODELS as ESTOP_MODELS
+from drivers.power_relay.open_relay import RELAY_MODELS
 from drivers.registry import SensorKind, model_names
 from vla_deploy.runtime.table_schema import (
     NUMBER,
@@ -40,6 +41,7 @@ _IDS = ValueCheck(
 ROBOT: Shape = {
     "name": TEXT,
     "mjcf": TEXT,
+    "read_only": one_of(False, True).optional,
     "servo_bus": TABLE,
     "servo_models": TABLE,
     "can_bus": TABLE.optional,
@@ -48,6 +50,7 @@ ROBOT: Shape = {
     "imu": TABLE.optional,
     "camera": TABLE.optional,
     "estop": TABLE.optional,
+    "power_relay": TABLE.optional,
     "microphone": TABLE.optional,
     "speaker": TABLE.optional,
     "voice": TABLE.optional,
@@ -70,6 +73,7 @@ ROBOT: Shape = {
     "clearance": TABLE.optional,
     "tip_over": TABLE.optional,
     "contact": TABLE.optional,
+    "calibration": TABLE.optional,
 }
 SERVO_BUS: Shape = {
     "device": TEXT,
@@ -149,6 +153,14 @@ ESTOP: Shape = {
     "path": TEXT,
     "model": one_of(*ESTOP_MODELS),
     "number": integer(0, 767),
+}
+POWER_RELAY: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "model": one_of(*RELAY_MODELS),
+    "number": integer(0, 255),
+    "hold_s": number(0.3, 60.0, "s", kind="a time").optional,
+    "control_silence_s": number(1.0, 120.0, "s", kind="a time").optional,
 }
 AUDIO: Shape = {
     "device": TEXT,

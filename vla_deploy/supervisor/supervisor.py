@@ -19,6 +19,7 @@ from vla_deploy.supervisor.errors import (
     StartFailed,
     SupervisorError,
 )
+from vla_deploy.supervisor.power_relay import CONTROL
 from vla_deploy.supervisor.processes.lifecycle import (
     SETTLED,
     TROUBLED,
@@ -129,7 +130,7 @@ class Supervisor:
         except BaseException:
             self.stop(power_off=False)
             raise
-        if self._options.arm and not self.stop_requested:
+        if self._options.arm and not (self.stop_requested or self._robot.read_only):
             _arm(self._run.space)
 
     def step(self) -> None:
@@ -215,6 +216,8 @@ class Supervisor:
         run.activity.step(self._given_up.refusal)
         if run.battery is not None:
             run.battery.step()
+        if run.power_relay is not None:
+            run.power_relay.step(self._records[CONTROL].state, stopping=stopping)
         run.serial_workers.step(wanted=self.profile.realtime_priority > 0)
         run.notifier.step(
             ready=self._is_ready(),

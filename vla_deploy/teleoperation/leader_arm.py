@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -24,11 +24,24 @@ _VELOCITY_SAMPLES: Final = 4
 """60 ms at 50 Hz: one pulse is then 0.026 rad/s."""
 
 
+class PulseScale(Protocol):
+    """Convert the pulses of a leader's servos into joint values of the robot that follows."""
+
+    @property
+    def joints(self) -> Sequence[str]:
+        """Return the joints, in the order of the servos."""
+        ...
+
+    def to_joints(self, pulses: Floats) -> Floats:
+        """Return the values of `joints`."""
+        ...
+
+
 class LeaderArm:
     """Declare what a person moves by hand: a pose in joint values of the robot that follows."""
 
     def __init__(
-        self, bench: ServoBench, clock: Clock, servos: Sequence[JointServo], scale: LeaderScale
+        self, bench: ServoBench, clock: Clock, servos: Sequence[JointServo], scale: PulseScale
     ) -> None:
         """Take servos in the order of the scale's joints."""
         self.missed = 0

@@ -16,6 +16,7 @@ from drivers.dynamixel.tables.control_table import (
 )
 from drivers.dynamixel.tables.registers import Registers, decode
 from drivers.dynamixel.tables.settings import IMAGE_BYTES
+from drivers.dynamixel.tools.gentle_drive import DynamixelDrive
 from drivers.dynamixel.wire.codec import (
     BROADCAST_ID,
     MAX_SERVO_ID,
@@ -167,6 +168,16 @@ class DynamixelBench:
             LinkLost: the adapter is gone.
         """
         self.write(servo, "torque_enable", 0)
+
+    def drive(self, servo: JointServo, torque_ratio: float) -> DynamixelDrive:
+        """Make ready to drive a servo with a share of its torque; nothing is written yet.
+
+        Raises:
+            WrongServo: it is in no position mode, or its torque cannot be bounded.
+            ServoSilent: no answer.
+            LinkLost: the adapter is gone.
+        """
+        return DynamixelDrive(self._registers, _spec(servo), torque_ratio)
 
     def set_id(self, servo: JointServo, new_id: int) -> None:
         """Give a servo without torque another id.

@@ -30,6 +30,7 @@ from drivers.feetech.table import (
     model_names,
     models_of,
 )
+from drivers.feetech.tools.gentle_drive import FeetechDrive
 from drivers.servo.counters import BusCounters
 from drivers.servo.errors import CorruptReply, ServoSilent, WrongServo
 from drivers.servo.fault_policy import describe_bits
@@ -191,6 +192,16 @@ class FeetechBench:
             LinkLost: the adapter is gone.
         """
         self.link.write(_spec(servo), "torque_enable", 0)
+
+    def drive(self, servo: JointServo, torque_ratio: float) -> FeetechDrive:
+        """Make ready to drive a servo with a share of its torque; nothing is written yet.
+
+        Raises:
+            WrongServo: it is in no position mode, or its torque cannot be bounded.
+            ServoSilent: no answer.
+            LinkLost: the adapter is gone.
+        """
+        return FeetechDrive(self.link, _spec(servo), torque_ratio)
 
     def set_id(self, servo: JointServo, new_id: int) -> None:
         """Give a servo without torque another id, and lock that against a power cut.

@@ -10,6 +10,7 @@ from drivers.servo.counters import BusCounters
 from drivers.servo.errors import ServoSilent
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.patience import ReplyPatience
+from drivers.servo.tools.gentle_drive import GentleDrive
 from drivers.servo.trouble import ServoTrouble
 
 ONE_TRY: Final = ReplyPatience(margin_s=0.02, attempts=1)
@@ -140,6 +141,14 @@ class ServoBench(Protocol):
 
     def release(self, servo: JointServo) -> None:
         """Take a servo's torque away."""
+        ...
+
+    def drive(self, servo: JointServo, torque_ratio: float) -> GentleDrive:
+        """Make ready to drive a servo with a share of its torque; nothing is written yet.
+
+        Raises:
+            WrongServo: it is in no position mode, or its torque cannot be bounded.
+        """
         ...
 
     def set_id(self, servo: JointServo, new_id: int) -> None:

@@ -59,6 +59,19 @@ class ServoMounting:
     offset: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopApproach:
+    """Say how a joint is driven against its stops; all values are of the servo's shaft.
+
+    `torque_ratio` is of the full duty. The travel may differ from the MJCF's by `tolerance_rad`,
+    half of which is the most that the middle is then off.
+    """
+
+    torque_ratio: float
+    speed_rad_s: float
+    tolerance_rad: float = 0.06
+
+
 class TravelLog:
     """Follow the servos of a bus through a sweep, over the ends of their turns."""
 
@@ -143,6 +156,22 @@ def judge_sweep(
             f"{joint}: it went against its declared sign {expected.sign}: begin at the lower end "
             f"({expected.low:g}); if the servo is mounted the other way round now, say "
             "--accept-sign"
+        )
+
+
+def judge_stops(expected: JointRange, travel: int, tolerance_rad: float) -> None:
+    """Refuse a travel between two stops that are not the joint's.
+
+    Raises:
+        TravelRefused: it differs from the joint's range by more than the tolerance.
+    """
+    off_rad = (abs(travel) - expected.pulses) * PULSE_RAD
+    if abs(off_rad) > tolerance_rad:
+        raise TravelRefused(
+            f"{expected.joint}: it was stopped at both ends of {_degrees(travel)}, its range "
+            f"{expected.low:g}..{expected.high:g} is {_degrees(expected.pulses)}: "
+            + ("something is in the way" if off_rad < 0 else "a stop gives way, or is not there")
+            + ", or the MJCF is wrong"
         )
 
 

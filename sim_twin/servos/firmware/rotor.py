@@ -46,7 +46,8 @@ class FreeRotors:
     torque = stall * duty - stall / no_load * velocity
 
     Without `inertia_kg_m2` each motor turns its own rotor alone, by `TIME_CONSTANT_S`: an inertia
-    that suits a strong motor makes the position loop of a fast weak one unstable.
+    that suits a strong motor makes the position loop of a fast weak one unstable. A shaft ends at
+    its `stops_rad`, a row of the lowest and one of the highest positions, without a bounce.
     """
 
     def __init__(self, models: Sequence[MotorFigures], inertia_kg_m2: float | None = None) -> None:
@@ -57,11 +58,16 @@ class FreeRotors:
         self.motion: Floats = np.zeros((2, len(models)))
         self.position_rad, self.velocity_rad_s = self.motion
         self.torque_nm: Floats = np.zeros(len(models))
+        self.stops_rad: Floats = np.full((2, len(models)), np.inf)
+        self.stops_rad[0] = -np.inf
 
     def advance(self, duty: Floats, dt_s: float) -> None:
         """Move on by `dt_s` with a constant duty."""
         per_inertia = dt_s / self._inertia_kg_m2
         pushed = self.velocity_rad_s + per_inertia * self._stall_nm * duty
         self.velocity_rad_s[:] = pushed / (1.0 + per_inertia * self._damping)
+        turned = self.position_rad + self.velocity_rad_s * dt_s
+        low, high = self.stops_rad
+        self.velocity_rad_s[(turned < low) | (turned > high)] = 0.0
+        self.position_rad[:] = np.clip(turned, low, high)
         self.torque_nm = self._stall_nm * duty - self._damping * self.velocity_rad_s
-        self.position_rad += self.velocity_rad_s * dt_s

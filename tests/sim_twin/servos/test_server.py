@@ -18,7 +18,10 @@ import psutil
 import pytest
 import rustypot
 
+from drivers.dynamixel.tables.control_table import PULSE_RAD
 from sim_twin.servos.__main__ import main
+from sim_twin.servos.server import FreeRobotServos
+from vla_deploy.robots import load_robot
 
 pytestmark = pytest.mark.stack
 
@@ -322,6 +325,19 @@ def test_the_server_ends_by_itself_and_sleeps_meanwhile(tmp_path: Path) -> None:
         assert server.wait(timeout=10) == 0
 
 
+def test_a_robots_servos_end_at_the_stops_of_its_joints(tmp_path: Path) -> None:
+    robot, path = load_robot("koch_v1_1"), tmp_path / "servos"
+    free = FreeRobotServos(robot, horn_off_pulses=10.0)
+    low, high = free.rotors.stops_rad[:, robot.joint_index["gripper"]]
+    off_rad = robot.servo_bus.servos[5].offset - 10.0 * PULSE_RAD
+    assert (low + off_rad, high + off_rad) == pytest.approx((-0.032, 1.6))
+    with served(path, "--robot", "koch_v1_1"):
+        host = SdkHost(path)
+        host.open(robot.servo_bus.baud)
+        assert host.packets.ping(host.port, 6)[0] == 1200
+        host.close()
+
+
 def test_a_paced_bus_is_never_faster_than_its_wire(tmp_path: Path) -> None:
     ids, path, times_s = range(1, 17), tmp_path / "servos", []
     words = ("--servos", "16", "--baud", str(BAUD), "--return-delay-us", "100")
@@ -343,6 +359,7 @@ def test_a_paced_bus_is_never_faster_than_its_wire(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["--servos", "300"], "expected 1..252, got 300"),
+        (["--robot", "nobody"], "--robot: nobody"),
         (["--return-delay-us", "600"], "--return-delay-us: expected 0..508, got 600"),
         (["--latency-timer-ms", "16"], "--latency-timer-ms: only a paced bus has it; give --baud"),
         (["--baud", "9600", "--jitter-us", "-1"], "--jitter-us: expected 0 or more, got -1.0"),

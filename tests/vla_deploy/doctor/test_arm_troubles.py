@@ -367,7 +367,7 @@ def test_a_homing_offset_that_was_changed_since_calibration_is_named(
     write_calibration(tmp_path / CALIBRATION_FILE, {"elbow_flex": calibration})
     computer.write(SO101.servo_bus.path)
     line = so101({3: {"homing_offset": held}})
-    robot = replace(SO101, mjcf_path=tmp_path / "so101.xml")
+    robot = replace(SO101, folder=tmp_path)
     context = replace(computer.context(), robot=robot, clock=line, open_serial=line.open)
     (finding,) = servos_on_the_bus(context)
     assert finding.level is level

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.servo.family import servo_family
+from drivers.servo.family import family_of, servo_family
+from drivers.servo.tools.bench import ServoBench
 from sim_twin.ports.lines import MemoryLine
-from sim_twin.servos.server import FreeServos, make_specs
+from sim_twin.servos.server import FreeRobotServos, FreeServos, make_specs
 from tests.vla_deploy.teleoperation.conftest import FOLDED, MOTORS, SO101, EmulatedLeader, HandClock
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.calibration.lerobot_file import LeRobotMotor
@@ -17,6 +18,7 @@ from vla_deploy.robots.calibration.lerobot_units import units_of
 from vla_deploy.teleoperation.errors import HandMotionEnded, LeaderUnusable
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
+from vla_deploy.teleoperation.leader_robot import open_leader_robot
 
 
 @pytest.fixture
@@ -185,3 +187,33 @@ def test_a_leader_is_calibrated_by_hand_and_follows_then(
     pose = opened(leader, clock, motors).read()
     assert pose is not None
     np.testing.assert_allclose(pose.position[:5], FOLDED[:5], atol=0.05)
+
+
+@pytest.mark.parametrize("name", ["so101_leader", "koch_v1_1_leader"])
+def test_a_leader_with_a_robot_file_is_read_by_it(name: str, clock: HandClock) -> None:
+    robot = load_robot(name)
+    follower = load_robot(name.removesuffix("_leader"))
+    free = FreeRobotServos(robot)
+    signs = np.array([one.sign for one in robot.servo_bus.servos])
+    offsets = np.array([one.offset for one in robot.servo_bus.servos])
+    wanted = np.array([0.3, -0.2, 0.4, 0.5, -0.6, 0.25])
+    free.rotors.position_rad[:] = (wanted - offsets) / signs
+    free.advance_to(clock.now_ns())
+    family = family_of(robot.servo_bus.servos[0].model)
+    line = MemoryLine(free.bank, clock)
+    bench = family.bench(line, clock, 1_000_000)
+    pose = open_leader_robot(bench, clock, follower, robot).read()
+    assert pose is not None
+    np.testing.assert_allclose(pose.position[:5], wanted[:5], atol=0.002)
+    opens = follower.limits["gripper"]
+    share = (pose.position[5] - opens.min) / (opens.max - opens.min)
+    assert share == pytest.approx(0.25, abs=0.002)
+    with pytest.raises(LeaderUnusable, match="it is X"):
+        open_leader_robot(*other_arm(clock), follower, robot)
+
+
+def other_arm(clock: HandClock) -> tuple[ServoBench, HandClock]:
+    servos = FreeServos(make_specs(6, ["XL430-W250"]))
+    servos.advance_to(clock.now_ns())
+    line = MemoryLine(servos.bank, clock)
+    return servo_family("dynamixel").bench(line, clock, 1_000_000), clock

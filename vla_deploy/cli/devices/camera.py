@@ -118,7 +118,7 @@ def calibrate(arguments: argparse.Namespace) -> int:
     if not images:
         raise CommandFailed("no image came; is the camera at work? see: vla-deploy status")
     fit = fit_lens(chosen.views, (robot.camera.width, robot.camera.height), arguments.model)
-    file = arguments.output or robot.mjcf_path.parent / LENS_FILE
+    file = arguments.output or robot.folder / LENS_FILE
     write_lens(file, fit.calibration(TOOL, _now()), robot.camera)
     at = fit.intrinsics
     text = (
@@ -135,7 +135,7 @@ def hand_eye(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
     images, chosen = _chosen_views(arguments, robot)
     found = fit_hand_eye(_head_views(robot, images, chosen.views), robot.camera.intrinsics)
-    file = arguments.output or robot.mjcf_path.parent / MOUNTING_FILE
+    file = arguments.output or robot.folder / MOUNTING_FILE
     mounting = found.mounting(robot.camera, _now())
     require_plausible(file, mounting, robot.camera)
     write_mounting(file, mounting)

@@ -1,13 +1,20 @@
-"""`vla-deploy servo calibrate`: measure the mounting of servos on joints; nothing is driven."""
+"""`vla-deploy servo calibrate`: measure the mounting of servos on joints.
+
+A person moves the joints; only `--method stops` drives them, one at a time and gently.
+"""
 
 import argparse
-from collections.abc import Mapping, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.servo.joint_servo import JointServo
 from drivers.servo.tools.bench import ServoBench
 from drivers.servo.tools.calibration_guide import CalibrationGuide, GuidedJoint, Person
+from drivers.servo.tools.stop_search import StopSearch
 from drivers.servo.tools.travel import PULSE_RAD, PULSES_PER_REV, ServoMounting, TravelRefused
 from vla_deploy.cli.commands import add_command, emit
 from vla_deploy.cli.devices.console import Console
@@ -30,8 +37,10 @@ from vla_deploy.robots.joint_calibration import (
 )
 
 _TRIES: Final = 3
+_ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXAMPLES = """  vla-deploy servo calibrate --robot butler --joint left_elbow
   vla-deploy servo calibrate --robot butler --method mark --at 0
+  vla-deploy servo calibrate --robot so101 --method stops
   vla-deploy servo calibrate --robot butler --from-pose rest --yes
   vla-deploy servo calibrate --robot butler --from-pose head_pan=0,head_tilt=0.3 --yes
 """
@@ -40,16 +49,17 @@ EXAMPLES = """  vla-deploy servo calibrate --robot butler --joint left_elbow
 def register(commands: Any) -> None:
     """Add the command."""
     calibrate = add_command(
-        commands, "calibrate", "measure sign and offset of joints by hand", EXAMPLES, run
+        commands, "calibrate", "measure sign and offset of joints", EXAMPLES, run
     )
     add_bus_arguments(calibrate)
     add_yes_argument(calibrate)
     calibrate.add_argument("--joint", action="append", help="this joint (repeat it; default: all)")
     calibrate.add_argument(
         "--method",
-        choices=("ends", "mark"),
+        choices=("ends", "mark", "stops"),
         default="ends",
-        help="ends: move each joint from its lower to its upper end; mark: to one mark",
+        help="ends: move each joint from its lower to its upper end; mark: to one mark; stops: it "
+        "drives those joints against their stops for which the robot file allows it",
     )
     calibrate.add_argument("--at", type=float, default=0.0, help="the mark's value (default: 0)")
     calibrate.add_argument(
@@ -94,22 +104,89 @@ def calibrate(
         DriverError: a servo is silent, or the bus is lost.
     """
     pose = _read_pose(robot, arguments.from_pose) if arguments.from_pose else {}
-    names = chosen_joints(robot, arguments.joint or list(pose))
+    by_stops = arguments.method == "stops"
+    names = _allowed(robot, arguments) if by_stops else arguments.joint or list(pose)
+    names = chosen_joints(robot, names)
     joints = guided_joints(robot, names)
     _require_turns(joints)
     _require_values(joints, pose, arguments)
     watched = answering_servos(robot, link, names)
-    _release(arguments, link, [*watched, *shadows_of(robot, link, names)])
-    record = CalibrationRecord(arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE)
-    guide = CalibrationGuide(link, watched, person, bus.clock, accept_sign=arguments.accept_sign)
+    record = CalibrationRecord(arguments.output or robot.folder / CALIBRATION_FILE)
     failures = []
+    if by_stops:
+        _announce_drive(arguments, robot, names)
+        search = StopSearch(link, watched, person, bus.clock)
+        with _signals_interrupt():
+            failures = _calibrate_one_by_one(
+                lambda joint: search.mounting_of(joint, robot.against_stops[joint.name]),
+                *(joints, record, person),
+                method="stops",
+                tries=1,
+            )
+        return _report(arguments, link, joints, record, failures, person)
+    _release(arguments, link, [*watched, *shadows_of(robot, link, names)])
+    guide = CalibrationGuide(link, watched, person, bus.clock, accept_sign=arguments.accept_sign)
     if pose:
         stands = guide.as_it_stands({joint: pose[joint.name] for joint in joints})
         _store(record, joints, stands, "pose", person)
     else:
-        failures = _calibrate_one_by_one(arguments, guide, joints, record, person)
+        by_ends = arguments.method == "ends"
+        failures = _calibrate_one_by_one(
+            guide.by_ends if by_ends else lambda joint: guide.by_mark(joint, arguments.at),
+            *(joints, record, person),
+            method=arguments.method,
+        )
+    return _report(arguments, link, joints, record, failures, person)
+
+
+def _allowed(robot: RobotDescription, arguments: argparse.Namespace) -> list[str]:
+    """Return the joints that are to be driven against their stops.
+
+    Raises:
+        UsageError: the robot file does not allow it, or another option does not go with it.
+    """
+    allowed = robot.against_stops
+    if arguments.from_pose:
+        raise UsageError("--from-pose drives nothing: leave out --method stops")
+    if unknown := [one for one in arguments.joint or () if one not in allowed]:
+        raise UsageError(
+            f"{robot.name}: {', '.join(unknown)} may not be driven against its stops; its file "
+            f"allows it for {', '.join(allowed) or 'no joint'}: [calibration.against_stops]"
+        )
+    if not allowed:
+        raise UsageError(
+            f"{robot.name}: no joint may be driven against its stops: [calibration.against_stops] "
+            "is not in its file; calibrate it by hand"
+        )
+    return arguments.joint or list(allowed)
+
+
+def _announce_drive(
+    arguments: argparse.Namespace, robot: RobotDescription, names: Sequence[str]
+) -> None:
+    shares = ", ".join(f"{one} at {robot.against_stops[one].torque_ratio:.0%}" for one in names)
+    confirm(
+        arguments,
+        f"These joints move from stop to stop, one after the other, with a part of their torque: "
+        f"{shares}. Clear their way, and keep the supply's switch at hand.",
+    )
+
+
+def _report(
+    arguments: argparse.Namespace,
+    link: ServoBench,
+    joints: Sequence[GuidedJoint],
+    record: CalibrationRecord,
+    failures: Sequence[str],
+    person: Person,
+) -> int:
+    """Say how it ended.
+
+    Raises:
+        CommandFailed: a joint could not be measured.
+    """
     _warn_of_turns(link, joints, person)
-    report = {"file": str(record.file), "joints": record.changes, "failed": failures}
+    report = {"file": str(record.file), "joints": record.changes, "failed": [*failures]}
     emit(arguments, report, "")
     if failures:
         raise CommandFailed(f"not calibrated: {', '.join(failures)}; see above, then try again")
@@ -117,23 +194,24 @@ def calibrate(
 
 
 def _calibrate_one_by_one(
-    arguments: argparse.Namespace,
-    guide: CalibrationGuide,
+    measure: Callable[[GuidedJoint], ServoMounting],
     joints: Sequence[GuidedJoint],
     record: CalibrationRecord,
     person: Person,
+    *,
+    method: str,
+    tries: int = _TRIES,
 ) -> list[str]:
     """Return the joints that could not be measured."""
     failures = []
     for joint in joints:
-        for _ in range(_TRIES):
+        for _ in range(tries):
             try:
-                by_ends = arguments.method == "ends"
-                found = guide.by_ends(joint) if by_ends else guide.by_mark(joint, arguments.at)
+                found = measure(joint)
             except TravelRefused as refusal:
                 person.tell(f"refused: {refusal}")
                 continue
-            _store(record, [joint], {joint.name: found}, arguments.method, person)
+            _store(record, [joint], {joint.name: found}, method, person)
             break
         else:
             failures.append(joint.name)
@@ -172,6 +250,31 @@ def _release(arguments: argparse.Namespace, link: ServoBench, servos: Sequence[J
     confirm(arguments, f"The torque of {joints} goes off: hold what would fall.")
     for servo in powered:
         link.release(servo)
+
+
+@contextmanager
+def _signals_interrupt() -> Iterator[None]:
+    """Let the signals that end a program act like Ctrl-C, so that a driven servo is let go.
+
+    Only the first one counts: letting go is not interrupted. Outside of the main thread nothing is
+    changed.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interrupted: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        interrupted.append(number)
+        if len(interrupted) == 1:
+            raise KeyboardInterrupt
+
+    before = {one: signal.signal(one, interrupt) for one in _ENDING_SIGNALS}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def _read_pose(robot: RobotDescription, text: str) -> dict[str, float]:

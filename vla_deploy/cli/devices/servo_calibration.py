@@ -88,7 +88,7 @@ def run_import(arguments: argparse.Namespace) -> int:
     bus = bus_of(arguments)
     robot = _robot_of(bus)
     motors = read_lerobot(arguments.file)
-    output = arguments.output or robot.mjcf_path.parent / CALIBRATION_FILE
+    output = arguments.output or robot.folder / CALIBRATION_FILE
     present = read_calibration(output)
     in_servo = _homing_in_servo(arguments, bus, robot, motors)
     found = imported(robot, motors, present, in_servo, arguments.file)
@@ -113,7 +113,7 @@ def run_export(arguments: argparse.Namespace) -> int:
     """
     bus = bus_of(arguments)
     robot = _robot_of(bus)
-    calibrations = read_calibration(robot.mjcf_path.parent / CALIBRATION_FILE)
+    calibrations = read_calibration(robot.folder / CALIBRATION_FILE)
     held = _held_offsets(bus, robot.joint_names) if arguments.read_servos else {}
     _require_as_calibrated(calibrations, held)
     motors = exported(robot, calibrations, held)
@@ -135,7 +135,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     """
     bus = bus_of(arguments)
     robot = _robot_of(bus)
-    calibrations = read_calibration(robot.mjcf_path.parent / CALIBRATION_FILE)
+    calibrations = read_calibration(robot.folder / CALIBRATION_FILE)
     held = _held_offsets(bus, robot.joint_names)
     _require_as_calibrated(calibrations, held)
     lines = [

@@ -15,6 +15,7 @@ from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import plan_schema
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.servos.guard import GUARD_PAGE, GUARD_REMEDY, unguarded_servos
 from vla_deploy.supervisor.processes.ros_environment import require_environment
 
 EXAMPLES: Final = """  vla-deploy check --robot butler
@@ -63,7 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
         f"{_count(robot.places, 'place')}: ok",
         f"profile {profile.name}: ok",
     ]
-    document = {"robot": robot.name, "profile": profile.name}
+    document: dict[str, Any] = {"robot": robot.name, "profile": profile.name}
+    if lacks := unguarded_servos(robot):
+        document["notes"] = [lacks]
+        lines.append(f"note: {lacks}; {GUARD_REMEDY}: {GUARD_PAGE}")
     found = PlanCheck()
     if arguments.plan:
         world = world_of(robot, {}, base_planner(robot).is_free)

@@ -111,6 +111,8 @@ class Demo:
 
     def run(self) -> dict[str, Any]:
         """Start everything, give the command, follow it, ask the referee, stop everything."""
+        if refusal := load_robot(self._options.robot).never_moves:
+            raise UsageError(refusal)
         self._print(f"starting the twin of {self._options.robot} (seed {self._options.seed})")
         self._order = self._arguments.order or load_robot(self._options.robot).twin.demo
         with Supervisor(self._options) as supervisor:

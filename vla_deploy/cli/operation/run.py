@@ -31,6 +31,7 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
 """
 
 _STDERR = 2
+_READ_ONLY = "ready, to be read; in another terminal: vla-deploy joint show"
 _READY = 'ready; in another terminal: vla-deploy say "%s"; the page: vla-deploy dashboard'
 
 
@@ -176,5 +177,7 @@ def _keep_running(options: RunOptions) -> None:
     with Supervisor(options) as supervisor:
         supervisor.start()
         if not supervisor.stop_requested:
-            print(_READY % load_robot(options.robot).twin.demo, flush=True)
+            robot = load_robot(options.robot)
+            words = _READY % robot.twin.demo
+            print(_READ_ONLY if robot.read_only else words, flush=True)
         supervisor.run_until_stopped()

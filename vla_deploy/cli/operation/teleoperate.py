@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.client.motions import JointView, joint_view
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.calibration.lerobot_file import read_lerobot, write_lerobot
+from vla_deploy.robots.loader import robot_names
 from vla_deploy.teleoperation.errors import HandMotionEnded
 from vla_deploy.teleoperation.following import PERIOD_S, HandFollowing
 from vla_deploy.teleoperation.hand_pose import Floats, HandInput
@@ -25,10 +27,12 @@ from vla_deploy.teleoperation.jogging import JogHand, JogInput
 from vla_deploy.teleoperation.keyboard import DEAD_MAN_S, keys_of, keys_of_terminal
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
+from vla_deploy.teleoperation.leader_robot import open_leader_robot
 from vla_deploy.teleoperation.pad_jog import gamepad_at
 
 SCREEN_S: Final = 0.1
 EXAMPLES: Final = """\
+  vla-deploy teleoperate --leader so101_leader --approach
   vla-deploy teleoperate --leader /dev/ttyACM1 --calibration lead.json --calibrate --robot so101
   vla-deploy teleoperate --leader /dev/ttyACM1 --calibration lead.json --approach
   vla-deploy teleoperate --keyboard
@@ -45,8 +49,9 @@ def register(commands: Any) -> None:
     hand.add_argument(
         "--leader",
         type=Path,
-        metavar="PORT",
-        help="follow the leader arm at this port; it has no torque, and nothing is written to it",
+        metavar="ROBOT|PORT",
+        help="follow the leader arm of this robot file, or at this port with --calibration; it has "
+        "no torque, and nothing is written to it",
     )
     hand.add_argument(
         "--keyboard",
@@ -78,6 +83,9 @@ def register(commands: Any) -> None:
         help="speed of its servos in bit/s (default: the robot's)",
     )
     command.add_argument(
+        "--port", type=Path, help="of a leader with a robot file (default: as its file says)"
+    )
+    command.add_argument(
         "--approach",
         action="store_true",
         help="let the robot go slowly to a leader's pose that is far away",
@@ -95,9 +103,11 @@ def run(arguments: argparse.Namespace) -> int:
         LeaderUnusable: the leader has torque, or its calibration is not the robot's.
         CommandFailed: the robot is not armed, was stopped, or the leader was lost.
     """
-    if arguments.leader is not None and arguments.calibration is None:
+    leads = None if arguments.leader is None else leader_robot(arguments)
+    if arguments.leader is not None and leads is None and arguments.calibration is None:
         raise UsageError(
-            "--leader: expected --calibration FILE, LeRobot's or one that --calibrate makes"
+            f"--leader {arguments.leader}: expected a leader's robot file, such as so101_leader, "
+            "or a port with --calibration FILE, LeRobot's or one that --calibrate makes"
         )
     if arguments.calibrate and arguments.leader is None:
         raise UsageError("--calibrate: expected --leader PORT, which is calibrated")
@@ -108,7 +118,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.robot is not None and load_robot(arguments.robot).name != robot.name:
         raise UsageError(f"--robot {arguments.robot}: {robot.name} runs")
     if arguments.leader is not None:
-        with leader_of(arguments, session, robot) as leader:
+        opened = leader_of if leads is None else partial(leader_of_file, leads)
+        with opened(arguments, session, robot) as leader:
             return _follow(arguments, session, robot, leader)
     with jog_input(arguments, session, robot) as source:
         hand = JogHand(robot, session.clock, source, lambda: _setpoints(session, robot))
@@ -128,6 +139,43 @@ def jog_input(
         return keys_of_terminal(session.clock, robot.joint_names)
     path = None if arguments.gamepad == Path() else arguments.gamepad
     return gamepad_at(path, session.clock, robot.joint_names, robot.gripper_joints)
+
+
+def leader_robot(arguments: argparse.Namespace) -> RobotDescription | None:
+    """Return the robot that `--leader` names, None where it is a port.
+
+    Raises:
+        UsageError: the robot is no leader, or an option is given that only a port takes.
+        RobotFileError: its file has faults.
+    """
+    given: Path = arguments.leader
+    if str(given) not in robot_names() and not given.is_dir() and given.suffix != ".toml":
+        return None
+    leader = load_robot(given)
+    if not leader.read_only:
+        raise UsageError(f"--leader {given}: {leader.name} is no leader: `read_only` in its file")
+    names = ("calibration", "calibrate", "family", "baud")
+    if unfit := [f"--{name}" for name in names if getattr(arguments, name)]:
+        raise UsageError(
+            f"{', '.join(unfit)}: the file of {leader.name} says it; it is calibrated by: "
+            f"vla-deploy servo calibrate --robot {given}"
+        )
+    return leader
+
+
+@contextmanager
+def leader_of_file(
+    leader: RobotDescription,
+    arguments: argparse.Namespace,
+    session: RobotSession,
+    robot: RobotDescription,
+) -> Iterator[LeaderArm]:
+    """Open a leader with a robot file for a `with` block."""
+    bus = leader.servo_bus
+    family = family_of(bus.servos[0].model)
+    port = ServoBusPort(port=arguments.port or Path(bus.path), baud=bus.baud, family=family)
+    with port.open() as bench:
+        yield open_leader_robot(bench, session.clock, robot, leader)
 
 
 @contextmanager

@@ -15,8 +15,12 @@ _INSIST_TICKS = 25
 class Modes:
     """Hold the mode, and `notice`: what a person who asked for something has to be told."""
 
-    def __init__(self, arming: Arming, stopping: Stopping, motions: MotionSet) -> None:
+    def __init__(
+        self, arming: Arming, stopping: Stopping, motions: MotionSet, *, never_moves: str = ""
+    ) -> None:
+        """Take what carries changes out; `never_moves` says why the robot is never armed."""
         self.mode = Mode.DISARMED
+        self._never_moves = never_moves
         self.notice = ""
         self._arming = arming
         self._stopping = stopping
@@ -40,7 +44,7 @@ class Modes:
             ModeInputs(
                 reaction=verdict.reaction,
                 latched=verdict.latched,
-                arm=act is OperatorAct.ARM,
+                arm=act is OperatorAct.ARM and not self._never_moves,
                 disarm=act is OperatorAct.DISARM,
                 armed=self._arming.step() if before is Mode.ARMING else None,
                 at_rest=at_rest,
@@ -57,6 +61,8 @@ class Modes:
 
     def refusal(self, verdict: Verdict, *, estop_latched: bool) -> str:
         """Return why a motion is refused now, or nothing while control is armed."""
+        if self._never_moves:
+            return self._never_moves
         if self.mode is Mode.ARMED:
             return ""
         return refusal_in(self.mode, verdict, estop_latched=estop_latched)

@@ -36,6 +36,7 @@ class ServoLine:
         self._devices = devices
         self._clock = clock
         self._baud = robot.servo_bus.baud
+        self._never_moves = robot.never_moves
         self._watchdog_s = profile.bus_watchdog_s
         self._family = bus_family(robot)
         self._specs = servo_specs(robot)
@@ -146,6 +147,9 @@ class ServoLine:
 
     def energise(self, servo: int) -> bool:
         """Hold one servo where it is, its watchdog armed; False with `failure` when it refuses."""
+        if self._never_moves:
+            self.failure = self._never_moves
+            return False
         return self._attempt(lambda bus: self._energise(bus, self._ids[servo]))
 
     def clear_watchdogs(self) -> bool:

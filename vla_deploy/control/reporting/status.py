@@ -32,6 +32,8 @@ class Status:
         motions: MotionSet,
         servos: ServoLine,
         wheels: BaseDrive,
+        *,
+        never_moves: str,
     ) -> None:
         self._ticks = ticks
         self._modes = modes
@@ -40,6 +42,7 @@ class Status:
         self._motions = motions
         self._servos = servos
         self._wheels = wheels
+        self._never_moves = never_moves
         self._buses = (servos, wheels) if wheels.has_wheels else (servos,)
         self._pace = StatusPace()
 
@@ -65,6 +68,7 @@ class Status:
             "estop_latched": self._judging.state.estop_latched,
             **verdict_document(verdict),
             "detail": detail(verdict.text, self._modes.notice, self._inbox.complaint),
+            "never_moves": self._never_moves,
             "tick": ticks.tick,
             "judged_tick": self._judging.tick,
             "late_ticks": ticks.late_ticks,

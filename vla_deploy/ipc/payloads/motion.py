@@ -99,6 +99,7 @@ class ControlStatus(VerdictFields):
     state: ControlStateName
     estop_latched: bool
     detail: str
+    never_moves: str
     tick: int
     judged_tick: int
     late_ticks: int

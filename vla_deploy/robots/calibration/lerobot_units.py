@@ -93,5 +93,5 @@ def units_of(robot: RobotDescription, unit: LeRobotUnit = LeRobotUnit.DEGREES) -
     Raises:
         RobotFileError: that file cannot be used.
     """
-    file = robot.mjcf_path.parent / CALIBRATION_FILE
+    file = robot.folder / CALIBRATION_FILE
     return LeRobotUnits(robot, read_calibration(file), unit)

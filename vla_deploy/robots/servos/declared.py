@@ -16,7 +16,10 @@ def bus_family(robot: RobotDescription) -> ServoFamily:
 
 
 def servo_specs(robot: RobotDescription) -> list[JointServo]:
-    """Return what the bus driver must know of each servo of a robot, those of shadows last."""
+    """Return what the bus driver must know of each servo of a robot, those of shadows last.
+
+    Servos that are only read have no goals, so their own position limits do not matter.
+    """
     family, bus = bus_family(robot), robot.servo_bus
     rows = [(one, one.joint) for one in bus.servos]
     rows += [(one, shadow_name(one.joint)) for one in bus.shadows]
@@ -28,7 +31,9 @@ def servo_specs(robot: RobotDescription) -> list[JointServo]:
             sign=servo.sign,
             offset_rad=servo.offset,
             travel_per_rad=servo.travel_per_rad,
-            goal_range=(robot.limits[servo.joint].min, robot.limits[servo.joint].max),
+            goal_range=None
+            if robot.read_only
+            else (robot.limits[servo.joint].min, robot.limits[servo.joint].max),
         )
         for servo, name in rows
     ]

@@ -78,7 +78,7 @@ def homing_troubles(
     robot: RobotDescription, servos: Sequence[JointServo], held: Mapping[int, int]
 ) -> Iterator[ServoTrouble]:
     """Compare the homing offsets in the servos with those at the robot's calibration."""
-    calibrations = read_calibration(robot.mjcf_path.parent / CALIBRATION_FILE)
+    calibrations = read_calibration(robot.folder / CALIBRATION_FILE)
     expected = {
         name: one.expected_homing_offset
         for name, one in calibrations.items()

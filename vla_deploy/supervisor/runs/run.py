@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import Clock, MonotonicClock
+from drivers.opener import PathOpener
 from drivers.twin_clock import TwinClock, clock_of
 from drivers.twin_page import PAGE_FILE, TIME_LINK, TimePage
 from platforms import Profile
 from platforms.power_switch import PowerSwitch
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.links import device_links
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.journal import JOURNAL_SOCKET
 from vla_deploy.runtime.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
@@ -23,6 +25,7 @@ from vla_deploy.supervisor.activity_writer import ActivityWriter
 from vla_deploy.supervisor.battery import BatteryKeeper, open_battery
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.health import Health
+from vla_deploy.supervisor.power_relay import PowerRelayFeed
 from vla_deploy.supervisor.processes.crash_reports import CrashReports, crash_folder
 from vla_deploy.supervisor.processes.process_manager import ProcessManager
 from vla_deploy.supervisor.profiles.profile_choice import choice_of
@@ -76,6 +79,9 @@ class Run:
             self.battery = self._open_battery(options, robot)
             if self.battery is not None:
                 opened.callback(self.battery.close)
+            self.power_relay = self._open_relay(options, robot)
+            if self.power_relay is not None:
+                opened.callback(self.power_relay.close)
             self.switch = self._open_switch(options, profile())
             opened.callback(self.switch.close)
             self.processes = ProcessManager(
@@ -102,6 +108,15 @@ class Run:
             root = options.devices_dir or self.runtime.run_dir / "dev"
             executor = InlineExecutor()
         return open_battery(robot.battery, self.space, self.clock, root, executor)
+
+    def _open_relay(self, options: RunOptions, robot: RobotDescription) -> PowerRelayFeed | None:
+        if robot.power_relay is None:
+            return None
+        devices_dir = options.devices_dir
+        if options.takes_devices and devices_dir is None:
+            devices_dir = self.runtime.run_dir / "dev"
+        devices = PathOpener(device_links(robot, devices_dir), self.clock)
+        return PowerRelayFeed(robot, devices, self.space, self.clock)
 
     def _open_switch(self, options: RunOptions, profile: Profile) -> ProfileSwitch:
         power, executor = PowerSwitch(), low_priority_thread(self.clock)
