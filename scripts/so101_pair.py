@@ -24,11 +24,10 @@ _HEAD: Final = """<mujoco model="so101_pair">
 """
 _CAMERA: Final = """
 <body name="camera_stand">
-  <geom class="shell" size="0.006 0.03 0.29" pos="-0.094 0 0.29" material="so101_servo"/>
-  <geom class="shell" size="0.16 0.006 0.006" pos="0.06 0 0.574" material="so101_servo"/>
-  <geom class="shell" size="0.012 0.045 0.0125" pos="0.22 0 0.5725" material="so101_servo"/>
-  <site name="table_camera" pos="0.22 0 0.555" quat="0 0.707106781 -0.707106781 0"/>
-  <camera name="table_camera" pos="0.22 0 0.555" quat="0.707106781 0 0 -0.707106781" fovy="58"/>
+  <geom class="shell" size="0.006 0.006 0.25" pos="-0.09 0 0.25" material="so101_servo"/>
+  <geom class="shell" size="0.0125 0.045 0.012" pos="-0.072 0 0.506" xyaxes="0.887 0 0.4617 0 1 0" material="so101_servo"/>
+  <site name="table_camera" pos="-0.06 0 0.5" xyaxes="0 -1 0 -0.887 0 -0.4617"/>
+  <camera name="table_camera" pos="-0.06 0 0.5" xyaxes="0 -1 0 0.887 0 0.4617" fovy="54"/>
 </body>"""
 
 
