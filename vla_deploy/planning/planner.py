@@ -264,6 +264,6 @@ def _worded(answer: PlanningResult, request: PlanRequest) -> PlanningResult:
     """Replace the error by "not understood" where no back end has said more."""
     if isinstance(answer.error, Declined):
         return replace(
-            answer, error=NotUnderstood(request.text, drives="move" in request.world.skills)
+            answer, error=NotUnderstood(request.text, request.world)
         )
     return answer
