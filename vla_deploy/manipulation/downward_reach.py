@@ -1,7 +1,8 @@
 """Find by inverse kinematics where hands that point straight down get to, and judge `[reach]`."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,7 @@ _BEARINGS_RAD: Final = tuple(math.radians(15.0 * step) for step in (0, 1, -1, 2,
 _RESTARTS: Final = 2
 
 Point = tuple[float, float, float]
+Promise = tuple[str, Sequence[float], Callable[[float], Iterator[Point]], str]
 
 
 class DownwardReach:
@@ -60,39 +62,42 @@ class DownwardReach:
 def reach_faults(robot: RobotDescription, name: str) -> Iterator[TableFault]:
     """Yield what `[reach]` promises and no hand gets to; `name` is how a command names the robot.
 
-    Each distance, height and spot has to be reached at one of the others.
+    Each distance has to be reached at one of the heights, and the reverse, each x at one of the y.
     """
     reach = robot.parts.reach
     if reach is None or not robot.hands:
         return
-    hands, (low_m, high_m) = DownwardReach(robot), reach.grip_heights_m
+    hands = DownwardReach(robot)
+    for key, values, points_of, expected in _promises(reach):
+        for i, value in enumerate(values):
+            if not any(map(hands.any_has, points_of(value))):
+                yield TableFault(
+                    key=f"reach.{key}[{i}]",
+                    got=f"{value:g}",
+                    expected=f"{expected}, pointing straight down: vla-deploy robot reach "
+                    f"--robot {name} prints a table that fits the arm",
+                )
+
+
+def _promises(reach: Reach) -> Iterator[Promise]:
+    """Yield the keys that name places, with the points of which a hand has to get to one."""
+    low_m, high_m = reach.grip_heights_m
     heights_m = (low_m, 0.5 * (low_m + high_m), high_m)
-    advice = f"; vla-deploy robot reach --robot {name} prints a table that fits the arm"
-    for i, distance_m in enumerate(reach.distances_m):
-        if not any(map(hands.any_has, _around(reach, (distance_m,), heights_m))):
-            yield TableFault(
-                key=f"reach.distances_m[{i}]",
-                got=f"{distance_m:g}",
-                expected="a distance from the base at which a hand gets to a height of "
-                f"grip_heights_m, pointing straight down{advice}",
-            )
-    for i, height_m in enumerate(reach.grip_heights_m):
-        if not any(map(hands.any_has, _around(reach, reach.distances_m, (height_m,)))):
-            yield TableFault(
-                key=f"reach.grip_heights_m[{i}]",
-                got=f"{height_m:g}",
-                expected="a height to which a hand that points straight down gets at one of "
-                f"distances_m{advice}",
-            )
-    for i, ahead_m in enumerate(reach.put_ahead_m):
-        spots = [(ahead_m, y_m, z_m) for y_m in reach.put_aside_m for z_m in heights_m]
-        if not any(map(hands.any_has, [*spots, *((x_m, -y_m, z_m) for x_m, y_m, z_m in spots)])):
-            yield TableFault(
-                key=f"reach.put_ahead_m[{i}]",
-                got=f"{ahead_m:g}",
-                expected="a spot that a hand that points straight down gets to at one of "
-                f"put_aside_m{advice}",
-            )
+
+    def at_distance(distance_m: float) -> Iterator[Point]:
+        return _around(reach, (distance_m,), heights_m)
+
+    def at_height(height_m: float) -> Iterator[Point]:
+        return _around(reach, reach.distances_m, (height_m,))
+
+    def ahead(ahead_m: float) -> Iterator[Point]:
+        asides_m = [side * one for one in reach.put_aside_m for side in (1.0, -1.0)]
+        yield from product((ahead_m,), asides_m, heights_m)
+
+    a_hand = "that a hand gets to at one of"
+    yield "distances_m", reach.distances_m, at_distance, f"one {a_hand} grip_heights_m"
+    yield "grip_heights_m", reach.grip_heights_m, at_height, f"one {a_hand} distances_m"
+    yield "put_ahead_m", reach.put_ahead_m, ahead, f"one {a_hand} put_aside_m"
 
 
 def _around(

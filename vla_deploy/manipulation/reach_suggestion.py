@@ -37,11 +37,11 @@ def suggested_reach(robot: RobotDescription) -> Reach:
         PostureUnreachable: no hand gets anywhere, pointing straight down.
     """
     survey = _Survey(robot)
-    rows = {z_m: survey.ahead(z_m) for z_m in survey.heights_m()}
+    rows = survey.rows()
     if not rows:
         raise PostureUnreachable(
             f"{robot.name}: no hand that points straight down gets to a point before its shoulder; "
-            "expected a grip_site whose z points out of the hand, and an arm with a roll joint"
+            "expected a grip_site whose z points out of the hand, and an arm of five joints or more"
         )
     best_z_m = max(rows, key=lambda z_m: len(rows[z_m]))
     places = survey.around(best_z_m, rows[best_z_m])
@@ -79,19 +79,18 @@ class _Survey:
         self._highest_m = max(float(arm.shoulder_m[2]) for arm in arms) + self._length_m
         self.aside_m = round(max(abs(float(arm.shoulder_m[1])) for arm in arms), 2)
 
-    def heights_m(self) -> list[float]:
-        """Return the heights at which a hand gets to something before its shoulder."""
-        found: list[float] = []
+    def rows(self) -> dict[float, Plane]:
+        """Return the points before the shoulders to which hands get, by their height."""
+        found: dict[float, Plane] = {}
         missed = 0
-        for z_m in np.arange(_LOWEST_M, self._highest_m, self.step_m):
-            if self.ahead(round(float(z_m), 3)):
-                found.append(round(float(z_m), 3))
-                missed = 0
+        for z_m in self._steps(_LOWEST_M, self._highest_m):
+            if row := self._ahead(z_m):
+                found[z_m], missed = row, 0
             elif found and (missed := missed + 1) == _ROWS_MISSED:
                 break
         return found
 
-    def ahead(self, z_m: float) -> Plane:
+    def _ahead(self, z_m: float) -> Plane:
         """Return the points at a height before the shoulders to which their hands get."""
         return {
             (x_m, y_m)
@@ -110,7 +109,9 @@ class _Survey:
         found: Plane = set()
         for hand, arm in self._hands.arms.items():
             shoulder_m = (float(arm.shoulder_m[0]), float(arm.shoulder_m[1]))
-            away_m = [math.dist(one, shoulder_m) for one in row if abs(one[1] - shoulder_m[1]) < 1e-3]
+            away_m = [
+                math.dist(one, shoulder_m) for one in row if abs(one[1] - shoulder_m[1]) < 1e-3
+            ]
             if not away_m:
                 continue
             for x_m in self._steps(0.0, shoulder_m[0] + max(away_m) + self.step_m):

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Final
 from vla_deploy.plans.errors import PlanError
 
 if TYPE_CHECKING:
-    from vla_deploy.plans.knowledge import World
     from vla_deploy.planning.understanding.conversation import Candidate
+    from vla_deploy.plans.knowledge import World
 
 
 _DRIVING: Final = (

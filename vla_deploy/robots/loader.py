@@ -109,7 +109,11 @@ def load_robot(name_or_path: str | Path, *, despite: Collection[str] = ()) -> Ro
     overrides, override_faults = read_overrides(file.parent)
     document, calibration_faults = calibrated(merged(own, overrides), file.parent)
     found = (_traced(fault, overrides, own) for fault in _faults(document, file.parent))
-    faults = (*override_faults, *calibration_faults, *(one for one in found if one.key not in despite))
+    faults = (
+        *override_faults,
+        *calibration_faults,
+        *(one for one in found if one.key not in despite),
+    )
     if faults:
         raise RobotFileError(file, faults)
     camera = None
