@@ -24,7 +24,7 @@ ABILITIES: Final = (
     ("navigate_to", "go to places"),
     ("find_object", "look for things and tell you what I see"),
     ("pick_up", "pick things up and put them in a box or on a table"),
-    ("hand_over", "bring them to you"),
+    ("hand_over", "give them to you"),
     ("place", "tidy up"),
     ("move_arm", "bring my arm to a pose"),
     ("open_gripper", "open and close my hand"),

@@ -1,0 +1,50 @@
+"""What `[reach]` promises is held against the kinematics, and suggested by them."""
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from vla_deploy.manipulation.downward_reach import reach_faults
+from vla_deploy.manipulation.reach_suggestion import suggested_reach
+from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.reach import Reach
+
+SO101 = load_robot("so101")
+
+
+def reaching(robot: RobotDescription, reach: Reach) -> RobotDescription:
+    return replace(robot, parts=replace(robot.parts, reach=reach))
+
+
+def keys(robot: RobotDescription) -> list[str]:
+    return [fault.key for fault in reach_faults(robot, robot.name)]
+
+
+@pytest.mark.parametrize("name", ["so101", "koch_v1_1", "omx", "wx250s", "so101_pair"])
+def test_hands_get_to_what_the_arms_that_come_with_the_stack_promise(name: str) -> None:
+    assert not keys(load_robot(name))
+
+
+@pytest.mark.parametrize(
+    ("change", "faults"),
+    [
+        ({"distances_m": (0.22, 0.6)}, ["reach.distances_m[1]"]),
+        ({"grip_heights_m": (0.005, 0.4)}, ["reach.grip_heights_m[1]"]),
+        ({"put_ahead_m": (0.2, 0.5)}, ["reach.put_ahead_m[1]"]),
+    ],
+)
+def test_what_no_hand_gets_to_is_named_with_what_helps(
+    change: dict[str, tuple[float, ...]], faults: list[str]
+) -> None:
+    robot = reaching(SO101, replace(SO101.reach, **change))
+    found = list(reach_faults(robot, "my_arm"))
+    assert [one.key for one in found] == faults
+    assert "vla-deploy robot reach --robot my_arm" in str(found[0])
+
+
+def test_a_suggestion_is_what_a_person_measured_and_holds() -> None:
+    found = suggested_reach(reaching(SO101, replace(SO101.reach, distances_m=(9.0,))))
+    assert not keys(reaching(SO101, found))
+    for key in ("distances_m", "most_aside_m", "grip_heights_m", "out_m", "above_m", "apart_m"):
+        written = asdict(SO101.reach)[key]
+        assert asdict(found)[key] == pytest.approx(written, abs=0.031), key
