@@ -1,11 +1,10 @@
-"""What `[reach]` promises is held against the kinematics, and suggested by them."""
+"""What `[reach]` promises is held against the kinematics."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import pytest
 
 from vla_deploy.manipulation.downward_reach import reach_faults
-from vla_deploy.manipulation.reach_suggestion import suggested_reach
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.reach import Reach
 
@@ -30,7 +29,7 @@ def test_hands_get_to_what_the_arms_that_come_with_the_stack_promise(name: str) 
     [
         ({"distances_m": (0.22, 0.6)}, ["reach.distances_m[1]"]),
         ({"grip_heights_m": (0.005, 0.4)}, ["reach.grip_heights_m[1]"]),
-        ({"put_ahead_m": (0.2, 0.5)}, ["reach.put_ahead_m[1]"]),
+        ({"put_ahead_m": (0.2, 0.5), "put_aside_m": (0.0,)}, ["reach.put_ahead_m[1]"]),
     ],
 )
 def test_what_no_hand_gets_to_is_named_with_what_helps(
@@ -40,11 +39,3 @@ def test_what_no_hand_gets_to_is_named_with_what_helps(
     found = list(reach_faults(robot, "my_arm"))
     assert [one.key for one in found] == faults
     assert "vla-deploy robot reach --robot my_arm" in str(found[0])
-
-
-def test_a_suggestion_is_what_a_person_measured_and_holds() -> None:
-    found = suggested_reach(reaching(SO101, replace(SO101.reach, distances_m=(9.0,))))
-    assert not keys(reaching(SO101, found))
-    for key in ("distances_m", "most_aside_m", "grip_heights_m", "out_m", "above_m", "apart_m"):
-        written = asdict(SO101.reach)[key]
-        assert asdict(found)[key] == pytest.approx(written, abs=0.031), key

@@ -36,7 +36,9 @@ def test_each_hand_is_where_that_of_one_arm_is_beside_the_middle(side: str) -> N
         for name, value in joints.items():
             data.joint(f"{side}_{name}").qpos[0] = value
         mujoco.mj_forward(model, data)
-        there = np.array([joints.get(name.removeprefix(f"{side}_"), 0.0) for name in PAIR.joint_names])
+        there = np.array(
+            [joints.get(name.removeprefix(f"{side}_"), 0.0) for name in PAIR.joint_names]
+        )
         expected_m = one.forward(drawn)[:3, 3] + beside_m
         assert both.forward(there)[:3, 3] == pytest.approx(expected_m, abs=1e-6)
         assert data.site(f"{side}_grip").xpos == pytest.approx(expected_m, abs=1e-6)
