@@ -19,7 +19,7 @@ EXAMPLES = """  vla-deploy robot urdf --robot butler --out butler.urdf
 URDF_EXAMPLES = """  vla-deploy robot urdf > butler.urdf
   vla-deploy robot urdf --robot my_folder --out my_robot.urdf
 """
-REACH_EXAMPLES = """  vla-deploy robot reach --robot my_arm >> my_arm/robot.toml
+REACH_EXAMPLES = """  vla-deploy robot reach --robot my_arm
   vla-deploy robot reach --robot so101 --json
 
 Where hands that point straight down get to, by inverse kinematics: a table to begin with. Whether
