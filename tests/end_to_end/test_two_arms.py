@@ -78,8 +78,8 @@ def test_each_hand_takes_what_lies_in_its_half_and_hands_it_over(tmp_path: Path)
         assert set(stack.lockstep.truth()["held"]) == set(HANDS)
         _said(stack, between, "put the red block into the bowl")
         assert stack.lockstep.inside("red_block", "bowl")["inside"]
-        command = stack.give(text="hand it over")
-        assert stack.lockstep.run_until(lambda: stack.has_said(OFFER), 25.0)
+        command = stack.give(text="hand over the blue block")
+        assert stack.lockstep.run_until(lambda: _offers(stack, command), 25.0)
         stack.lockstep.run_for(2.0)
         assert stack.outcome(command) is None, "nobody pulls yet"
         person = stack.lockstep.twin.person
@@ -98,6 +98,11 @@ def _said(stack: LockstepStack, between: Between, text: str) -> None:
             assert ended["success"], ended
             return
     pytest.fail(f"{text}: not done within a minute")
+
+
+def _offers(stack: LockstepStack, command: str) -> bool:
+    assert stack.outcome(command) is None
+    return stack.has_said(OFFER)
 
 
 def _holding(stack: LockstepStack) -> dict[str, str | None]:
