@@ -44,7 +44,7 @@ def suggested_reach(robot: RobotDescription) -> Reach:
             "expected a grip_site whose z points out of the hand, and an arm of five joints or more"
         )
     best_z_m = max(rows, key=lambda z_m: len(rows[z_m]))
-    places = survey.around(best_z_m, rows[best_z_m])
+    places = rows[best_z_m] | survey.around(best_z_m, rows[best_z_m])
     best_x_m = float(np.median(sorted(x_m for x_m, _ in rows[best_z_m])))
     at_best_m = [z_m for z_m, row in rows.items() if _near(best_x_m, row, 0.5 * survey.step_m)]
     low_m, high_m, aside_m = min(at_best_m), max(at_best_m), survey.aside_m

@@ -9,7 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from sim_twin.worlds import draw_poses
 from vla_deploy.control.judging.body_shapes import BodyShapes
+from vla_deploy.manipulation.downward_reach import DownwardReach
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import load_robot
@@ -69,3 +71,14 @@ def test_hands_that_would_meet_in_the_middle_are_judged_to_be_too_near() -> None
         positions = ArmKinematics(PAIR, side).solve(middle, positions).positions
     meeting_m = min(np.array(shapes.distances(positions)[0])[between])
     assert meeting_m < PAIR.protection.clearance.self_m < 0.1 < apart_m
+
+
+def test_each_block_lies_where_a_hand_gets_and_the_bowl_where_both_do() -> None:
+    hands = DownwardReach(PAIR)
+    for seed in range(20):
+        places = {
+            name: pose.position_m[:2] for name, pose in draw_poses("pair_table", seed).items()
+        }
+        assert all(hands.has(hand, (*places["bowl"], 0.07)) for hand in SIDES_M), seed
+        for block in ("red_block", "blue_block"):
+            assert hands.any_has((*places[block], 0.02)), (seed, block)

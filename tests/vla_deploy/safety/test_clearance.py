@@ -111,6 +111,16 @@ def test_a_joint_that_gains_speed_needs_the_way_of_the_speed_that_it_reaches(
     assert time_s < at_rest.time_s < time_s + 0.06
 
 
+def test_the_way_of_a_joint_that_gains_speed_is_that_of_each_phase() -> None:
+    velocity, gain = np.array([0.8, 0.0]), np.array([4.0, 0.0])
+    at_rest = stopping(driven(np.array([-0.5, 0.02]), velocity, gain), BOUNDS)
+    reached, peak = 0.8 + 4.0 * 0.1, 0.8 + 4.0 * 0.1 + 0.5 * 4.0 * 0.1
+    gaining = 0.1 * (0.8 + 0.5 * 4.0 * 0.1) + 0.1 * (reached + 4.0 * 0.1 / 3.0)
+    braking = 0.5 * peak * (0.1 + peak / 4.0)
+    assert at_rest.position[0] == pytest.approx(-0.5 + gaining + braking)
+    assert at_rest.time_s == pytest.approx(0.1 + 0.1 + 0.1 + peak / 4.0)
+
+
 def test_a_joint_that_does_not_follow_counts_from_where_it_is() -> None:
     motion = JointMotion(
         position=np.array([0.5, 0.02]),

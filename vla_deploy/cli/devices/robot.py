@@ -56,6 +56,8 @@ def write_urdf(arguments: argparse.Namespace) -> int:
 def print_reach(arguments: argparse.Namespace) -> int:
     """Print where the hands get to, as a table of the robot file."""
     robot = load_robot(arguments.robot, despite=("reach",))
+    if not robot.hands:
+        raise UsageError(f"{robot.name} has no hands: expected [hands] in its file; see so101's")
     try:
         found = asdict(suggested_reach(robot))
     except PostureUnreachable as error:
