@@ -23,6 +23,8 @@ from drivers.servo.joint_servo import JointServo
 
 FULL_DUTY_ERROR_RAD: Final = PWM_FULL * 128.0 / HOLD_GAINS["position_p_gain"] * PULSE_RAD
 """e-manual: duty in PWM units is the error in pulses times P / 128."""
+_CYCLE_BITS: Final = 300
+"""One sync write and one fast sync read, by the servo."""
 
 
 class DynamixelFamily:
@@ -61,6 +63,7 @@ class DynamixelFamily:
             ),
             has_watchdog=True,
             protocol="dynamixel 2",
+            cycle_bits=_CYCLE_BITS,
         )
 
     def servo(

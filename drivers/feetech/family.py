@@ -21,6 +21,10 @@ FULL_DUTY_STEPS_AT_GAIN_1: Final = 1600.0
 From an STS3215-C018 that rested some 25 steps below its goal under half of its stall torque with
 the factory's P of 32; the vendor's tables do not say it.
 """
+_CYCLE_BITS: Final = 220
+"""Its id in the request, its status of 16 bytes and its goal of 3, and a gap before it answers."""
+_SINGLE_CYCLE_BITS: Final = 300
+"""The same with a request of its own."""
 
 
 class FeetechFamily:
@@ -54,6 +58,7 @@ class FeetechFamily:
             ),
             has_watchdog=False,
             protocol=f"feetech {sheet.byte_order}-endian",
+            cycle_bits=_CYCLE_BITS if sheet.has_sync_read else _SINGLE_CYCLE_BITS,
         )
 
     def servo(

@@ -30,6 +30,8 @@ class ServoFacts:
     """It stops by itself when the bus falls silent."""
     protocol: str
     """What is spoken on its wire: servos of one bus have the same."""
+    cycle_bits: int
+    """What it adds to a control cycle on the wire: its goal, and its share of the answer."""
 
 
 class ServoFamily(Protocol):

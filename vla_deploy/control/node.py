@@ -13,7 +13,7 @@ from vla_deploy.control.modes.controlled_descent import LOWERING_S
 from vla_deploy.control.modes.modes import AT_REST_MODES, Modes
 from vla_deploy.control.modes.operator_acts import OperatorAct, OperatorInbox
 from vla_deploy.control.modes.resetting import Resetting
-from vla_deploy.control.modes.retuning import Tuning, retuned, tuning_of
+from vla_deploy.control.modes.retuning import Tuning, require_bus_rate, retuned, tuning_of
 from vla_deploy.control.modes.standstill import Standstill
 from vla_deploy.control.modes.state_machine import Mode
 from vla_deploy.control.modes.stopping import Stopping
@@ -54,7 +54,12 @@ class ControlNode:
         profile: Profile,
         devices: DeviceOpener,
     ) -> None:
-        """Prepare everything that needs no device."""
+        """Prepare everything that needs no device.
+
+        Raises:
+            ProfileError: the servo bus is too slow for the rate.
+        """
+        require_bus_rate(robot, profile)
         clock = self._clock = context.clock
         self._robot, self._profile, self._run_dir = robot, profile, context.run_dir
         self._tuning = tuning_of(profile)

@@ -12,12 +12,36 @@ PlanError             of vla_deploy.plans.errors, with what is wrong with a plan
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from vla_deploy.plans.errors import PlanError
 
 if TYPE_CHECKING:
     from vla_deploy.planning.understanding.conversation import Candidate
+    from vla_deploy.plans.knowledge import World
+
+
+_DRIVING: Final = (
+    "go to the kitchen",
+    "find the keys",
+    "pick up the red cup and put it in the box",
+    "bring me the bottle",
+    "stop",
+)
+_MOUNTED: Final = (
+    ("find_object", "find the red block"),
+    ("place", "put the red block in the bowl"),
+    ("open_gripper", "open your hand"),
+    ("stop", "stop"),
+)
+"""What is said to a robot that does not drive, where it has the skill."""
+
+
+def _examples(world: "World | None") -> Sequence[str]:
+    if world is None or "move" in world.skills:
+        return _DRIVING
+    poses = [f"go to the {min(world.poses).replace('_', ' ')} pose"] if world.poses else []
+    return [*(said for skill, said in _MOUNTED if skill in world.skills), *poses]
 
 
 class CommandUnreadable(PlanError):
@@ -25,17 +49,10 @@ class CommandUnreadable(PlanError):
 
 
 class NotUnderstood(PlanError):
-    """Say that no rule covers the command, and what a robot that `drives`, or not, understands."""
+    """Say that no rule covers the command, and what a robot of this world understands."""
 
-    def __init__(self, text: str, *, drives: bool = True) -> None:
-        known = (
-            "go to the kitchen, find the keys, pick up the red cup and put it in the box, "
-            "bring me the bottle, stop"
-            if drives
-            else "find the red block, put the red block in the bowl, go to the ready pose, "
-            "open your hand, stop"
-        )
-        super().__init__(f'I do not understand "{text}"; try: {known}')
+    def __init__(self, text: str, world: "World | None" = None) -> None:
+        super().__init__(f'I do not understand "{text}"; try: {", ".join(_examples(world))}')
 
 
 class CannotBeDone(PlanError):

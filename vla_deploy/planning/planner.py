@@ -263,7 +263,5 @@ def _checked_by(
 def _worded(answer: PlanningResult, request: PlanRequest) -> PlanningResult:
     """Replace the error by "not understood" where no back end has said more."""
     if isinstance(answer.error, Declined):
-        return replace(
-            answer, error=NotUnderstood(request.text, drives="move" in request.world.skills)
-        )
+        return replace(answer, error=NotUnderstood(request.text, request.world))
     return answer

@@ -208,6 +208,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="give a person what a hand holds: it opens when it feels a pull",
             parameters={"arm": _ARM},
             resources=("base", "arms", "speaker"),
+            may_lack=_MOUNTED,
             estimated_duration_s=15.0,
         ),
         "open_gripper": SkillSpec(

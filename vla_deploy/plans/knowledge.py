@@ -242,8 +242,13 @@ def _lacks_of(robot: RobotDescription) -> dict[str, str]:
         name: [part for part in spec.resources if part not in parts | spec.may_lack]
         for name, spec in SKILLS.items()
     }
-    return {
+    lacks = {
         name: f"{robot.name} has no {' and no '.join(lacked)}"
         for name, lacked in missing.items()
         if lacked
     }
+    if robot.parts.base is None and robot.parts.reach is None:
+        lacks.setdefault(
+            "hand_over", f"{robot.name} has no [reach], in which it would hold things out"
+        )
+    return lacks

@@ -1,7 +1,7 @@
 """Load a robot file: read, judge everything, then build; never half a robot."""
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -96,8 +96,10 @@ SHAPES: Mapping[str, Shape] = {
 """What each table of a robot file holds, by its path."""
 
 
-def load_robot(name_or_path: str | Path) -> RobotDescription:
+def load_robot(name_or_path: str | Path, *, despite: Collection[str] = ()) -> RobotDescription:
     """Return the robot of that name under `vla_deploy/robots`, or of that file or folder.
+
+    Faults of the keys `despite` are passed over, by who helps to mend them.
 
     What `overrides.toml` in the same folder says goes before the robot file, and what its
     `calibration.toml` has measured replaces signs and offsets; the camera
@@ -111,7 +113,11 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     overrides, override_faults = read_overrides(file.parent)
     document, calibration_faults = calibrated(merged(own, overrides), file.parent)
     found = (_traced(fault, overrides, own) for fault in _faults(document, file.parent))
-    faults = (*override_faults, *calibration_faults, *found)
+    faults = (
+        *override_faults,
+        *calibration_faults,
+        *(one for one in found if one.key not in despite),
+    )
     if faults:
         raise RobotFileError(file, faults)
     camera = None

@@ -59,7 +59,8 @@ class StoppingMotion:
 def stopping(motion: JointMotion, bounds: JointBounds) -> StoppingMotion:
     """Return where the joints come to rest if they brake after the reaction time.
 
-    The way of a jerk-limited stop is v^2 / 2a, and v / 2 times what it takes to begin braking.
+    The way of a jerk-limited stop is v^2 / 2a, and v / 2 times what it takes to begin braking. A
+    joint that still gains speed gains more until its acceleration has gone, after the reaction.
     """
     follows = np.abs(motion.setpoint - motion.position) <= bounds.following
     start = np.where(follows, motion.setpoint, motion.position)
@@ -68,11 +69,17 @@ def stopping(motion: JointMotion, bounds: JointBounds) -> StoppingMotion:
     moving = np.abs(velocity) > np.where(follows, 0.0, STANDING_SHARE * bounds.velocity)
     speed = np.where(moving, np.abs(velocity), 0.0)
     gain = _within(acceleration * np.sign(velocity), -bounds.acceleration, bounds.acceleration)
-    onset_s = (bounds.acceleration + gain) / bounds.jerk
-    braking_s = speed / bounds.acceleration
-    way = np.sign(velocity) * speed * (bounds.reaction_s + 0.5 * onset_s + 0.5 * braking_s)
+    onset_s = (bounds.acceleration + np.minimum(gain, 0.0)) / bounds.jerk
+    gain, reaction_s = np.maximum(gain, 0.0), bounds.reaction_s
+    fading_s = gain / bounds.jerk
+    reached = speed + gain * reaction_s
+    peak = reached + 0.5 * gain * fading_s
+    braking_s = peak / bounds.acceleration
+    gaining = reaction_s * (speed + 0.5 * gain * reaction_s)
+    gaining += fading_s * (reached + gain * fading_s / 3.0)
+    way = np.sign(velocity) * (gaining + peak * 0.5 * (onset_s + braking_s))
     low, high = np.minimum(bounds.lower, start), np.maximum(bounds.upper, start)
-    slowest_s = float(np.where(moving, onset_s + braking_s, 0.0).max())
+    slowest_s = float(np.where(moving, fading_s + onset_s + braking_s, 0.0).max())
     position = _within(start + way, low, high)
     return StoppingMotion(start=start, position=position, time_s=bounds.reaction_s + slowest_s)
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from platforms import ProfileError, load_profile
-from vla_deploy.control.modes.retuning import retuned, tuning_of
+from vla_deploy.control.modes.retuning import require_bus_rate, retuned, tuning_of
 from vla_deploy.control.reporting.telemetry import TickClock
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.node import NeedsRestart
@@ -46,6 +46,14 @@ def test_a_rate_that_the_servo_bus_cannot_carry_is_refused():
     with pytest.raises(ProfileError, match="expected at most 500 Hz, for 16 servos at 3000000"):
         retuned(ROBOT, DESKTOP, replace(DESKTOP, control_rate_hz=510))
     assert retuned(ROBOT, DESKTOP, replace(DESKTOP, control_rate_hz=500)).period_s == 0.002
+
+
+@pytest.mark.parametrize(("robot", "most_hz"), [("so101_pair", 303), ("wx250s", 296)])
+def test_each_family_of_servos_has_its_share_of_the_wire(robot: str, most_hz: int) -> None:
+    described = load_robot(robot)
+    require_bus_rate(described, replace(DESKTOP, control_rate_hz=250))
+    with pytest.raises(ProfileError, match=f"expected at most {most_hz} Hz"):
+        require_bus_rate(described, replace(DESKTOP, control_rate_hz=most_hz + 1))
 
 
 def test_a_tick_is_late_against_the_period_that_led_up_to_it():

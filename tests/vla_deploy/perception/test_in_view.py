@@ -98,5 +98,16 @@ def test_the_place_of_what_was_taken_away_is_in_clear_view(boxed: "StillFlat") -
     assert is_in_clear_view(local(boxed, CUP_IN_BOX_M), CUP_SIZE_M, boxed.cloud(), [])
 
 
+@pytest.mark.parametrize(("away_m", "is_clear"), [(0.05, False), (0.12, True)])
+def test_a_place_beside_the_robots_own_fingers_is_not_in_clear_view(
+    boxed: "StillFlat", away_m: float, is_clear: bool
+) -> None:
+    boxed.put("red_cup", (2.2, 1.6, 0.5))
+    cloud, place = boxed.cloud(), local(boxed, CUP_IN_BOX_M)
+    beside = np.abs(cloud.points[..., 1] - place[1] - away_m) < 0.01
+    fingers = replace(cloud, own_body=cloud.own_body | beside)
+    assert is_in_clear_view(place, CUP_SIZE_M, fingers, []) is is_clear
+
+
 def test_what_is_out_of_the_image_is_hidden(boxed: "StillFlat") -> None:
     assert not is_in_clear_view((-1.0, 0.0, 0.5), CUP_SIZE_M, boxed.cloud(), [])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.plans.knowledge import match_device, spoken_devices
+from vla_deploy.plans.knowledge import match_device, spoken_devices, world_of
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.home_devices import DeviceKind, HomeDevice
 
@@ -32,3 +32,12 @@ def test_a_device_is_called_by_its_names_and_by_where_it_stands(
 ) -> None:
     robot = replace(BUTLER, devices={**BUTLER.devices, "desk_lamp": OTHER})
     assert match_device(said, spoken_devices(robot)) == device
+
+
+@pytest.mark.parametrize(("has_reach", "lacks"), [(True, ""), (False, "so101 has no [reach]")])
+def test_an_arm_on_a_table_hands_over_within_its_reach(has_reach: bool, lacks: str) -> None:
+    robot = load_robot("so101")
+    if not has_reach:
+        robot = replace(robot, parts=replace(robot.parts, reach=None))
+    assert world_of(robot, {}).lacks.get("hand_over", "").startswith(lacks)
+    assert ("hand_over" in world_of(robot, {}).skills) is has_reach

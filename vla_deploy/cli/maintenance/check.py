@@ -11,6 +11,8 @@ from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.maintenance.plan_check import PlanCheck, check_plan_file
+from vla_deploy.cli.maintenance.robot_check import require_usable
+from vla_deploy.control.modes.retuning import require_bus_rate
 from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import plan_schema
@@ -59,6 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
     profile = load_profile(arguments.profile)
     require_environment(robot)
+    require_usable(robot, arguments.robot)
+    require_bus_rate(robot, profile)
     lines = [
         f"robot {robot.name}: {_count(robot.joint_names, 'servo')}, "
         f"{_count(robot.places, 'place')}: ok",

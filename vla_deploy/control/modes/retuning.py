@@ -4,13 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from drivers.servo.family import family_of
 from platforms import Profile, ProfileError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.node import NeedsRestart
 
 STATUS_HZ: Final = 20.0
-# A cycle's share of the servo bus: one sync write and one fast sync read, by the servo.
-_WIRE_BITS: Final = 300
 _MAX_BUS_RATIO: Final = 0.8
 _RAMPED_BY_CYCLE: Final = "cyclic_synchronous_velocity"
 
@@ -36,21 +35,28 @@ def retuned(robot: RobotDescription, before: Profile, after: Profile) -> Tuning:
         ProfileError: the servo bus is too slow for the rate.
         NeedsRestart: something would have to be set up anew, which is done at standstill.
     """
-    _refuse_busy_bus(robot, after)
+    require_bus_rate(robot, after)
     reasons = "; ".join(_set_up_anew(robot, before, after))
     if reasons:
         raise NeedsRestart(reasons)
     return tuning_of(after)
 
 
-def _refuse_busy_bus(robot: RobotDescription, profile: Profile) -> None:
-    bus = robot.servo_bus
-    limit_hz = _MAX_BUS_RATIO * bus.baud / (_WIRE_BITS * len(bus.servos))
+def require_bus_rate(robot: RobotDescription, profile: Profile) -> None:
+    """Refuse a control rate that the servo bus cannot carry.
+
+    Raises:
+        ProfileError: its cycles would fill more than 80 % of the wire.
+    """
+    bus, servos = robot.servo_bus, robot.servo_bus.all_servos
+    bits = sum(family_of(one.model).facts(one.model).cycle_bits for one in servos)
+    limit_hz = _MAX_BUS_RATIO * bus.baud / bits
     if profile.control_rate_hz > limit_hz:
         raise ProfileError(
             (
-                f"control_rate_hz: expected at most {limit_hz:.0f} Hz, for {len(bus.servos)} "
-                f"servos at {bus.baud} baud, got {profile.control_rate_hz:g}",
+                f"control_rate_hz: expected at most {limit_hz:.0f} Hz, for {len(servos)} "
+                f"servos at {bus.baud} baud, got {profile.control_rate_hz:g}; raise the baud rate "
+                "of the servos, or take a slower profile",
             )
         )
 

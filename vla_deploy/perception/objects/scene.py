@@ -44,6 +44,9 @@ PATCH_PX = 2
 IN_FRONT_M = 0.05
 # What is lower than this shows no nearer than what it lies on.
 FLAT_M = 0.04
+# The robot's own parts are taken out of an image with a margin, and with them the edge of a thing
+# between the fingers: what is left of a small one is no thing any more.
+BESIDE_BODY_M = 0.03
 # Over an empty place the camera sees this share of the thing's height further.
 THROUGH_RATIO = 0.25
 
@@ -198,7 +201,8 @@ def is_in_clear_view(
     u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
     if not (border <= u < camera.width - border and border <= v < camera.height - border):
         return False
-    around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
+    reach = half + math.ceil(camera.fx * BESIDE_BODY_M / z)
+    around = np.s_[max(0, v - reach) : v + reach + 1, max(0, u - reach) : u + reach + 1]
     patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
     if cloud.own_body[around].any() or not cloud.valid[patch].all():
         return False

@@ -24,7 +24,7 @@ ABILITIES: Final = (
     ("navigate_to", "go to places"),
     ("find_object", "look for things and tell you what I see"),
     ("pick_up", "pick things up and put them in a box or on a table"),
-    ("hand_over", "bring them to you"),
+    ("hand_over", "give them to you"),
     ("place", "tidy up"),
     ("move_arm", "bring my arm to a pose"),
     ("open_gripper", "open and close my hand"),
@@ -51,11 +51,16 @@ def _tell_hands(_: Fields, request: PlanRequest) -> list[Skill]:
     """Say what the hands hold."""
     held = {one.held_by: str(one) for one in (request.scene.things if request.scene else ())}
     full = [
-        f"{_a(held.get(hand, kind))} in my {hand.split('_')[0]} hand"
+        f"{_a(held.get(hand, kind))} in my {_hand_words(hand)}"
         for hand, kind in request.world.holding.items()
         if kind
     ]
     return _say(f"I hold {listed(full)}." if full else "My hands are empty.")
+
+
+def _hand_words(hand: str) -> str:
+    name = hand.split("_")[0]
+    return name if name == "hand" else f"{name} hand"
 
 
 def _tell_place(_: Fields, request: PlanRequest) -> list[Skill]:

@@ -243,11 +243,16 @@ def _arm(step: Step) -> dict[str, str]:
     return {"arm": step["arm"]} if "arm" in step else {}
 
 
-def _pose(spoken: Steps, step: Step) -> list[Skill]:
-    said = step["name"].replace(" ", "_")
+def pose_named(words: str, poses: frozenset[str]) -> str | None:
+    """Return the pose that words mean: it, or one of another word for the same."""
+    said = words.replace(" ", "_")
     same = next((words for words in _SAME_POSE if said in words), frozenset())
-    poses = spoken.request.world.poses
-    name = said if said in poses else next(iter(sorted(same & poses)), said)
+    return said if said in poses else next(iter(sorted(same & poses)), None)
+
+
+def _pose(spoken: Steps, step: Step) -> list[Skill]:
+    said = step["name"]
+    name = pose_named(said, spoken.request.world.poses) or said.replace(" ", "_")
     return [("move_arm", {"pose": name, **_arm(step)})]
 
 

@@ -1,11 +1,13 @@
 """Plan the commonest commands at once: each clause fits a whole pattern, or nothing is planned."""
 
+import re
+from collections.abc import Mapping
 from string import digits
 from typing import Final
 
 from vla_deploy.client.action_words import skill_words
 from vla_deploy.memory import EpisodeOutcome, Judgement, read_judgement
-from vla_deploy.planning.builders.steps import Steps
+from vla_deploy.planning.builders.steps import Steps, pose_named
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.errors import CannotBeDone, Declined, NotUnderstood
 from vla_deploy.planning.interfaces import BackEnd, PlanRequest, Proposal
@@ -22,6 +24,7 @@ from vla_deploy.plans.plan import Plan, Skill, chained
 from vla_deploy.runtime.deadline import Deadline
 
 NAME: Final = "patterns"
+_CALLED_POSE: Final = re.compile(r"\b(?:pose|posture)\b")
 _THERE: Final = frozenset({"here", "there", "over there", "back there"})
 
 
@@ -104,7 +107,7 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
     try:
         return ground_plan(pattern_plan(request), request)
     except Declined as error:
-        raise NotUnderstood(text, drives="move" in world.skills) from error
+        raise NotUnderstood(text, world) from error
 
 
 def _fitting(clause: str, request: PlanRequest) -> Step:
@@ -116,6 +119,8 @@ def _fitting(clause: str, request: PlanRequest) -> Step:
         said = {name.rstrip(digits): text for name, text in found.groupdict().items() if text}
         named = [said[name] for name in ("where", "from") if name in said]
         devices = parts_of(said.get("device", ""))
+        if not _is_pose(said, given, clause, request):
+            continue
         if not all(match_devices(one, request.world) for one in devices):
             no_device = said["device"] if clause.startswith(("turn ", "switch ")) else ""
             continue
@@ -127,6 +132,14 @@ def _fitting(clause: str, request: PlanRequest) -> Step:
     if no_device and request.world.devices and not scope_words(clause):
         raise UnknownDevice(no_device, set(request.world.devices.values()))
     raise Declined(f'no pattern covers "{clause[:60]}"')
+
+
+def _is_pose(said: Step, given: Mapping[str, str], clause: str, request: PlanRequest) -> bool:
+    """Return whether a clause about a pose names one; what is called a pose is refused by name."""
+    if "name" not in said or "name" in given:
+        return True
+    known = pose_named(said["name"], request.world.poses) is not None
+    return known or _CALLED_POSE.search(clause) is not None
 
 
 def _is_known(name: str, request: PlanRequest) -> bool:

@@ -49,6 +49,11 @@ _THING: Final = rf"(?P<what>{THING})"
 # What is moved where: a thing that is told by where it stands leaves it open what goes where.
 _MOVED: Final = rf"(?P<what>{_BARE}(?:(?:,| and|, and) {_BARE})*)"
 _WHERE: Final = rf"(?P<where>{WORDS})"
+# "The stretched out pose", or "the pose stretched out".
+_POSE: Final = (
+    rf"(?:(?:the|your|a) )?(?:(?P<name>{WORDS}) (?:pose|posture|position)|"
+    rf"(?:pose|posture|position) (?P<name>{WORDS}))"
+)
 # Not "turn on the spot".
 _DEVICE: Final = r"(?!(?:the )?spot\b)(?P<device>[a-z][a-z']*(?:,? [a-z']+){0,7}?)"
 _INTO: Final = r"(?P<how>into|inside|in|onto|on top of|on|next to|beside|to)"
@@ -74,6 +79,9 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"(?:turn|rotate|spin)(?: to the)? {_SIDE}(?:(?: by)? (?P<by>{_ANGLE}|{_LITTLE}))?",
      "turn", {}),
     (rf"(?:turn|rotate|spin)(?: by)? (?P<by>{_ANGLE})(?: (?:to the )?{_SIDE})?", "turn", {}),
+    (rf"(?:{_GO}|return)(?: back)? (?:in)?to {_POSE}|"
+     rf"(?:bring|move|put|get|take|return) (?:your|the|both(?: your)?)(?: (?P<arm>left|right))? "
+     rf"(?:arms?|hands?)(?: back)? (?:in)?to {_POSE}", "pose", {}),
     (rf"(?:{_GO}|head|navigate|return)(?: back| over)?(?: to| into)? {_WHERE}", "go", {}),
     ("(?:turn|spin) (?:a?round once|in a circle)", "turn", {"by": "360 degrees"}),
     # --- switch devices of the home; what is no device of it is refused by name

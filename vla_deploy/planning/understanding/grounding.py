@@ -271,7 +271,7 @@ class _Grounder:
             if self._held(thing) is None:
                 yield from _on_furniture(thing)
                 yield "pick_up", {"object": thing.name, **_arm(given)}
-                if self._request.here is not None:
+                if self._request.here is not None and "navigate_to" in self._request.world.skills:
                     yield "navigate_to", self._here("here")
             yield "hand_over", self._hand_of(self._held(thing)) or _arm(given)
 

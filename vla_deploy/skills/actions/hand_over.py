@@ -1,7 +1,8 @@
 """Give somebody what a hand holds: let go as soon as the arm feels that it is pulled at.
 
-The hand stays where loaded hands travel, close in front of the chest: held out further it would
-hang over furniture that the robot may stand at. What the arm bears by itself is measured before
+On a robot that drives the hand stays where loaded hands travel, close in front of the chest: held
+out further it would hang over furniture that the robot may stand at. An arm on a table holds things
+out over it, and goes back. What the arm bears by itself is measured before
 anybody is asked to pull; a knock is over before the fingers open.
 """
 
@@ -17,7 +18,7 @@ from vla_deploy.skills.actions.simple import speak
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, Touched
 from vla_deploy.skills.movements.arms import arm_joints, believe_fingers, open_gripper
-from vla_deploy.skills.movements.carrying import carry
+from vla_deploy.skills.movements.carrying import carry, hold_out, or_carry
 from vla_deploy.skills.movements.motion import pause, settle, stay
 from vla_deploy.world.vocabulary import ANY_CLASS
 
@@ -47,6 +48,15 @@ def hand_over(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     kind = ANY_CLASS if held is None else held.kind
     yield from carry(context)
     context.keep_only(hand)
+    if context.robot.parts.base is not None:
+        yield from _offer(context, hand, kind)
+        return
+    yield from hold_out(context, hand)
+    yield from or_carry(context, _offer(context, hand, kind), hand)
+    yield from carry(context, (hand,))
+
+
+def _offer(context: SkillContext, hand: str, kind: str) -> Skill:
     yield from settle(context, arm_joints(context, hand))
     alone = _efforts(context, hand)
     here = "Here you are" if kind == ANY_CLASS else f"Here is the {kind}"

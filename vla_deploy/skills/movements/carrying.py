@@ -1,7 +1,7 @@
 """Bring arms to where they may travel, past what stands on furniture and out from under it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from vla_deploy.skills.movements.underside import leave_underside
 AT_POSE_RAD = 0.05
 LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
 FOLDING_STEPS = 12
+HOLD_OUT_HEIGHTS = 5
 CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
 # One yaw out of reach is no loss: another is tried at once.
 RESTARTS = 2
+Point = tuple[float, float, float]
 
 
 def carry(context: SkillContext, hands: Sequence[str] | None = None) -> Skill:
@@ -108,10 +110,16 @@ def _empty_targets(context: SkillContext, hand: str) -> dict[str, float]:
     return {name: context.robot.poses[pose][name] for name in joints}
 
 
-def _carry_targets(
-    context: SkillContext, hand: str, point_m: tuple[float, float, float]
-) -> dict[str, float]:
+def _carry_targets(context: SkillContext, hand: str, point_m: Point) -> dict[str, float]:
     """Return the carry posture nearest to the present one."""
+    targets = _down_at(context, hand, point_m)
+    if targets is None:
+        raise NotPossible(f"the {hand} hand cannot reach its carry point {point_m}")
+    return targets
+
+
+def _down_at(context: SkillContext, hand: str, point_m: Point) -> dict[str, float] | None:
+    """Return the nearest posture in which a hand points down at a point, None out of its reach."""
     arm = context.arms[hand]
     now = context.link.setpoints
     found = []
@@ -121,9 +129,34 @@ def _carry_targets(
         except ManipulationError:
             continue  # not every yaw is within the wrist's range
     if not found:
-        raise NotPossible(f"the {hand} hand cannot reach its carry point {point_m}")
+        return None
     best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
     return arm_targets(context, hand, best)
+
+
+def hold_out(context: SkillContext, hand: str) -> Skill:
+    """Bring what a hand holds as high and then as far out before its shoulder as it gets.
+
+    Raises:
+        NotPossible: it gets nowhere within the reach of the robot file.
+    """
+    for point_m in _points_out(context, hand):
+        targets = _down_at(context, hand, point_m)
+        if targets is not None:
+            yield from move_joints(context, targets, LOADED_SPEED_RATIO)
+            return
+    raise NotPossible(f"the {hand} hand gets to no point of [reach] where it could hold things out")
+
+
+def _points_out(context: SkillContext, hand: str) -> Iterator[Point]:
+    """Yield points before a hand's shoulder from the highest grip down, the farthest first."""
+    reach, aside_m = context.robot.reach, float(context.arms[hand].shoulder_m[1])
+    low_m, high_m = reach.grip_heights_m
+    for height_m in np.linspace(high_m, low_m, HOLD_OUT_HEIGHTS):
+        for distance_m in sorted(reach.distances_m, reverse=True):
+            if distance_m > abs(aside_m):
+                ahead_m = math.sqrt(distance_m**2 - aside_m**2)
+                yield ahead_m, aside_m, float(height_m)
 
 
 def or_carry(context: SkillContext, skill: Skill, hand: str) -> Skill:

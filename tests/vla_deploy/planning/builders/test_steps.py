@@ -168,6 +168,7 @@ def test_what_it_can_do_is_what_its_body_can() -> None:
     request = PlanRequest(command_id="c", text="what can you do", world=world)
     assert planned("what can you do", {"do": "ask", "about": "able"}, request=request) == [
         ("speak", {"text": "I can look for things and tell you what I see, pick things up and put "
-                           "them in a box or on a table, tidy up, bring my arm to a pose, open and "
-                           "close my hand and stand still when you tell me to."})
+                           "them in a box or on a table, give them to you, tidy up, bring my arm "
+                           "to a pose, open and close my hand and stand still when you tell me "
+                           "to."})
     ]  # fmt: skip

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.errors import Declined, NotAble
+from vla_deploy.planning.errors import Declined, NotAble, NotUnderstood
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.steering import awaiting, is_stop, is_word, objects, only_objects
@@ -98,6 +98,31 @@ def does(text: str, *turns: ConversationTurn) -> str:
 def test_a_common_command_is_planned_as_it_is_said(text: str, expected: str) -> None:
     said = does(text)
     assert said == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("go to the stretched out pose", "stretched_out"),
+        ("bring your arm to the pose stretched out", "stretched_out"),
+        ("move your left arm into the resting position", "rest left"),
+        ("put both arms into your folded posture", "folded"),
+        ("go back to the tucked pose", "folded"),
+        ("go to the moon pose", "moon"),  # the validator lists those there are
+    ],
+)
+def test_a_pose_is_said_with_its_words(text: str, expected: str) -> None:
+    robot = load_robot("so101_pair")
+    robot = replace(robot, poses={**robot.poses, "stretched_out": robot.poses["ready"]})
+    request = replace(request_for(text), world=world_of(robot, {}))
+    (action,) = pattern_plan(request).actions
+    assert action.skill == "move_arm"
+    assert " ".join(map(str, action.parameters.values())) == expected
+
+
+def test_a_position_that_is_no_pose_is_a_place() -> None:
+    with pytest.raises(UnknownPlace, match="parking position"):
+        does("go to the parking position")
 
 
 @pytest.mark.parametrize(
@@ -214,3 +239,13 @@ def test_words_that_object_are_told_from_idioms_and_from_what_is_to_be_done(
     text: str, is_objection: bool, has_more: bool
 ) -> None:
     assert (objects(text), not only_objects(text)) == (is_objection, has_more)
+
+
+@pytest.mark.parametrize("sees", [True, False])
+def test_what_is_not_understood_is_answered_by_what_the_robot_can_do(sees: bool) -> None:
+    robot = load_robot("so101")
+    if not sees:
+        robot = replace(robot, parts=replace(robot.parts, camera=None))
+    said = str(NotUnderstood("dance", world_of(robot, {})))
+    assert "open your hand" in said
+    assert ("find" in said) is ("put" in said) is sees

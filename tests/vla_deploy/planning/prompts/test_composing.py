@@ -216,7 +216,7 @@ def test_instructions_have_specs_and_safety_rules_of_a_robot_and_no_skill_that_i
     assert "- pick_up(" in system
     arm = chat_for(ask("go", world=world_of(load_robot("so101"), {})), "so101").system
     skills = set(re.findall(r"^- (\w+)\(", arm, re.MULTILINE))
-    hands = {"move_arm", "open_gripper", "close_gripper", "pick_up", "place"}
+    hands = {"move_arm", "open_gripper", "close_gripper", "pick_up", "place", "hand_over"}
     assert skills == {*hands, "find_object", "look_at", "speak", "wait", "stop"}
     assert "wheels" not in arm
     assert "cannot drive" in arm
