@@ -50,7 +50,7 @@ def measure(requests: int = 100, seed: int = 0) -> dict[str, Any]:
         closing(_Presser(robot, random.Random(seed))) as presser,
         busy_cores(),
     ):
-        with _pages(presser.address("page")):
+        with _pages(presser.address("page"), robot.base):
             figures = {
                 "both": presser.presses(requests, BOTH),
                 "page": presser.presses(requests // 4, ("page",)),
@@ -187,9 +187,9 @@ def _await_dashboard(robot: ProcessStack) -> None:
 
 
 @contextmanager
-def _pages(address: tuple[str, int]) -> Iterator[None]:
+def _pages(address: tuple[str, int], base: Path) -> Iterator[None]:
     """Keep pages connected, which take what the dashboard tells."""
-    words = [address[0], str(address[1]), str(CLIENTS), "0", _TOPICS]
+    words = [address[0], str(address[1]), str(CLIENTS), "0", _TOPICS, str(base)]
     with subprocess.Popen(
         [sys.executable, "-m", "benchmarks.live_clients", *words],
         stdin=subprocess.PIPE,

@@ -45,6 +45,7 @@ class Denial(Enum):
 
     LOGIN_NEEDED = HTTPStatus.UNAUTHORIZED, "login_needed"
     LOGIN_FAILED = HTTPStatus.UNAUTHORIZED, "login_failed"
+    LINK_REFUSED = HTTPStatus.UNAUTHORIZED, "link_refused"
     TOKEN_REFUSED = HTTPStatus.UNAUTHORIZED, "token_refused"
     ROLE_TOO_LOW = HTTPStatus.FORBIDDEN, "role_too_low"
     ORIGIN_REFUSED = HTTPStatus.FORBIDDEN, "origin_refused"

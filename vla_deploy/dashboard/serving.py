@@ -25,7 +25,6 @@ from vla_deploy.ipc.memory.doorbell import short_path
 from vla_deploy.runtime.net import BACKLOG, PortTaken
 from vla_deploy.runtime.node import Node
 
-SOCKET_NAME: Final = "dashboard.sock"
 _SOCKET_MODE: Final = 0o660
 _SHUTDOWN_S: Final = 1  # for open requests
 _KEEP_ALIVE_S: Final = 10

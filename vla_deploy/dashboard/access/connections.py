@@ -4,6 +4,7 @@ uvicorn waits without limit for a request's first bytes, which is all that a slo
 """
 
 import asyncio
+import socket
 from collections import Counter
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from vla_deploy.dashboard.access.identity import Peer, peer_of
+from vla_deploy.runtime.peer_credentials import is_own_user
 
 MOST: Final = 256
 """Of all addresses together; connections of this computer do not count."""
@@ -81,7 +83,7 @@ class BoundedHttp(H11Protocol):
         super().connection_made(transport)
         self._slot = ConnectionSlot(self.bounds, self)
         self._head_timer: asyncio.TimerHandle | None = None
-        if self._slot.is_held:
+        if self._slot.is_held and _is_welcome(transport):
             self._await_head()
         else:
             transport.abort()
@@ -134,6 +136,12 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         if self.slot is not None:
             self.slot.release()
         super().connection_lost(exc)
+
+
+def _is_welcome(transport: asyncio.Transport) -> bool:
+    """Return whether a connection is of the network, or by the Unix socket from the own user."""
+    connection = transport.get_extra_info("socket")
+    return connection.family != socket.AF_UNIX or is_own_user(connection)
 
 
 def bounded_by(connections: Connections) -> type[BoundedHttp]:

@@ -103,6 +103,7 @@ def require(role: UserRole) -> Require:
 Anyone = Annotated[Identity, Depends(require(UserRole.ANYONE))]
 Viewer = Annotated[Identity, Depends(require(UserRole.VIEWER))]
 Operator = Annotated[Identity, Depends(require(UserRole.OPERATOR))]
+Admin = Annotated[Identity, Depends(require(UserRole.ADMIN))]
 
 
 def guard(app: FastAPI, access: AccessControl) -> None:

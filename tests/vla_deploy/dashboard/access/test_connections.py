@@ -76,7 +76,7 @@ def until_closed(called):
 
 @pytest.fixture
 def robot(world):
-    made = world()
+    made = world(trust_loopback=True)
     listener = socket.create_server(("127.0.0.1", 0))
     bounds = Connections(3, 2, HEAD_WITHIN_S)
     ended = threading.Event()
