@@ -1,7 +1,7 @@
 """Be many WebSocket clients of a dashboard at little cost: bytes are taken, and counted only.
 
-`python -m benchmarks.live_clients HOST PORT COUNT FROZEN TOPIC,... RUNTIME_BASE` prints "ready" once
-all are subscribed, and what came as JSON when its input ends. The frozen ones read nothing.
+`python -m benchmarks.live_clients HOST PORT COUNT FROZEN TOPIC,... RUNTIME_BASE` prints "ready"
+once all are subscribed, and what came as JSON when its input ends. The frozen ones read nothing.
 """
 
 import json
