@@ -13,6 +13,7 @@ from vla_deploy.client.access.local_token import provide_local_token
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
+from vla_deploy.dashboard.door_probe import DoorProbe
 from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import HttpSocket, open_socket
 from vla_deploy.ipc import CellWriter, topics
@@ -45,6 +46,7 @@ class DashboardNode:
         self._parts: list[Part] = []
         self._guard = PartGuard(_log)
         self._access: AccessControl | None = None
+        self.probe: DoorProbe | None = None
         self._status: CellWriter[DashboardStatus]
         self._due_ns = 0
         self._url = ""
@@ -65,6 +67,7 @@ class DashboardNode:
         tcp = open_port(settings.host, settings.port, search=twin, before=before)
         unix = open_socket(self._context.run_dir / DASHBOARD_SOCKET)
         self.sockets = (HttpSocket(tcp, tls), HttpSocket(unix))
+        self.probe = DoorProbe(tcp, is_tls=tls is not None)
         self._status = self.link.space.cell_writer(topics.DASHBOARD_STATUS)
         # Sessions and limits on guesses run in real time.
         base, rules = self._context.run_dir.parent, _rules(settings)
@@ -78,11 +81,12 @@ class DashboardNode:
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
     def step(self) -> None:
-        """Step the parts, and publish the page's address twice a second."""
+        """Step the parts, and publish the page's address twice a second, while it is answered."""
         for part in self._parts:
             self._guard.run(type(part).__name__, part.step)
         now_ns = self._clock.now_ns()
-        if now_ns >= self._due_ns:
+        is_silent = self.probe is not None and self.probe.is_silent
+        if now_ns >= self._due_ns and not is_silent:
             self._due_ns = now_ns + _PUBLISH_NS
             self._status.put_document(
                 {

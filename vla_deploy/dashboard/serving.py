@@ -15,19 +15,25 @@ from starlette.types import ASGIApp
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
+from vla_deploy.dashboard.accepting import Acceptor
 from vla_deploy.dashboard.access.connections import (
     HEAD_BYTES,
+    BoundedHttp,
+    ConnectionLimits,
     Connections,
     bounded_by,
 )
+from vla_deploy.dashboard.door_probe import DoorProbe
 from vla_deploy.dashboard.live.endpoint import LiveProtocol
 from vla_deploy.ipc.memory.doorbell import short_path
 from vla_deploy.runtime.net import BACKLOG, PortTaken
 from vla_deploy.runtime.node import Node
+from vla_deploy.runtime.open_files import open_files_left
 
 _SOCKET_MODE: Final = 0o660
 _SHUTDOWN_S: Final = 1  # for open requests
 _KEEP_ALIVE_S: Final = 10
+_OWN_FILES: Final = 64  # which answers open meanwhile: logs, recordings, topics
 _MOST_MESSAGE_BYTES: Final = 1_000_000
 
 
@@ -59,11 +65,34 @@ class HttpSocket:
 
 
 class _Server(uvicorn.Server):
-    """Leave signals to the process's main function."""
+    """Leave signals to the process's main function, and accepting to an acceptor within bounds."""
+
+    def __init__(self, config: uvicorn.Config, at: HttpSocket, bounds: Connections) -> None:
+        super().__init__(config)
+        self._at = at
+        self._bounds = bounds
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Accept connections."""
+        await self.lifespan.startup()
+        protocol = bounded_by(self._bounds)
+
+        def make_protocol() -> BoundedHttp:
+            return protocol(self.config, self.server_state, self.lifespan.state)
+
+        self.servers = []  # uvicorn's own would accept without bounds
+        self._acceptor = Acceptor(self._at.listener, self._at.tls, make_protocol, self._bounds)
+        self._acceptor.start()
+        self.started = True
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Accept no more, and let open requests end."""
+        self._acceptor.close()
+        await super().shutdown(sockets)
 
 
 async def serve(
@@ -73,10 +102,12 @@ async def serve(
     clock: Clock,
     should_stop: Callable[[], bool],
     connections: Connections | None = None,
+    probe: DoorProbe | None = None,
 ) -> None:
-    """Answer requests and step a started node until `should_stop()`."""
-    bounds = connections or Connections()
-    servers = [_Server(_config(app, one, bounds)) for one in sockets]
+    """Answer requests and step a started node until `should_stop()`; `probe` asks meanwhile."""
+    bounds = connections or Connections(ConnectionLimits.within(open_files_left() - _OWN_FILES))
+    servers = [_Server(_config(app), one, bounds) for one in sockets]
+    probing = None if probe is None else asyncio.create_task(probe.run())
     serving = [
         asyncio.create_task(server.serve([one.listener]))
         for server, one in zip(servers, sockets, strict=True)
@@ -84,6 +115,8 @@ async def serve(
     try:
         await _step(node, clock, lambda: should_stop() or any(task.done() for task in serving))
     finally:
+        if probing is not None:
+            probing.cancel()
         for server in servers:
             server.should_exit = True
         await asyncio.gather(*serving)
@@ -101,8 +134,7 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)
 
 
-def _config(app: ASGIApp, at: HttpSocket, connections: Connections) -> uvicorn.Config:
-    tls = at.tls
+def _config(app: ASGIApp) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         log_config=None,
@@ -110,7 +142,6 @@ def _config(app: ASGIApp, at: HttpSocket, connections: Connections) -> uvicorn.C
         access_log=False,
         lifespan="off",
         loop="asyncio",
-        http=bounded_by(connections),
         ws=LiveProtocol,
         ws_per_message_deflate=False,  # else each message is compressed for each client
         proxy_headers=False,
@@ -119,5 +150,4 @@ def _config(app: ASGIApp, at: HttpSocket, connections: Connections) -> uvicorn.C
         timeout_keep_alive=_KEEP_ALIVE_S,
         timeout_graceful_shutdown=_SHUTDOWN_S,
         ws_max_size=_MOST_MESSAGE_BYTES,
-        ssl_context_factory=None if tls is None else lambda *_: tls,
     )

@@ -127,9 +127,7 @@ def test_the_unix_socket_asks_the_kernel_who_is_there(made, monkeypatch, uid, an
 
 
 def test_a_stranger_at_the_unix_socket_is_hung_up_on(made, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "vla_deploy.dashboard.access.connections.is_own_user", lambda connection: False
-    )
+    monkeypatch.setattr("vla_deploy.dashboard.accepting.is_own_user", lambda connection: False)
     path, ended = tmp_path / "s", threading.Event()
     listener = open_socket(path)
     serving = serve(made.app, [HttpSocket(listener)], Idle(), MonotonicClock(), ended.is_set)
