@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_twin.errors import TwinError
-from vla_deploy.runtime.peer_credentials import is_own_user
+from vla_deploy.client.peer_credentials import is_own_user
 
 MAX_REQUEST_BYTES = 65_536
 
