@@ -13,9 +13,9 @@ import struct
 from collections.abc import Callable
 from typing import Final
 
+from vla_deploy.client.peer_credentials import is_own_user
 from vla_deploy.dashboard.access.connections import BoundedHttp, Connections, ConnectionSlot
 from vla_deploy.dashboard.access.identity import SOCKET, Peer, peer_at
-from vla_deploy.client.peer_credentials import is_own_user
 
 HANDSHAKE_WITHIN_S: Final = 5.0
 PAUSE_S: Final = 0.25

@@ -9,12 +9,12 @@ import threading
 import pytest
 
 from drivers.clock import MonotonicClock
+from vla_deploy.client import peer_credentials
 from vla_deploy.client.access.accounts import UserRole
 from vla_deploy.client.access.errors import LocalTokenUnusable
 from vla_deploy.client.access.local_token import LOCAL, local_headers, provide_local_token
 from vla_deploy.dashboard.access.login_links import VALID_S
 from vla_deploy.dashboard.serving import HttpSocket, open_socket, serve
-from vla_deploy.client import peer_credentials
 from vla_deploy.runtime.state_dir import access_dir_of
 
 STATE, COMMANDS = "/api/v1/state", "/api/v1/commands"
