@@ -111,7 +111,7 @@ class Connections:
         self._slots.pop(slot, None)
 
     def make_room(self) -> None:
-        """End the oldest connection that waits, of the address that holds most: no file is left to open."""
+        """End the oldest waiting connection of the address that holds most, to free a file."""
         self._crowd_out([*self._slots])
 
     def _has_room(self, new: ConnectionSlot) -> bool:
