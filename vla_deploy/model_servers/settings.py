@@ -11,6 +11,7 @@ from urllib.parse import SplitResult, urlsplit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from vla_deploy.model_servers.errors import ServersFileInvalid
+from vla_deploy.runtime.table_schema import parse_toml
 
 SERVERS_FILE: Final = "servers.toml"
 _TABLE: Final = "servers"
@@ -120,7 +121,7 @@ def read_servers(file: Path) -> dict[str, ServerSettings]:
         ServersFileInvalid: it is no TOML, or has faults; all of them are listed.
     """
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from vla_deploy.runtime.state_dir import config_dir_of
+from vla_deploy.runtime.table_schema import parse_toml
 
 SETTINGS_FILE: Final = "dashboard.toml"
 DASHBOARD_SOCKET: Final = "dashboard.sock"
@@ -120,7 +121,7 @@ def read_settings(base: Path) -> DashboardSettings:
     """
     file = config_dir_of(base) / SETTINGS_FILE
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return DashboardSettings()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

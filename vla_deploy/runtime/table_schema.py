@@ -1,5 +1,6 @@
 """Declare what the tables of a hand-written file hold; collect every fault, stop at none."""
 
+import tomllib
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from enum import Enum
@@ -38,6 +39,18 @@ class ValueCheck:
 
 
 Shape = Mapping[str, ValueCheck]
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the document of a hand-written file; one that nests too deeply is no TOML, too.
+
+    Raises:
+        tomllib.TOMLDecodeError: it is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("it is nested too deeply") from None
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
