@@ -1,11 +1,13 @@
-"""Give a process room for the files and connections that it opens."""
+"""Give a process room for the files that it opens, and keep those it makes from other users."""
 
+import os
 import resource
 from pathlib import Path
 from typing import Final
 
 MOST_OPEN: Final = 4096
 """The dashboard holds 450 (a topic takes two) and 450 connections; systemd's default is 1024."""
+_NOT_FOR_OTHERS: Final = 0o027
 _OWN_FILES: Final = Path("/proc/self/fd")
 
 
@@ -16,6 +18,14 @@ def raise_open_files() -> int:
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
     return resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+
+
+def keep_files_private() -> None:
+    """Take every right of others, and writing of the group, from files that are made from now on.
+
+    Logs hold what was said in the room; a stricter mask of the user stays.
+    """
+    os.umask(os.umask(_NOT_FOR_OTHERS) | _NOT_FOR_OTHERS)
 
 
 def open_files_left() -> int:

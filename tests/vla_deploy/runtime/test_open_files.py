@@ -1,3 +1,4 @@
+import os
 import resource
 
 import pytest
@@ -22,3 +23,14 @@ def test_what_is_open_is_counted():
     with open("/dev/null"):  # noqa: PTH123
         assert open_files.open_files_left() == left - 1
     assert left < resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+
+
+@pytest.mark.parametrize(("before", "mode"), [(0o022, 0o640), (0o077, 0o600), (0, 0o640)])
+def test_new_files_are_not_for_other_users(tmp_path, before, mode):
+    own = os.umask(before)
+    try:
+        open_files.keep_files_private()
+        (tmp_path / "log").touch()
+    finally:
+        os.umask(own)
+    assert (tmp_path / "log").stat().st_mode & 0o777 == mode

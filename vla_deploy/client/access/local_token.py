@@ -73,7 +73,10 @@ def _read(base: Path) -> str:
             f"{file}: {error.strerror}; run as the robot's user or as root, while it runs"
         ) from error
     try:
-        mode = stat.S_IMODE(os.fstat(handle).st_mode)
+        found = os.fstat(handle)
+        mode = stat.S_IMODE(found.st_mode)
+        if os.geteuid() not in (0, found.st_uid):
+            raise LocalTokenUnusable(f"{file}: belongs to user {found.st_uid}; remove it")
         if mode & 0o077:
             raise LocalTokenUnusable(
                 f"{file}: others may read it (mode {mode:o}), expected 600; revoke it: "
