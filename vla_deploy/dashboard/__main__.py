@@ -33,7 +33,13 @@ class Dashboard:
             node.start()
             probe = self._node.probe
             serving = serve(
-                self._node.app, self._node.sockets, node, clock, should_stop, probe=probe
+                self._node.app,
+                self._node.sockets,
+                node,
+                clock,
+                should_stop,
+                probe=probe,
+                press=self._node.press,
             )
             asyncio.run(serving)
         finally:

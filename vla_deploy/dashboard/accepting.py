@@ -14,13 +14,20 @@ from collections.abc import Callable
 from typing import Final
 
 from vla_deploy.client.peer_credentials import is_own_user
-from vla_deploy.dashboard.access.connections import BoundedHttp, Connections, ConnectionSlot
+from vla_deploy.dashboard.access.connections import (
+    STOP_REQUEST,
+    BoundedHttp,
+    Connections,
+    ConnectionSlot,
+)
 from vla_deploy.dashboard.access.identity import SOCKET, Peer, peer_at
 
 HANDSHAKE_WITHIN_S: Final = 5.0
 PAUSE_S: Final = 0.25
-_ACCEPTED_AT_ONCE: Final = 16
+_ACCEPTED_AT_ONCE: Final = 8
 """After these, what was accepted before gets its turn, a stop among it."""
+_LAST_LOOK_S: Final = 0.05
+_MOST_REFUSED: Final = 32
 _FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 _RESET: Final = struct.pack("ii", 1, 0)  # SO_LINGER of no time: an early refusal keeps nothing
 _log = logging.getLogger(__name__)
@@ -35,16 +42,20 @@ class Acceptor:
         tls: ssl.SSLContext | None,
         make_protocol: Callable[[], BoundedHttp],
         connections: Connections,
+        press: Callable[[], None],
     ) -> None:
+        """Accept nothing yet; `press` presses the stop."""
         listener.setblocking(False)
         self._listener = listener
         self._tls = tls
         self._make_protocol = make_protocol
         self._connections = connections
+        self._press = press
         self._loop = asyncio.get_running_loop()
         self._opening: set[asyncio.Task[None]] = set()
         self._pause: asyncio.TimerHandle | None = None
         self._is_full = False
+        self._refused = 0
 
     def start(self) -> None:
         """Accept from now on."""
@@ -85,11 +96,14 @@ class Acceptor:
 
     def _take(self, connection: socket.socket, address: object) -> None:
         peer = _peer(connection, address)
+        is_pressed = peer is not None and self._tls is None and _asks_to_stop(connection)
+        if is_pressed:  # before anything else is done with it, and where there is no room, too
+            self._press()
         slot = None if peer is None else self._connections.enter(peer, lambda: None)
         if slot is None:
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
-            connection.close()
+            self._refuse(connection, may_press=peer is not None and not is_pressed)
             return
+        slot.has_pressed = is_pressed
         connection.setblocking(False)
         task = self._loop.create_task(self._open(connection, slot))
 
@@ -109,6 +123,20 @@ class Acceptor:
         self._opening.add(task)
         task.add_done_callback(end)
 
+    def _refuse(self, connection: socket.socket, *, may_press: bool) -> None:
+        """Reset a connection; one without TLS gets a moment before, in which a press may come."""
+        if may_press and self._tls is None and self._refused < _MOST_REFUSED:
+            self._refused += 1
+            self._loop.call_later(_LAST_LOOK_S, self._look_and_reset, connection)
+        else:
+            _reset(connection)
+
+    def _look_and_reset(self, connection: socket.socket) -> None:
+        self._refused -= 1
+        if _asks_to_stop(connection):
+            self._press()
+        _reset(connection)
+
     async def _open(self, connection: socket.socket, slot: ConnectionSlot) -> None:
         """Let a protocol serve the connection, after its TLS handshake where there is one."""
 
@@ -121,6 +149,21 @@ class Acceptor:
         await self._loop.connect_accepted_socket(
             serving, connection, ssl=self._tls, ssl_handshake_timeout=limit_s
         )
+
+
+def _reset(connection: socket.socket) -> None:
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+    connection.close()
+
+
+def _asks_to_stop(connection: socket.socket) -> bool:
+    """Return whether a press has come with the connection; its bytes stay for who serves it."""
+    try:
+        return connection.recv(len(STOP_REQUEST), socket.MSG_PEEK | socket.MSG_DONTWAIT) == (
+            STOP_REQUEST
+        )
+    except OSError:
+        return False
 
 
 def _peer(connection: socket.socket, address: object) -> Peer | None:

@@ -16,8 +16,9 @@ from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.door_probe import DoorProbe
 from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import HttpSocket, open_socket
-from vla_deploy.ipc import CellWriter, topics
+from vla_deploy.ipc import CellWriter, IpcError, topics
 from vla_deploy.ipc.payloads.services import DashboardStatus
+from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.runtime.net import DASHBOARD_SOCKET, DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
@@ -96,6 +97,13 @@ class DashboardNode:
                     "failures": dict(self._guard.failures),
                 }
             )
+
+    def press(self) -> None:
+        """Press the stop; what is wrong with shared memory, its route answers."""
+        try:
+            self.link.operate(ESTOP)
+        except IpcError as error:
+            _log.error("the stop is not pressed: %s", error)
 
     def stop(self) -> None:
         """Stop the parts and close everything."""

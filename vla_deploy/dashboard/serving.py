@@ -5,11 +5,13 @@ import contextlib
 import logging
 import socket
 import ssl
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import anyio.to_thread
 import uvicorn
 from starlette.types import ASGIApp
 
@@ -33,6 +35,9 @@ from vla_deploy.runtime.open_files import open_files_left
 _SOCKET_MODE: Final = 0o660
 _SHUTDOWN_S: Final = 1  # for open requests
 _KEEP_ALIVE_S: Final = 10
+_THREADS: Final = 3
+"""Of answers that read slow disks: each takes the interpreter from the event loop for a moment."""
+_SWITCH_S: Final = 0.001
 _OWN_FILES: Final = 64  # which answers open meanwhile: logs, recordings, topics
 _MOST_MESSAGE_BYTES: Final = 1_000_000
 
@@ -67,10 +72,17 @@ class HttpSocket:
 class _Server(uvicorn.Server):
     """Leave signals to the process's main function, and accepting to an acceptor within bounds."""
 
-    def __init__(self, config: uvicorn.Config, at: HttpSocket, bounds: Connections) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        at: HttpSocket,
+        bounds: Connections,
+        press: Callable[[], None],
+    ) -> None:
         super().__init__(config)
         self._at = at
         self._bounds = bounds
+        self._press = press
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -79,13 +91,15 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Accept connections."""
         await self.lifespan.startup()
-        protocol = bounded_by(self._bounds)
+        protocol = bounded_by(self._bounds, self._press)
 
         def make_protocol() -> BoundedHttp:
             return protocol(self.config, self.server_state, self.lifespan.state)
 
         self.servers = []  # uvicorn's own would accept without bounds
-        self._acceptor = Acceptor(self._at.listener, self._at.tls, make_protocol, self._bounds)
+        self._acceptor = Acceptor(
+            self._at.listener, self._at.tls, make_protocol, self._bounds, self._press
+        )
         self._acceptor.start()
         self.started = True
 
@@ -103,10 +117,16 @@ async def serve(
     should_stop: Callable[[], bool],
     connections: Connections | None = None,
     probe: DoorProbe | None = None,
+    press: Callable[[], None] = lambda: None,
 ) -> None:
-    """Answer requests and step a started node until `should_stop()`; `probe` asks meanwhile."""
+    """Answer requests and step a started node until `should_stop()`; `probe` asks meanwhile.
+
+    `press` presses the stop, ahead of the requests that wait.
+    """
+    anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
+    sys.setswitchinterval(_SWITCH_S)
     bounds = connections or Connections(ConnectionLimits.within(open_files_left() - _OWN_FILES))
-    servers = [_Server(_config(app), one, bounds) for one in sockets]
+    servers = [_Server(_config(app), one, bounds, press) for one in sockets]
     probing = None if probe is None else asyncio.create_task(probe.run())
     serving = [
         asyncio.create_task(server.serve([one.listener]))
@@ -138,7 +158,7 @@ def _config(app: ASGIApp) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         log_config=None,
-        log_level=logging.WARNING,
+        log_level=logging.ERROR,  # a warning for each request that is none would fill the disk
         access_log=False,
         lifespan="off",
         loop="asyncio",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 MOST_OPEN: Final = 4096
-"""The dashboard holds 450 (a topic takes two) and 450 connections; systemd's default is 1024."""
+"""The dashboard holds 450 (a topic takes two) and 580 connections; systemd's default is 1024."""
 _NOT_FOR_OTHERS: Final = 0o027
 _OWN_FILES: Final = Path("/proc/self/fd")
 

@@ -15,9 +15,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from vla_deploy.dashboard.access.identity import Peer
+from vla_deploy.dashboard.access.request import STOP_PATH
 
 HEAD_WITHIN_S: Final = 10.0
 HEAD_BYTES: Final = 32 * 1024
+STOP_REQUEST: Final = f"POST {STOP_PATH} ".encode()
 _LEAST: Final = 4
 
 
@@ -38,7 +40,7 @@ class PeerGroup(Enum):
 
 MOST: Final[Mapping[PeerGroup, int]] = {
     PeerGroup.NETWORK: 256,
-    PeerGroup.LOOPBACK: 128,
+    PeerGroup.LOOPBACK: 256,
     PeerGroup.SOCKET: 64,
 }
 MOST_PER_ADDRESS: Final = 32
@@ -49,10 +51,12 @@ class ConnectionSlot:
     """Hold the place of one connection, across its upgrade from HTTP to WebSocket."""
 
     def __init__(self, connections: "Connections", peer: Peer, drop: Callable[[], None]) -> None:
-        self.peer = peer
+        self.key = peer.rate_key
         self.group = PeerGroup.of(peer)
         self.is_waiting = True
         """It waits for its client, to ask or to take an answer: then it gives way to another."""
+        self.has_pressed = False
+        """The stop that it begins with has been pressed already."""
         self.drop = drop
         self._connections = connections
 
@@ -117,7 +121,7 @@ class Connections:
     def _has_room(self, new: ConnectionSlot) -> bool:
         fellows = [one for one in self._slots if one.group is new.group]
         if new.group is PeerGroup.NETWORK:
-            own = [one for one in fellows if one.peer.rate_key == new.peer.rate_key]
+            own = [one for one in fellows if one.key == new.key]
             if len(own) >= self._limits.per_address and not self._crowd_out(own):
                 return False
         is_full = len(fellows) >= self._limits.most[new.group]
@@ -127,8 +131,8 @@ class Connections:
         waiting = [one for one in slots if one.is_waiting]
         if not waiting:
             return False
-        by_key = Counter(one.peer.rate_key for one in waiting)
-        victim = max(waiting, key=lambda one: by_key[one.peer.rate_key])  # the first: the oldest
+        by_key = Counter(one.key for one in waiting)
+        victim = max(waiting, key=lambda one: by_key[one.key])  # the first: the oldest
         self.crowded_out += 1
         victim.release()
         victim.drop()
@@ -140,6 +144,7 @@ class BoundedHttp(H11Protocol):
 
     bounds: Connections
     slot: ConnectionSlot
+    press: Callable[[], None]
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Wait for the first request."""
@@ -155,7 +160,14 @@ class BoundedHttp(H11Protocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes; any number of small pieces does not extend the time limit."""
+        """Take bytes; any number of small pieces does not extend the time limit.
+
+        A stop is pressed before anything else is done with it, also before the requests ahead of
+        it are answered; its route answers it when its turn comes.
+        """
+        if data.startswith(STOP_REQUEST) and not self.slot.has_pressed:
+            self.press()
+        self.slot.has_pressed = False
         super().data_received(data)
         self._await_head()
 
@@ -210,7 +222,7 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
 
 
-def bounded_by(connections: Connections) -> type[BoundedHttp]:
-    """Return the HTTP protocol whose connections count together."""
-    fields: dict[str, Any] = {"bounds": connections}
+def bounded_by(connections: Connections, press: Callable[[], None]) -> type[BoundedHttp]:
+    """Return the HTTP protocol whose connections count together; `press` presses the stop."""
+    fields: dict[str, Any] = {"bounds": connections, "press": staticmethod(press)}
     return type("BoundedHttp", (BoundedHttp,), fields)

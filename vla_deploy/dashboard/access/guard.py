@@ -13,6 +13,7 @@ from vla_deploy.dashboard.access.access_control import AccessControl
 from vla_deploy.dashboard.access.audit_middleware import AuditMiddleware, note_code, note_required
 from vla_deploy.dashboard.access.body import read_body, read_stop_body, replay
 from vla_deploy.dashboard.access.identity import IDENTITY, Identity, unknown_user
+from vla_deploy.dashboard.access.read_turns import ReadTurns
 from vla_deploy.dashboard.access.request import WEBSOCKET, IncomingRequest, read_request
 from vla_deploy.dashboard.errors import AccessDenied, Denial, denial_response
 
@@ -27,6 +28,7 @@ class AccessGuard:
     def __init__(self, app: ASGIApp, access: AccessControl) -> None:
         self._app = app
         self._access = access
+        self._reads = ReadTurns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request or WebSocket."""
@@ -45,8 +47,17 @@ class AccessGuard:
             if request.method == WEBSOCKET:
                 session = self._access.session_expiry(request, receive, audited.send)
                 await self._app(scope, session.receive, session.send)
-            else:
+            elif request.is_change:
                 await self._app(scope, receive, audited.send)
+            else:
+                await self._read(scope, receive, audited.send)
+
+    async def _read(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            async with self._reads.turn(send) as turn:
+                await self._app(scope, receive, turn.send)
+        except AccessDenied as denied:  # of too many; those of routes are answered by the app
+            await _deny(denied, scope, receive, send)
 
     async def _admit(self, scope: Scope, receive: Receive, request: IncomingRequest) -> Receive:
         if request.is_stop:

@@ -21,8 +21,10 @@ from vla_deploy.dashboard import accepting, door_probe
 from vla_deploy.dashboard.access import UserRole
 from vla_deploy.dashboard.access.connections import ConnectionLimits, Connections, PeerGroup
 from vla_deploy.dashboard.access.identity import Peer, peer_at
+from vla_deploy.dashboard.access.read_turns import ReadTurns
 from vla_deploy.dashboard.access.session_expiry import CHECK_NS
 from vla_deploy.dashboard.door_probe import DoorProbe
+from vla_deploy.dashboard.errors import AccessDenied
 from vla_deploy.dashboard.serving import HttpSocket, serve
 
 FAR = peer_at("192.168.1.7")
@@ -61,9 +63,10 @@ class Robot:
 
     def answer(self, sent):
         """Return what comes back until the other end hangs up."""
-        with self.call() as called:
+        with contextlib.suppress(ConnectionError), self.call() as called:
             called.sendall(sent)
             return until_closed(called)
+        return b""
 
     def until_held(self, count):
         for _ in range(500):
@@ -82,14 +85,14 @@ def until_closed(called):
 
 
 @contextlib.contextmanager
-def serving(app, listener, bounds, tls=None):
+def serving(app, listener, bounds, tls=None, press=lambda: None):
     """Serve an application in a thread; give the port."""
     with listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
         ended = threading.Event()
         sockets = [HttpSocket(listener, tls)]
-        served = serve(app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds)
+        served = serve(app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds, press=press)
         thread = threading.Thread(target=asyncio.run, args=(served,))
         thread.start()
         port = listener.getsockname()[1]
@@ -275,9 +278,9 @@ def test_who_floods_gives_way_first():
 
 
 def test_with_few_files_to_open_there_are_fewer_places():
-    usual, few = ConnectionLimits.within(10_000), ConnectionLimits.within(112)
-    assert [usual.most[group] for group in PeerGroup] == [256, 128, 64]
-    assert [few.most[group] for group in PeerGroup] == [64, 32, 16]
+    usual, few = ConnectionLimits.within(10_000), ConnectionLimits.within(144)
+    assert [usual.most[group] for group in PeerGroup] == [256, 256, 64]
+    assert [few.most[group] for group in PeerGroup] == [64, 64, 16]
 
 
 def test_unfinished_tls_handshakes_count_and_end(world, monkeypatch):
@@ -366,3 +369,56 @@ def test_a_client_that_pings_without_end_and_reads_nothing_is_not_heard_without_
         while select.select([], [called], [], 0.5)[1] and taken < FAR_TOO_MUCH:
             taken += called.send(500 * ping)
         assert taken < FAR_TOO_MUCH
+
+
+STOP = b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
+
+
+def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_room(world):
+    pressed, entered, goes_on = threading.Event(), threading.Event(), threading.Event()
+    app = FastAPI()
+
+    @app.get("/slow")
+    async def slow() -> None:
+        entered.set()
+        await asyncio.to_thread(goes_on.wait)
+
+    bounds = Connections(LIMITS)
+    with serving(app, socket.socket(), bounds, press=pressed.set) as port:
+        robot = Robot(port, bounds, None)
+        with robot.call() as one, robot.call() as other:
+            for called in (one, other):
+                called.sendall(b"GET /slow HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert entered.wait(10)
+            robot.until_held(2)
+            one.sendall(STOP)  # on a connection that waits for an answer
+            assert pressed.wait(10)
+            pressed.clear()
+            assert robot.answer(STOP) == b""  # there is no room for a third
+            assert pressed.wait(10)
+            goes_on.set()
+
+
+def test_reads_take_turns_and_a_client_that_takes_nothing_keeps_none():
+    async def reads() -> list[Any]:
+        turns, sent, came = ReadTurns(at_once=1, most_waiting=1), [], []
+
+        async def send(message):
+            sent.append(message)
+
+        async def wait():
+            async with turns.turn(send):
+                came.append("second")
+
+        async with turns.turn(send) as first:
+            waiting = asyncio.create_task(wait())
+            await asyncio.sleep(0)
+            with pytest.raises(AccessDenied, match="too many reads"):
+                async with turns.turn(send):
+                    pass
+            came.append("first")
+            await first.send({"type": "http.response.start"})
+            await waiting  # though the first answer is still being sent
+        return came
+
+    assert asyncio.run(reads()) == ["first", "second"]
