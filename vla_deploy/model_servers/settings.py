@@ -43,7 +43,8 @@ class ServerSettings(BaseModel):
 
     `total_timeout_s` bounds a call from its beginning to its end, waiting and retries included.
     `vision` says that the model takes images. `temperature` is sent only where it is given: some
-    models take none.
+    models take none. Without `trust_plans` a person agrees to each plan of it before anything
+    moves, however sure it says that it is.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -58,6 +59,7 @@ class ServerSettings(BaseModel):
     allow_text_off_robot: bool = False
     allow_images_off_robot: bool = False
     temperature: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
+    trust_plans: bool = False
     max_answer_tokens: Annotated[int, Field(ge=1, le=65_536)] = 2048
     max_answer_bytes: Annotated[int, Field(ge=1024, le=16 * 2**20)] = 2**20
     connect_timeout_s: Seconds = 2.0

@@ -22,7 +22,8 @@ DASHBOARD_SOCKET: Final = "dashboard.sock"
 _LAST_PORT: Final = 65535
 _BEYOND_GROUP_READ: Final = 0o037
 _ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
-BACKLOG: Final = 128
+BACKLOG: Final = 1024
+"""A client that finds no place in it tries again after a second: no press may."""
 _PAIRS: Final = 200
 
 
