@@ -94,7 +94,7 @@ class Require:
             raise AccessDenied(
                 Denial.LOGIN_NEEDED,
                 f"this needs the role {self.role}",
-                "log in, or send a token; none yet? On the robot: vla-deploy dashboard password",
+                "log in, or send a token; on the robot a link does it: vla-deploy dashboard",
             )
         raise AccessDenied(
             Denial.ROLE_TOO_LOW,
