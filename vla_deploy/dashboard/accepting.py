@@ -15,11 +15,13 @@ from itertools import islice
 from typing import Final
 
 from vla_deploy.client.peer_credentials import is_own_user
+from vla_deploy.dashboard.access.body import STOP_BYTES
 from vla_deploy.dashboard.access.connections import (
-    STOP_REQUEST,
     BoundedHttp,
     Connections,
     ConnectionSlot,
+    Press,
+    pressed_by,
 )
 from vla_deploy.dashboard.access.identity import SOCKET, Peer, peer_at
 
@@ -45,7 +47,7 @@ class Acceptor:
         tls: ssl.SSLContext | None,
         make_protocol: Callable[[], BoundedHttp],
         connections: Connections,
-        press: Callable[[], None],
+        press: Press,
     ) -> None:
         """Accept nothing yet; `press` presses the stop."""
         listener.setblocking(False)
@@ -103,9 +105,8 @@ class Acceptor:
 
     def _take(self, connection: socket.socket, address: object) -> None:
         peer = _peer(connection, address)
-        is_pressed = peer is not None and self._tls is None and _asks_to_stop(connection)
-        if is_pressed:  # before anything else is done with it, and where there is no room, too
-            self._press()
+        # Before anything else is done with it, and where there is no room, too.
+        is_pressed = peer is not None and self._tls is None and self._is_press(connection)
         slot = None if peer is None else self._connections.enter(peer, lambda: None)
         if slot is None:
             self._refuse(connection, may_press=peer is not None and not is_pressed)
@@ -158,9 +159,16 @@ class Acceptor:
 
     def _look_and_reset(self, connection: socket.socket) -> None:
         self._refused -= 1
-        if _asks_to_stop(connection):
-            self._press()
+        self._is_press(connection)
         _reset(connection)
+
+    def _is_press(self, connection: socket.socket) -> bool:
+        """Press where a press has come with the connection; its bytes stay for who serves it."""
+        try:
+            data = connection.recv(STOP_BYTES, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except OSError:
+            return False
+        return pressed_by(data, self._press)
 
     async def _open(self, connection: socket.socket, slot: ConnectionSlot) -> None:
         """Let a protocol serve the connection, after its TLS handshake where there is one."""
@@ -179,16 +187,6 @@ class Acceptor:
 def _reset(connection: socket.socket) -> None:
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
     connection.close()
-
-
-def _asks_to_stop(connection: socket.socket) -> bool:
-    """Return whether a press has come with the connection; its bytes stay for who serves it."""
-    try:
-        return connection.recv(len(STOP_REQUEST), socket.MSG_PEEK | socket.MSG_DONTWAIT) == (
-            STOP_REQUEST
-        )
-    except OSError:
-        return False
 
 
 def _peer(connection: socket.socket, address: object) -> Peer | None:

@@ -98,12 +98,14 @@ class DashboardNode:
                 }
             )
 
-    def press(self) -> None:
-        """Press the stop; what is wrong with shared memory, its route answers."""
+    def press(self, reason: str) -> bool:
+        """Press the stop; return whether it is pressed, else its route tries, and says why not."""
         try:
-            self.link.operate(ESTOP)
+            self.link.operate(ESTOP, reason)
         except IpcError as error:
             _log.error("the stop is not pressed: %s", error)
+            return False
+        return True
 
     def stop(self) -> None:
         """Stop the parts and close everything."""

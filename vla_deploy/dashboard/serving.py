@@ -23,6 +23,7 @@ from vla_deploy.dashboard.access.connections import (
     BoundedHttp,
     ConnectionLimits,
     Connections,
+    Press,
     bounded_by,
 )
 from vla_deploy.dashboard.door_probe import DoorProbe
@@ -77,7 +78,7 @@ class _Server(uvicorn.Server):
         config: uvicorn.Config,
         at: HttpSocket,
         bounds: Connections,
-        press: Callable[[], None],
+        press: Press,
     ) -> None:
         super().__init__(config)
         self._at = at
@@ -117,7 +118,7 @@ async def serve(
     should_stop: Callable[[], bool],
     connections: Connections | None = None,
     probe: DoorProbe | None = None,
-    press: Callable[[], None] = lambda: None,
+    press: Press = lambda _: False,
 ) -> None:
     """Answer requests and step a started node until `should_stop()`; `probe` asks meanwhile.
 

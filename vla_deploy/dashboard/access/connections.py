@@ -14,13 +14,26 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from vla_deploy.dashboard.access.body import reason_in
 from vla_deploy.dashboard.access.identity import Peer
 from vla_deploy.dashboard.access.request import STOP_PATH
 
 HEAD_WITHIN_S: Final = 10.0
 HEAD_BYTES: Final = 32 * 1024
 STOP_REQUEST: Final = f"POST {STOP_PATH} ".encode()
+PRESSED: Final = "is_stop_pressed"
+"""The key of a request's state: its route need not press again."""
+_HEAD_END: Final = b"\r\n\r\n"
 _LEAST: Final = 4
+
+
+Press = Callable[[str], bool]
+"""Press the stop with a reason; return whether it is pressed."""
+
+
+def pressed_by(data: bytes, press: Press) -> bool:
+    """Press where a request begins as a stop does; return whether it is pressed."""
+    return data.startswith(STOP_REQUEST) and press(reason_in(data.partition(_HEAD_END)[2]))
 
 
 class PeerGroup(Enum):
@@ -144,7 +157,7 @@ class BoundedHttp(H11Protocol):
 
     bounds: Connections
     slot: ConnectionSlot
-    press: Callable[[], None]
+    press: Press
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Wait for the first request."""
@@ -165,10 +178,12 @@ class BoundedHttp(H11Protocol):
         A stop is pressed before anything else is done with it, also before the requests ahead of
         it are answered; its route answers it when its turn comes.
         """
-        if data.startswith(STOP_REQUEST) and not self.slot.has_pressed:
-            self.press()
+        is_pressed = self.slot.has_pressed or pressed_by(data, self.press)
         self.slot.has_pressed = False
-        super().data_received(data)
+        before = self.app_state
+        self.app_state = {**before, PRESSED: is_pressed}
+        super().data_received(data)  # which begins the request, with this state
+        self.app_state = before
         self._await_head()
 
     def pause_writing(self) -> None:
@@ -222,7 +237,7 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
 
 
-def bounded_by(connections: Connections, press: Callable[[], None]) -> type[BoundedHttp]:
+def bounded_by(connections: Connections, press: Press) -> type[BoundedHttp]:
     """Return the HTTP protocol whose connections count together; `press` presses the stop."""
     fields: dict[str, Any] = {"bounds": connections, "press": staticmethod(press)}
     return type("BoundedHttp", (BoundedHttp,), fields)

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import queue
 import select
 import socket
 import ssl
@@ -20,9 +21,10 @@ from drivers.clock import MonotonicClock
 from vla_deploy.dashboard import accepting, door_probe
 from vla_deploy.dashboard.access import UserRole
 from vla_deploy.dashboard.access.connections import ConnectionLimits, Connections, PeerGroup
-from vla_deploy.dashboard.access.identity import Peer, peer_at
+from vla_deploy.dashboard.access.identity import Peer, peer_at, unknown_user
 from vla_deploy.dashboard.access.read_turns import ReadTurns
 from vla_deploy.dashboard.access.session_expiry import CHECK_NS
+from vla_deploy.dashboard.api import operate
 from vla_deploy.dashboard.door_probe import DoorProbe
 from vla_deploy.dashboard.errors import AccessDenied
 from vla_deploy.dashboard.serving import HttpSocket, serve
@@ -85,7 +87,7 @@ def until_closed(called):
 
 
 @contextlib.contextmanager
-def serving(app, listener, bounds, tls=None, press=lambda: None):
+def serving(app, listener, bounds, tls=None, press=lambda _: False):
     """Serve an application in a thread; give the port."""
     with listener:
         listener.bind(("127.0.0.1", 0))
@@ -370,12 +372,20 @@ def test_a_client_that_pings_without_end_and_reads_nothing_is_not_heard_without_
         assert taken < FAR_TOO_MUCH
 
 
+WHY = b'{"reason": "it smokes"}'
+STOP_WHY = (
+    b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n" % len(WHY)
+) + WHY
 STOP = b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
 
 
 def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_room(world):
-    pressed, entered, goes_on = threading.Event(), threading.Event(), threading.Event()
+    entered, goes_on, reasons = threading.Event(), threading.Event(), queue.Queue()
     app = FastAPI()
+
+    def press(reason):
+        reasons.put(reason)
+        return True
 
     @app.get("/slow")
     async def slow() -> None:
@@ -383,7 +393,7 @@ def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_roo
         await asyncio.to_thread(goes_on.wait)
 
     bounds = Connections(LIMITS)
-    with serving(app, socket.socket(), bounds, press=pressed.set) as port:
+    with serving(app, socket.socket(), bounds, press=press) as port:
         robot = Robot(port, bounds, None)
         with robot.call() as one, robot.call() as other:
             for called in (one, other):
@@ -391,11 +401,34 @@ def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_roo
             assert entered.wait(10)
             robot.until_held(2)
             one.sendall(STOP)  # on a connection that waits for an answer
-            assert pressed.wait(10)
-            pressed.clear()
-            assert robot.answer(STOP) == b""  # there is no room for a third
-            assert pressed.wait(10)
+            assert reasons.get(timeout=10) == ""
+            assert robot.answer(STOP_WHY) == b""  # there is no room for a third
+            assert reasons.get(timeout=10) == "it smokes"
             goes_on.set()
+
+
+@pytest.mark.parametrize("went_ahead", [True, False])
+def test_a_press_that_went_ahead_is_not_pressed_again_by_its_route(went_ahead):
+    pressed = []
+
+    class Link:
+        def operate(self, act, reason):
+            pressed.append((act, reason))
+
+    app = FastAPI()
+    app.state.link = Link()
+    app.include_router(operate.router, prefix="/api/v1")
+
+    @app.middleware("http")
+    async def known(request, call_next):
+        request.state.identity = unknown_user("127.0.0.1")
+        return await call_next(request)
+
+    with serving(app, socket.socket(), Connections(LIMITS), press=lambda _: went_ahead) as port:
+        assert b"200 OK" in Robot(port, None, None).answer(
+            STOP.replace(b"Host", b"Connection: close\r\nHost")
+        )
+    assert pressed == ([] if went_ahead else [("estop", "")])
 
 
 def test_reads_take_turns_and_a_client_that_takes_nothing_keeps_none():
