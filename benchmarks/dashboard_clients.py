@@ -70,7 +70,7 @@ def _measure(session: RobotSession, seconds: float) -> dict[str, Any]:
     spans: dict[str, list[dict[str, float]]] = {view: [] for view in VIEWS}
     for _ in range(_ROUNDS):
         for view, topics in VIEWS.items():
-            with _clients(address, topics) as told:
+            with _clients(session.base, address, topics) as told:
                 session.pause(_SETTLE_S)
                 span = _span(session, process, seconds)
             spans[view].append(span | told)  # told once the clients have gone
@@ -113,13 +113,15 @@ def _dashboard(session: RobotSession) -> tuple[psutil.Process, tuple[str, str]]:
 
 
 @contextmanager
-def _clients(address: tuple[str, str], topics: tuple[str, ...]) -> Iterator[dict[str, float]]:
+def _clients(
+    base: Path, address: tuple[str, str], topics: tuple[str, ...]
+) -> Iterator[dict[str, float]]:
     """Keep clients connected; what came to them is told at the end."""
     told: dict[str, float] = {"bytes_s": 0.0, "ended": 0, "frozen_cut_off": 0}
     if not topics:
         yield told
         return
-    words = (*address, str(CLIENTS), str(FROZEN), ",".join(topics))
+    words = (*address, str(CLIENTS), str(FROZEN), ",".join(topics), str(base))
     with subprocess.Popen(
         [sys.executable, "-m", "benchmarks.live_clients", *words],
         stdin=subprocess.PIPE,

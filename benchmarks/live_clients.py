@@ -1,7 +1,7 @@
 """Be many WebSocket clients of a dashboard at little cost: bytes are taken, and counted only.
 
-`python -m benchmarks.live_clients HOST PORT COUNT FROZEN TOPIC,...` prints "ready" once all are
-subscribed, and what came as JSON when its input ends. The frozen ones read nothing.
+`python -m benchmarks.live_clients HOST PORT COUNT FROZEN TOPIC,... RUNTIME_BASE` prints "ready"
+once all are subscribed, and what came as JSON when its input ends. The frozen ones read nothing.
 """
 
 import json
@@ -10,8 +10,11 @@ import selectors
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
+
+from vla_deploy.client.access.local_token import local_headers
 
 PATH: Final = "/api/v1/live"
 _KEY: Final = "dGhlIHNhbXBsZSBub25jZQ=="
@@ -22,7 +25,9 @@ _END_S: Final = 1.0
 _PATIENCE_S: Final = 30.0
 
 
-def connected(host: str, port: int, *, is_frozen: bool) -> socket.socket:
+def connected(
+    host: str, port: int, headers: Mapping[str, str], *, is_frozen: bool
+) -> socket.socket:
     """Return a WebSocket that is open; little fits between the server and a frozen one.
 
     Raises:
@@ -35,7 +40,8 @@ def connected(host: str, port: int, *, is_frozen: bool) -> socket.socket:
     connection.connect((host, port))
     upgrade = f"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {_KEY}\r\n"
     version = "Sec-WebSocket-Version: 13\r\n"
-    request = f"GET {PATH} HTTP/1.1\r\nHost: {host}:{port}\r\n{upgrade}{version}\r\n"
+    known = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+    request = f"GET {PATH} HTTP/1.1\r\nHost: {host}:{port}\r\n{upgrade}{version}{known}\r\n"
     connection.sendall(request.encode())
     answer = b""
     while b"\r\n\r\n" not in answer:
@@ -56,11 +62,12 @@ def subscribe(connection: socket.socket, topics: Sequence[str]) -> None:
 
 def main(argv: Sequence[str]) -> int:
     """Connect, take what comes until the input ends, and tell how much it was."""
-    host, port, count, frozen, topics = argv
+    host, port, count, frozen, topics, base = argv
     os.nice(_NICE)
-    frozen_ones = [connected(host, int(port), is_frozen=True) for _ in range(int(frozen))]
+    headers = local_headers(Path(base))
+    frozen_ones = [connected(host, int(port), headers, is_frozen=True) for _ in range(int(frozen))]
     others = int(count) - int(frozen)
-    clients = [connected(host, int(port), is_frozen=False) for _ in range(others)]
+    clients = [connected(host, int(port), headers, is_frozen=False) for _ in range(others)]
     selector = selectors.DefaultSelector()
     for client in (*frozen_ones, *clients):
         subscribe(client, topics.split(","))

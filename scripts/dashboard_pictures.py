@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
+from vla_deploy.client.access.login_link import login_url
 from vla_deploy.ipc import topics
 
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")
@@ -81,6 +82,8 @@ def take_all(stack: ProcessStack, browser: Browser, out: Path, views: tuple[str,
         dark = THEMES[device] == "dark"
         context = browser.new_context(viewport=size, color_scheme="dark" if dark else "light")
         page = context.new_page()
+        page.goto(login_url(stack.run_dir, url))
+        page.get_by_label("Safety state", exact=True).wait_for()
         page.goto(f"{url}/#/command")
         page.get_by_label("Command in words").fill(COMMANDS[device])
         page.get_by_label("Command in words").press("Enter")

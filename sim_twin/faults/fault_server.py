@@ -9,6 +9,7 @@ from sim_twin.errors import FaultRefused
 from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.scenario import SCENARIOS, Scenario, parse_scenario, scenario_paths
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.table_schema import parse_toml
 
 Answer = dict[str, Any]
 
@@ -71,7 +72,7 @@ class FaultServer:
                 raise FaultRefused(f"no scenario {name!r} ships with the twin; there are {known}")
             text = path.read_text(encoding="utf-8")
         try:
-            raw = tomllib.loads(str(text))
+            raw = parse_toml(str(text))
         except tomllib.TOMLDecodeError as error:
             raise FaultRefused(f"{name}: {error}") from error
         return parse_scenario(name, raw, self._robot)

@@ -11,6 +11,7 @@ from sim_twin.errors import FaultRefused
 from sim_twin.faults.request import FaultRequest, parse_request
 from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.robots import RobotDescription
+from vla_deploy.runtime.table_schema import parse_toml
 
 SCENARIOS: Final = Path(__file__).with_name("scenarios")
 NO_CAUSE: Final = "none"
@@ -101,7 +102,7 @@ def load_scenario(path: Path, robot: RobotDescription) -> Scenario:
         FaultRefused: the file cannot be read, or anything in it is unknown or out of range.
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = parse_toml(path.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise FaultRefused(f"{path}: {error}") from error
     return parse_scenario(path.stem, raw, robot)

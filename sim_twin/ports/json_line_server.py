@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_twin.errors import TwinError
+from vla_deploy.client.peer_credentials import is_own_user
 
 MAX_REQUEST_BYTES = 65_536
 
@@ -14,7 +15,7 @@ Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
 class JsonLineServer:
-    """Serve any number of clients from the twin's own loop."""
+    """Serve any number of clients of the twin's own user, or of root, from the twin's own loop."""
 
     def __init__(self, path: Path, answer: Answer) -> None:
         self._answer = answer
@@ -48,6 +49,9 @@ class JsonLineServer:
         try:
             client, _ = self._listener.accept()
         except BlockingIOError:
+            return
+        if not is_own_user(client):
+            client.close()
             return
         client.setblocking(False)
         self._buffers[client] = bytearray()

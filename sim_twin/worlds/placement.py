@@ -1,6 +1,5 @@
 """Read a world's description and draw where its objects lie: the same seed, the same poses."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
@@ -8,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from vla_deploy.runtime.table_schema import parse_toml
 
 WORLDS_DIR = Path(__file__).parent
 MAX_DRAWS = 1000
@@ -60,7 +61,7 @@ def load_world(name: str) -> WorldSpec:
     if not file.is_file():
         known = ", ".join(sorted(path.stem for path in WORLDS_DIR.glob("*.toml")))
         raise FileNotFoundError(f"no world {name!r} under {WORLDS_DIR}; there is {known}")
-    document = tomllib.loads(file.read_text(encoding="utf-8"))
+    document = parse_toml(file.read_text(encoding="utf-8"))
     return WorldSpec(
         name=document["name"],
         mjcf_path=WORLDS_DIR / document["mjcf"],

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from sim_twin.harness.processes import ProcessStack, armed_processes
+from vla_deploy.client.access.local_token import local_headers
 from vla_deploy.runtime.net import SETTINGS_FILE
 from vla_deploy.runtime.state_dir import config_dir_of
 
@@ -48,6 +49,7 @@ class Page:
     def ask(self, method: str, path: str, body: Any = None) -> Any:
         connection = HTTPConnection(urlsplit(self.url).netloc, timeout=20)
         headers = {"origin": self.url, "content-type": "application/json"}
+        headers |= local_headers(self._stack.base)
         content = None if body is None else json.dumps(body)
         connection.request(method, f"/api/v1/{path}", content, headers)
         with connection.getresponse() as answer:

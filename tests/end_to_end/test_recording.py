@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from websockets.sync.client import connect
 
 from sim_twin.harness.processes import ProcessStack
+from vla_deploy.client.access.local_token import local_headers
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 
 pytestmark = [
@@ -72,6 +73,7 @@ class Replay:
     """Run `vla-deploy replay` with its page, and look at the page's data."""
 
     def __init__(self, base: Path, file: Path) -> None:
+        self.base = base
         command = [sys.executable, "-m", "vla_deploy.cli", "--runtime-base", str(base)]
         self.process = subprocess.Popen(
             [*command, "replay", str(file), "--speed", str(SPEED), "--pause"],
@@ -80,11 +82,12 @@ class Replay:
         )
         assert self.process.stdout is not None
         told = (line for line in self.process.stdout if line.startswith("dashboard: "))
-        self.url = next(told).partition(" ")[2].strip()
+        self.url = next(told).partition(" ")[2].partition("/#")[0].strip()
 
     def ask(self, method: str, path: str, body: Any = None) -> tuple[int, Any]:
         connection = HTTPConnection(urlsplit(self.url).netloc, timeout=20)
         headers = {"origin": self.url, "content-type": "application/json"}
+        headers |= local_headers(self.base)
         connection.request(method, f"/api/v1/{path}", body and json.dumps(body), headers)
         with connection.getresponse() as answer:
             told = answer.status, json.load(answer)
@@ -133,7 +136,11 @@ class Watcher:
         self.pictures = 0
         self.outcome: dict[str, Any] = {}
         address = urlsplit(replay.url)
-        with connect(f"ws://{address.netloc}/api/v1/live", origin=replay.url) as live:
+        with connect(
+            f"ws://{address.netloc}/api/v1/live",
+            origin=replay.url,
+            additional_headers=local_headers(replay.base),
+        ) as live:
             live.send(json.dumps({"subscribe": [*self.takers, "camera", "replay_status"]}))
             live.recv()  # it stands until somebody watches it
             assert replay.ask("POST", "replay", {"act": "resume"}) == (200, {"asked": True})

@@ -78,3 +78,13 @@ def test_closing_removes_the_socket(tmp_path: Path) -> None:
     server = JsonLineServer(tmp_path / "s", echo)
     server.close()
     assert not (tmp_path / "s").exists()
+
+
+def test_another_user_is_hung_up_on(
+    server: JsonLineServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim_twin.ports.json_line_server.is_own_user", lambda client: False)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
+        stranger.connect(str(tmp_path / "s"))
+        server.poll_once()
+        assert stranger.recv(1) == b""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from vla_deploy.cli.commands import COMMANDS, OneLineParser
 from vla_deploy.cli.errors import CommandFailed, user_errors
+from vla_deploy.cli.terminal import escaping_output
 
 EXIT_BROKEN_PIPE = 141  # a shell's exit code for SIGPIPE
 # systemd restarts the service after 1, never after 2; a full disk may have room again later.
@@ -48,7 +49,11 @@ def parser(words: Iterable[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return 0 on success, 1 when the robot failed, 2 for a bad request."""
-    words = sys.argv[1:] if argv is None else argv
+    with escaping_output():
+        return _main(sys.argv[1:] if argv is None else argv)
+
+
+def _main(words: Sequence[str]) -> int:
     arguments = parser(words).parse_args(words)
     try:
         code = int(arguments.run(arguments))

@@ -31,7 +31,17 @@ class Dashboard:
         """Serve until `should_stop()`; `node` wraps the built one."""
         try:
             node.start()
-            asyncio.run(serve(self._node.app, self._node.sockets, node, clock, should_stop))
+            probe = self._node.probe
+            serving = serve(
+                self._node.app,
+                self._node.sockets,
+                node,
+                clock,
+                should_stop,
+                probe=probe,
+                press=self._node.press,
+            )
+            asyncio.run(serving)
         finally:
             node.stop()
 

@@ -45,6 +45,7 @@ class Denial(Enum):
 
     LOGIN_NEEDED = HTTPStatus.UNAUTHORIZED, "login_needed"
     LOGIN_FAILED = HTTPStatus.UNAUTHORIZED, "login_failed"
+    LINK_REFUSED = HTTPStatus.UNAUTHORIZED, "link_refused"
     TOKEN_REFUSED = HTTPStatus.UNAUTHORIZED, "token_refused"
     ROLE_TOO_LOW = HTTPStatus.FORBIDDEN, "role_too_low"
     ORIGIN_REFUSED = HTTPStatus.FORBIDDEN, "origin_refused"
@@ -54,6 +55,7 @@ class Denial(Enum):
     BODY_TOO_LARGE = HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "body_too_large"
     BODY_TOO_SLOW = HTTPStatus.REQUEST_TIMEOUT, "body_too_slow"
     TOO_MANY = HTTPStatus.TOO_MANY_REQUESTS, "too_many"
+    TOO_MANY_READS = HTTPStatus.SERVICE_UNAVAILABLE, "too_many_reads"
     ACCOUNTS_AWAY = HTTPStatus.SERVICE_UNAVAILABLE, "accounts_away"
     AUDIT_AWAY = HTTPStatus.SERVICE_UNAVAILABLE, "audit_away"
 

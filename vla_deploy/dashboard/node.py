@@ -1,24 +1,34 @@
 """Run the dashboard as a node: sockets, application, parts and status."""
 
 import logging
+from pathlib import Path
 from typing import Final
 
 from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.access.accounts import AccountsFile
+from vla_deploy.client.access.errors import AccessError
+from vla_deploy.client.access.local_token import provide_local_token
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import AccessControl, AccessRules
 from vla_deploy.dashboard.app import create_app
+from vla_deploy.dashboard.door_probe import DoorProbe
 from vla_deploy.dashboard.parts import Part
-from vla_deploy.dashboard.serving import SOCKET_NAME, HttpSocket, open_socket
-from vla_deploy.ipc import CellWriter, topics
+from vla_deploy.dashboard.serving import HttpSocket, open_socket
+from vla_deploy.ipc import CellWriter, IpcError, topics
 from vla_deploy.ipc.payloads.services import DashboardStatus
-from vla_deploy.runtime.net import DashboardSettings, open_port, server_context
+from vla_deploy.ipc.stop_button import ESTOP
+from vla_deploy.runtime.net import DASHBOARD_SOCKET, DashboardSettings, open_port, server_context
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.part_guard import PartGuard
 
 _PUBLISH_NS: Final = NS_PER_S // 2
 _EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+_TRUSTING: Final = (
+    "trust_loopback = true: every user of this computer, and every container on its network, may "
+    "move the robot; leave it out of dashboard.toml, and log in by: vla-deploy dashboard"
+)
 _log = logging.getLogger(__name__)
 
 
@@ -37,6 +47,7 @@ class DashboardNode:
         self._parts: list[Part] = []
         self._guard = PartGuard(_log)
         self._access: AccessControl | None = None
+        self.probe: DoorProbe | None = None
         self._status: CellWriter[DashboardStatus]
         self._due_ns = 0
         self._url = ""
@@ -55,23 +66,28 @@ class DashboardNode:
         status = self.link.document(topics.DASHBOARD_STATUS)
         before = None if status is None else status["port"]
         tcp = open_port(settings.host, settings.port, search=twin, before=before)
-        unix = open_socket(self._context.run_dir / SOCKET_NAME)
+        unix = open_socket(self._context.run_dir / DASHBOARD_SOCKET)
         self.sockets = (HttpSocket(tcp, tls), HttpSocket(unix))
+        self.probe = DoorProbe(tcp, is_tls=tls is not None)
         self._status = self.link.space.cell_writer(topics.DASHBOARD_STATUS)
         # Sessions and limits on guesses run in real time.
         base, rules = self._context.run_dir.parent, _rules(settings)
         self._access = AccessControl.of_base(base, rules, MonotonicClock())
+        _provide_token(base, self._access.accounts)
+        if settings.trust_loopback:
+            _log.warning(_TRUSTING)
         self.app = create_app(self.link, settings, self._access)
         self._parts = self.app.state.parts
         self._port = tcp.getsockname()[1]
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
     def step(self) -> None:
-        """Step the parts, and publish the page's address twice a second."""
+        """Step the parts, and publish the page's address twice a second, while it is answered."""
         for part in self._parts:
             self._guard.run(type(part).__name__, part.step)
         now_ns = self._clock.now_ns()
-        if now_ns >= self._due_ns:
+        is_silent = self.probe is not None and self.probe.is_silent
+        if now_ns >= self._due_ns and not is_silent:
             self._due_ns = now_ns + _PUBLISH_NS
             self._status.put_document(
                 {
@@ -82,6 +98,15 @@ class DashboardNode:
                 }
             )
 
+    def press(self, reason: str) -> bool:
+        """Press the stop; return whether it is pressed, else its route tries, and says why not."""
+        try:
+            self.link.operate(ESTOP, reason)
+        except IpcError as error:
+            _log.error("the stop is not pressed: %s", error)
+            return False
+        return True
+
     def stop(self) -> None:
         """Stop the parts and close everything."""
         for part in self._parts:
@@ -91,6 +116,14 @@ class DashboardNode:
         if self._access is not None:
             self._access.close()
         self.link.close()
+
+
+def _provide_token(base: Path, accounts: AccountsFile) -> None:
+    """Make the token of the robot's own user; without it, the Unix socket still knows that user."""
+    try:
+        provide_local_token(base, accounts)
+    except (AccessError, OSError) as error:
+        _log.error("no token for the programs of the robot's user: %s", error)
 
 
 def _rules(settings: DashboardSettings) -> AccessRules:

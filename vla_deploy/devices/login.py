@@ -1,13 +1,13 @@
 """Read user and password of a broker or a device from a file that only its owner can read."""
 
 import stat
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from vla_deploy.devices.errors import DeviceNotUsable
 from vla_deploy.runtime.secret import Secret
+from vla_deploy.runtime.table_schema import parse_toml
 
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 _EXAMPLE: Final = 'two lines, user = "robot" and password = "..."'
@@ -34,7 +34,7 @@ def read_login(file: Path) -> DeviceLogin:
                 f"{file}: mode {stat.S_IMODE(mode):o} lets others read it, expected 600; "
                 f"try: chmod 600 {file}"
             )
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise DeviceNotUsable(f"{file}: {error.strerror}; expected {_EXAMPLE}") from error
     except ValueError:

@@ -18,6 +18,7 @@ import yaml
 
 from platforms import load_profile
 from platforms.profile_source import merged, read_source
+from vla_deploy.client.access.private_file import open_private
 from vla_deploy.gateways.ros.applying import ParameterEffects, effects_of
 from vla_deploy.gateways.ros.errors import ParametersUnusable
 from vla_deploy.gateways.ros.parameters import (
@@ -29,6 +30,7 @@ from vla_deploy.gateways.ros.parameters import (
     SECTIONS,
     handed_over_parameters,
 )
+from vla_deploy.model_servers.credentials import GIVEN_FOLDER
 from vla_deploy.model_servers.settings import (
     SERVERS_FILE,
     Api,
@@ -42,10 +44,9 @@ from vla_deploy.runtime.state_dir import config_dir_of
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.runtime import default_base, free_base
 
-DERIVED_DIR: Final = "with_parameters"
+DERIVED_DIR: Final = GIVEN_FOLDER.partition("/")[0]
 _HEADER: Final = "# Derived from the parameters in {file}; the next start writes it anew.\n"
 _GATEWAY: Final = "ros"
-_PLANNER: Final = "planner"
 _DEFAULTS: Final = {one.name: one.default for one in PARAMETERS}
 _APIS: Final = {"anthropic": Api.ANTHROPIC, "openai": Api.OPENAI}
 _URLS: Final = {"anthropic": "https://api.anthropic.com", "openai": "https://api.openai.com/v1"}
@@ -71,7 +72,7 @@ def with_parameters(
 ) -> RunOptions:
     """Return the options changed by a parameter file, given here or named by the environment.
 
-    The API key is removed from the environment: only the planner gets it.
+    The API key is removed from the environment, and handed over in a file of mode 600.
 
     Raises:
         ParametersUnusable: the file cannot be used, or asks for what cannot be.
@@ -94,10 +95,13 @@ def with_parameters(
     choice = chosen_server(given, servers, servers_file)
     if faults := [*effects.faults, *([choice.fault] if choice.fault else ())]:
         raise ParametersUnusable(f"{file}: {'; '.join(faults)}")
-    credential, note = _credential(str(given.get(API_KEY, "")), choice, servers)
+    key = str(given.get(API_KEY, ""))
+    credential, note = _credential(key, choice, servers)
     free_base(base)
     folder = base / DERIVED_DIR
     shutil.rmtree(folder, ignore_errors=True)
+    if credential:
+        _give_key(base / GIVEN_FOLDER / credential, key)
     _log.info("parameters: %s", file)
     return replace(
         options,
@@ -105,7 +109,6 @@ def with_parameters(
         profile=str(_derived_profile(options.profile, effects, choice, folder, file)),
         variables={
             _GATEWAY: {PARAMS_FILE_VARIABLE: str(_derived_parameters(given, folder, file))},
-            _PLANNER: credential,
         },
         notes=(*effects.notes, *choice.notes, *([note] if note else ())),
     )
@@ -113,14 +116,20 @@ def with_parameters(
 
 def _credential(
     key: str, choice: ServerChoice, servers: Mapping[str, ServerSettings]
-) -> tuple[dict[str, str], str]:
-    """Return the environment variable that gives the planner the key, or why it needs none."""
+) -> tuple[str, str]:
+    """Return the name by which the planner finds the key, or why it needs none."""
     if not key:
-        return {}, ""
+        return "", ""
     credential = servers[choice.name].credential if choice.name else None
     if credential is None:
-        return {}, f"{API_KEY}: not used: no server is asked that wants one"
-    return {credential.upper(): key}, ""
+        return "", f"{API_KEY}: not used: no server is asked that wants one"
+    return credential, ""
+
+
+def _give_key(file: Path, key: str) -> None:
+    handle = open_private(file, os.O_WRONLY | os.O_TRUNC)
+    with os.fdopen(handle, "w", encoding="ascii") as opened:
+        opened.write(key)
 
 
 def _derived_robot(robot: str, effects: ParameterEffects, folder: Path, file: str) -> Path:

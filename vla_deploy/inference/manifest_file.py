@@ -11,7 +11,7 @@ from typing import Any, Final
 from vla_deploy.inference.errors import ManifestInvalid
 from vla_deploy.inference.manifest import Manifest
 from vla_deploy.inference.manifest_schema import manifest_faults
-from vla_deploy.runtime.table_schema import build
+from vla_deploy.runtime.table_schema import build, parse_toml
 
 MANIFEST: Final = "model.toml"
 Document = Mapping[str, Any]
@@ -25,7 +25,7 @@ def read_manifest(folder: Path) -> Manifest:
     """
     file = folder / MANIFEST
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise ManifestInvalid(file, ("no such file; each model has one",)) from error
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -4,6 +4,7 @@ onnxruntime answers a provider that it cannot give with a session on the CPU and
 lists a provider that then computes nothing. Both are found here.
 """
 
+import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -31,12 +32,17 @@ from vla_deploy.inference.runtime import (
     SESSION_ERRORS,
     VERSION,
     InferenceSession,
+    RunOptions,
     SessionOptions,
     available_providers,
 )
 from vla_deploy.inference.store import StoredModel
 from vla_deploy.runtime.one_line import one_line
 
+FIRST_RUNS_WITHIN_S: Final = 300.0
+"""A long prompt to a large language model on a slow processor takes a minute."""
+WATCHED_RUNS: Final = 2
+"""Those of the warm-up: a graph that never ends is found when it is added, or opened."""
 _FATAL_ONLY: Final = 4  # what goes wrong is raised, and reported once
 _HASH_DIGITS: Final = 12
 _ENTRIES: Final[Mapping[str, str]] = {
@@ -73,6 +79,7 @@ class GraphSession:
         self.outputs = tensors_of(session.get_outputs())
         self.classes = class_names(session)
         self._session = session
+        self._runs = 0
 
     def run(
         self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
@@ -80,13 +87,22 @@ class GraphSession:
         """Return the named outputs.
 
         Raises:
-            RunFailed: inputs do not fit, the provider failed, or the session is closed.
+            RunFailed: inputs do not fit, the provider failed, one of the first runs took too long,
+                or the session is closed.
         """
         if self._session is None:
             raise RunFailed(f"{self.path}: its session is closed")
+        watch = RunWatch(FIRST_RUNS_WITHIN_S if self._runs < WATCHED_RUNS else None)
+        self._runs += 1
         try:
-            outputs = self._session.run(list(names), dict(inputs))
+            with watch as options:
+                outputs = self._session.run(list(names), dict(inputs), options)
         except SESSION_ERRORS as error:
+            if watch.is_over:
+                raise RunFailed(
+                    f"{self.path} on {self.provider}: no answer within {FIRST_RUNS_WITHIN_S:g} s, "
+                    "it may loop for ever; take another model"
+                ) from error
             shapes = {name: f"{one.dtype}{list(one.shape)}" for name, one in inputs.items()}
             raise RunFailed(
                 f"{self.path} on {self.provider}, given {shapes}: {one_line(error)}"
@@ -96,6 +112,29 @@ class GraphSession:
     def close(self) -> None:
         """Release the memory; a run after that fails."""
         self._session = None
+
+
+class RunWatch:
+    """End a run that takes longer than a time limit; without one, watch nothing."""
+
+    def __init__(self, within_s: float | None) -> None:
+        self.is_over = False
+        self._options = RunOptions()
+        self._timer = None if within_s is None else threading.Timer(within_s, self._end)
+
+    def __enter__(self) -> RunOptions:
+        if self._timer is not None:
+            self._timer.daemon = True
+            self._timer.start()
+        return self._options
+
+    def __exit__(self, *_: object) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _end(self) -> None:
+        self.is_over = True
+        self._options.terminate = True
 
 
 class _Refused(Exception):

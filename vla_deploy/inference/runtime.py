@@ -21,6 +21,7 @@ SESSION_ERRORS: tuple[type[Exception], ...] = (
     ),
 )
 
+RunOptions = onnxruntime.RunOptions
 InferenceSession = onnxruntime.InferenceSession
 SessionOptions = onnxruntime.SessionOptions
 VERSION: str = onnxruntime.__version__

@@ -2,40 +2,59 @@
 
 import os
 import re
-from collections.abc import Mapping
+import stat
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from vla_deploy.model_servers.errors import CredentialMissing
 from vla_deploy.runtime.secret import Secret
+from vla_deploy.runtime.state_dir import config_dir_of
 
 FOLDER_VARIABLE: Final = "CREDENTIALS_DIRECTORY"
 """systemd names in it the folder with what `LoadCredential=` gave to the service."""
+OWN_FOLDER: Final = "credentials"
+"""Beside servers.toml: one file for each key."""
+GIVEN_FOLDER: Final = "with_parameters/credentials"
+"""In the runtime directory: what a start gave, as by ROS parameters."""
+_FOR_OTHERS: Final = 0o007  # systemd gives its files to the service by its group
 _KEY: Final = re.compile(r"[\x21-\x7e]{1,4096}")
 
 
-def find_credential(name: str, environment: Mapping[str, str] = os.environ) -> Secret:
-    """Return a key: the file `name` among systemd's credentials, else the variable `NAME`.
+def key_folders(base: Path, environment: Mapping[str, str] = os.environ) -> tuple[Path, ...]:
+    """Return where keys are looked for by a run in a runtime directory, in this order.
+
+    Not in the environment: every process of the robot inherits that.
+    """
+    systemds = environment.get(FOLDER_VARIABLE)
+    own = (config_dir_of(base) / OWN_FOLDER, base / GIVEN_FOLDER)
+    return (Path(systemds), *own) if systemds else own
+
+
+def find_credential(name: str, folders: Sequence[Path]) -> Secret:
+    """Return a key: the file `name` in the first of the folders that has it.
 
     Raises:
-        CredentialMissing: it is in neither place, or is not one word of printable ASCII.
+        CredentialMissing: none has it, others may read it, or it is not one word of printable
+            ASCII.
     """
-    folder = environment.get(FOLDER_VARIABLE)
-    file = Path(folder) / name if folder else None
-    variable = name.upper()
-    if file is not None and file.is_file():
-        return _checked(_read(file), f"credential {name}")
-    if variable in environment:
-        return _checked(environment[variable], f"environment variable {variable}")
-    where = f"{file} and " if file else ""
+    for file in (folder / name for folder in folders):
+        if file.is_file():
+            return _checked(_read(file), f"credential {name}")
+    where = ", ".join(str(folder / name) for folder in folders)
     raise CredentialMissing(
-        f"no key {name}: expected one in {where}environment variable {variable}; for the service: "
+        f"no key {name}: expected one word in a file of mode 600: {where}; for the service: "
         f"vla-deploy install --credential {name}=FILE"
     )
 
 
 def _read(file: Path) -> str:
     try:
+        mode = stat.S_IMODE(file.stat().st_mode)
+        if mode & _FOR_OTHERS:
+            raise CredentialMissing(
+                f"{file}: others may read the key (mode {mode:o}), expected: chmod 600 {file}"
+            )
         return file.read_text(encoding="ascii")
     except OSError as error:
         raise CredentialMissing(f"{file}: cannot read the key: {error.strerror}") from error

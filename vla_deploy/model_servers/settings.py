@@ -11,6 +11,7 @@ from urllib.parse import SplitResult, urlsplit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from vla_deploy.model_servers.errors import ServersFileInvalid
+from vla_deploy.runtime.table_schema import parse_toml
 
 SERVERS_FILE: Final = "servers.toml"
 _TABLE: Final = "servers"
@@ -42,7 +43,8 @@ class ServerSettings(BaseModel):
 
     `total_timeout_s` bounds a call from its beginning to its end, waiting and retries included.
     `vision` says that the model takes images. `temperature` is sent only where it is given: some
-    models take none.
+    models take none. Without `trust_plans` a person agrees to each plan of it before anything
+    moves, however sure it says that it is.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -57,6 +59,7 @@ class ServerSettings(BaseModel):
     allow_text_off_robot: bool = False
     allow_images_off_robot: bool = False
     temperature: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
+    trust_plans: bool = False
     max_answer_tokens: Annotated[int, Field(ge=1, le=65_536)] = 2048
     max_answer_bytes: Annotated[int, Field(ge=1024, le=16 * 2**20)] = 2**20
     connect_timeout_s: Seconds = 2.0
@@ -120,7 +123,7 @@ def read_servers(file: Path) -> dict[str, ServerSettings]:
         ServersFileInvalid: it is no TOML, or has faults; all of them are listed.
     """
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

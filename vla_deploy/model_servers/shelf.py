@@ -1,14 +1,13 @@
 """Find the declared servers and open them by name."""
 
-import os
 import random
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.calls.exchange import Exchange
-from vla_deploy.model_servers.credentials import find_credential
+from vla_deploy.model_servers.credentials import find_credential, key_folders
 from vla_deploy.model_servers.errors import ServerUnknown
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import SERVERS_FILE, ServerSettings, read_servers
@@ -22,7 +21,7 @@ class ServerShelf:
     file: Path
     declared: Mapping[str, ServerSettings]
     clock: Clock
-    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
+    key_folders: tuple[Path, ...] = ()
     draw: Callable[[], float] = random.random
 
     @classmethod
@@ -33,7 +32,9 @@ class ServerShelf:
             ServersFileInvalid: the file has faults.
         """
         file = config_dir_of(base) / SERVERS_FILE
-        return cls(file=file, declared=read_servers(file), clock=clock)
+        return cls(
+            file=file, declared=read_servers(file), clock=clock, key_folders=key_folders(base)
+        )
 
     def open(self, name: str) -> ModelServer:
         """Return a server, ready to be asked; nothing is sent yet.
@@ -48,7 +49,6 @@ class ServerShelf:
             raise ServerUnknown(
                 f"no server {name!r}: expected one that {self.file} declares ({known})"
             )
-        key = (
-            find_credential(settings.credential, self.environment) if settings.credential else None
-        )
+        name_of_key = settings.credential
+        key = find_credential(name_of_key, self.key_folders) if name_of_key else None
         return ModelServer(name, settings, key, Exchange(settings), self.clock, self.draw)

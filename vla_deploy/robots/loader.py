@@ -44,7 +44,14 @@ from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import ROS, RosSettings
 from vla_deploy.robots.twin_settings import twin_settings
-from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
+from vla_deploy.runtime.table_schema import (
+    Shape,
+    TableFault,
+    build,
+    check_record,
+    check_tables,
+    parse_toml,
+)
 
 P = TypeVar("P")
 
@@ -150,7 +157,7 @@ def robot_names() -> tuple[str, ...]:
 
 def _parse(file: Path) -> Document:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return parse_toml(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         fault = TableFault(key="(file)", got=str(error), expected="a TOML document")
         raise RobotFileError(file, (fault,)) from error
@@ -160,7 +167,7 @@ def read_overrides(directory: Path) -> tuple[Document, tuple[TableFault, ...]]:
     """Return the overrides of a robot's folder, empty where it has none, and the file's faults."""
     try:
         text = (directory / OVERRIDES_FILE).read_text(encoding="utf-8")
-        return tomllib.loads(text), ()
+        return parse_toml(text), ()
     except FileNotFoundError:
         return {}, ()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -14,12 +14,16 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from vla_deploy.runtime.state_dir import config_dir_of
+from vla_deploy.runtime.table_schema import parse_toml
 
 SETTINGS_FILE: Final = "dashboard.toml"
+DASHBOARD_SOCKET: Final = "dashboard.sock"
+"""In the run's directory, by which programs of the robot's user ask without a token."""
 _LAST_PORT: Final = 65535
 _BEYOND_GROUP_READ: Final = 0o037
 _ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
-BACKLOG: Final = 128
+BACKLOG: Final = 1024
+"""A client that finds no place in it tries again after a second: no press may."""
 _PAIRS: Final = 200
 
 
@@ -47,10 +51,11 @@ class TlsUnusable(NetError):
 class DashboardSettings:
     """Configure where the dashboard and the stop door listen, and whom they trust.
 
-    A request from loopback is the admin's unless `trust_loopback` is off: switch it off behind a
-    reverse proxy on this computer. `allowed_hosts` are further names of the robot, besides loopback
-    and `host`; all others are refused as DNS rebinding. `allowed_origins` are those of pages that a
-    proxy serves for the robot, such as `https://robot.example`.
+    With `trust_loopback` every request from loopback is an admin's: of any user of this computer,
+    of any container on its network, and of a reverse proxy there. `allowed_hosts` are further names
+    of the robot, besides loopback and `host`; all others are refused as DNS rebinding.
+    `allowed_origins` are those of pages that a proxy serves for the robot, such as
+    `https://robot.example`.
     """
 
     host: str = "127.0.0.1"
@@ -58,7 +63,7 @@ class DashboardSettings:
     stop_port: int = 8089
     allowed_hosts: tuple[str, ...] = ()
     allowed_origins: tuple[str, ...] = ()
-    trust_loopback: bool = True
+    trust_loopback: bool = False
     tls_certificate: str = ""
     tls_key: str = ""
 
@@ -117,7 +122,7 @@ def read_settings(base: Path) -> DashboardSettings:
     """
     file = config_dir_of(base) / SETTINGS_FILE
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return DashboardSettings()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

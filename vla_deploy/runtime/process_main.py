@@ -25,6 +25,7 @@ from vla_deploy.runtime.host_settings import REALTIME_PROCESS, HostSettings
 from vla_deploy.runtime.logs import process_log
 from vla_deploy.runtime.malloc_tuning import give_large_blocks_back
 from vla_deploy.runtime.node import Node, NodeContext, run_node
+from vla_deploy.runtime.open_files import keep_files_private, raise_open_files
 from vla_deploy.runtime.reconfigurable_node import ReconfigurableNode
 from vla_deploy.runtime.twin_members import MEMBERSHIPS, STOPPING_NS, WATCHERS
 
@@ -58,6 +59,8 @@ def main(
     context = _context(name, arguments)
     _name_process(name)
     give_large_blocks_back()
+    raise_open_files()
+    keep_files_private()
     stop_signals = _catch_stop_signals()
     with process_log(name, context.robot, context.run_dir, context.clock):
         try:

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Final
 
 _ROOT_BASE: Final = Path("/run/vla-deploy")
-_ROOT_STATE: Final = Path("/var/log/vla-deploy")
-_ROOT_CONFIG: Final = Path("/etc/vla-deploy")
+ROOT_STATE: Final = Path("/var/log/vla-deploy")
+ROOT_CONFIG: Final = Path("/etc/vla-deploy")
 _ROOT_LIBRARY: Final = Path("/var/lib/vla-deploy")
 _MODELS: Final = "models"
 _ENGINES: Final = "engines"
@@ -16,7 +16,7 @@ _ACCESS: Final = "access"
 def state_dir_of(base: Path) -> Path:
     """Return where the runs of a runtime directory leave what outlives them."""
     if base == _ROOT_BASE:
-        return _ROOT_STATE
+        return ROOT_STATE
     if base == user_base():
         home = os.environ.get("XDG_STATE_HOME")
         return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"
@@ -26,7 +26,7 @@ def state_dir_of(base: Path) -> Path:
 def config_dir_of(base: Path) -> Path:
     """Return where a person keeps what concerns this robot alone, such as its model servers."""
     if base == _ROOT_BASE:
-        return _ROOT_CONFIG
+        return ROOT_CONFIG
     if base == user_base():
         home = os.environ.get("XDG_CONFIG_HOME")
         return (Path(home) if home else Path.home() / ".config") / "vla-deploy"

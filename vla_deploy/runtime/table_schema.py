@@ -1,14 +1,17 @@
 """Declare what the tables of a hand-written file hold; collect every fault, stop at none."""
 
+import tomllib
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from enum import Enum
 from functools import cache
 from math import inf, isfinite
 from types import NoneType, UnionType
-from typing import Any, TypeGuard, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Any, Final, TypeGuard, TypeVar, cast, get_args, get_origin, get_type_hints
 
 Built = TypeVar("Built")
+LONGEST_LINE: Final = 1000
+_SHOWN: Final = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +23,13 @@ class TableFault:
     expected: str
 
     def __str__(self) -> str:
-        return f"{self.key}: got {self.got}, expected {self.expected}"
+        expected = _short(self.expected, LONGEST_LINE)
+        return f"{_short(self.key)}: got {_short(self.got)}, expected {expected}"
+
+
+def _short(text: str, most: int = _SHOWN) -> str:
+    """Return what a fault shows of a text that somebody wrote: its two ends where it is long."""
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +47,18 @@ class ValueCheck:
 
 
 Shape = Mapping[str, ValueCheck]
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the document of a hand-written file; one that nests too deeply is no TOML, too.
+
+    Raises:
+        tomllib.TOMLDecodeError: it is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("it is nested too deeply") from None
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -81,7 +102,17 @@ NUMBER = ValueCheck(expected="a number", holds=is_number)
 POSITIVE = ValueCheck(
     expected="a number above 0", holds=lambda value: is_number(value) and value > 0
 )
-TEXT = ValueCheck(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
+
+
+def is_line(value: object) -> TypeGuard[str]:
+    """Return whether a value is a text of one line that may be said, shown and logged."""
+    return isinstance(value, str) and value.isprintable() and len(value) <= LONGEST_LINE
+
+
+TEXT = ValueCheck(
+    expected="a text of one line",
+    holds=lambda value: is_line(value) and value != "",
+)
 TABLE = ValueCheck(expected="a table", holds=lambda value: isinstance(value, dict))
 TABLES = ValueCheck(
     expected="a list of tables",
@@ -89,7 +120,7 @@ TABLES = ValueCheck(
 )
 TEXTS = ValueCheck(
     expected="a list of texts",
-    holds=lambda value: isinstance(value, list) and all(isinstance(row, str) for row in value),
+    holds=lambda value: isinstance(value, list) and all(map(is_line, value)),
 )
 
 

@@ -11,6 +11,7 @@ from platforms.profile_schema import NODES
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import load_robot
 from vla_deploy.runtime.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
+from vla_deploy.runtime.open_files import keep_files_private, raise_open_files
 from vla_deploy.runtime.power_off import ask_power_off
 from vla_deploy.supervisor.errors import (
     DeviceAbsent,
@@ -67,6 +68,8 @@ class Supervisor:
         clock: Clock | None = None,
         notify: NotifyTarget | None = None,
     ) -> None:
+        raise_open_files()  # the processes inherit both, other programs among them
+        keep_files_private()
         self.stop_requested = False
         self.profile = load_profile(options.profile)
         """The profile in force."""

@@ -1,6 +1,6 @@
 """One twin with its dashboard for all tests in a browser, and pages that somebody is logged in at.
 
-Loopback is not trusted here: every test goes through the doors that an operator goes through.
+Every test goes through the doors that an operator goes through.
 """
 
 import shutil
@@ -29,8 +29,6 @@ from sim_twin.harness.processes import ProcessStack, armed_processes
 from vla_deploy.client.access.accounts import Accounts, AccountsFile, User, wall_s
 from vla_deploy.client.access.passwords import hash_password
 from vla_deploy.dashboard.access import UserRole
-from vla_deploy.runtime.net import SETTINGS_FILE
-from vla_deploy.runtime.state_dir import config_dir_of
 
 CHROMIUM: Final = "/usr/bin/chromium"
 DESKTOP: Final = ViewportSize(width=1440, height=900)
@@ -53,9 +51,6 @@ def stack(chromium: Browser, coarse: str) -> Iterator[ProcessStack]:
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
         base = Path(folder) / "base"
-        settings = config_dir_of(base) / SETTINGS_FILE
-        settings.parent.mkdir(parents=True)
-        settings.write_text("trust_loopback = false\n", encoding="utf-8")
         add_accounts(base)
         profile = Path(folder) / "shipped.toml"  # tests write another one beside it
         shutil.copyfile(coarse, profile)

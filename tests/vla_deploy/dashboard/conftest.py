@@ -95,7 +95,9 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
     clock = MonotonicClock()
     accounts = AccountsFile(tmp_path / "access" / "accounts.json")
     audit = AuditLog(AuditFile(tmp_path / "access" / "audit.jsonl"), clock, now_s=time.monotonic)
-    access = AccessControl(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
+    access = AccessControl(
+        AccessRules(trust_loopback=True), accounts, audit, clock, now_s=time.monotonic
+    )
     link = RobotLink(run_dir, clock)
     app = create_app(link, DashboardSettings(), access)
     client = TestClient(app, "http://127.0.0.1:8088", client=("127.0.0.1", 50_000))

@@ -4,6 +4,7 @@ import stat
 
 import pytest
 
+from vla_deploy.dashboard.door_probe import SILENT_S, DoorProbe
 from vla_deploy.dashboard.node import DashboardNode
 from vla_deploy.dashboard.serving import open_socket
 from vla_deploy.runtime.net import DashboardSettings, PortTaken
@@ -92,3 +93,14 @@ def test_the_unix_socket_is_for_owner_and_group_also_in_a_deep_folder(tmp_path):
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(PortTaken, match="cannot listen there"):
         open_socket(tmp_path / "gone" / "dashboard.sock")
+
+
+def test_a_dashboard_that_answers_nobody_falls_silent_for_the_supervisor(make, hand_clock):
+    node = make()
+    node.start()
+    node.probe = DoorProbe(node.sockets[0].listener, is_tls=False, clock=hand_clock)
+    node.step()
+    hand_clock.pass_s(SILENT_S + 1)
+    node.step()
+    told = node.link.fresh("dashboard_status")
+    assert told.age_s(hand_clock.now_ns()) > SILENT_S

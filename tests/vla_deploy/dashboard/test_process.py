@@ -11,9 +11,12 @@ from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from pathlib import Path
 
 import pytest
+from httpx import Client
 from websockets.sync.client import connect
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.access.local_token import local_headers
+from vla_deploy.client.access.login_link import login_url
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.runtime.state_dir import config_dir_of
 
@@ -77,7 +80,7 @@ def test_it_serves_by_tcp_and_by_its_socket_and_ends_at_once_with_a_client_that_
     process = Process(base)
     host, port = process.url()
     staying = HTTPConnection(host, port, timeout=10)
-    staying.request("GET", "/api/v1/state")
+    staying.request("GET", "/api/v1/state", headers=local_headers(base))
     answer = staying.getresponse()
     assert json.load(answer)["dashboard_url"] == f"http://{host}:{port}"
     assert "server" not in answer.headers
@@ -87,6 +90,12 @@ def test_it_serves_by_tcp_and_by_its_socket_and_ends_at_once_with_a_client_that_
     local.sock.connect(str(process.run_dir / "dashboard.sock"))
     local.request("GET", "/healthz")
     assert json.load(local.getresponse()) == {"answers": True}
+
+    link = login_url(process.run_dir, f"http://{host}:{port}")
+    page, _, code = link.partition("/#/login/")
+    with Client(base_url=f"{page}/api/v1") as browser:
+        assert browser.post("login/code", json={"code": code}).json()["user"] == "local"
+        assert browser.get("state").status_code == 200
 
     began_ns = CLOCK.now_ns()
     code, words = process.end()
@@ -131,11 +140,14 @@ def test_with_a_certificate_everything_goes_by_tls_and_nothing_without(
     process = Process(base)
     host, port = process.url()
     secure = HTTPSConnection(host, port, timeout=10, context=trusting)
-    secure.request("GET", "/api/v1/state")
+    secure.request("GET", "/api/v1/state", headers=local_headers(base))
     answer = secure.getresponse()
     assert json.load(answer)["dashboard_url"] == f"https://{host}:{port}"
     with connect(
-        f"wss://{host}:{port}/api/v1/live", ssl=trusting, origin=f"https://{host}:{port}"
+        f"wss://{host}:{port}/api/v1/live",
+        ssl=trusting,
+        origin=f"https://{host}:{port}",
+        additional_headers=local_headers(base),
     ) as live:
         live.send(json.dumps({"subscribe": ["dashboard_status"]}))
         topics = (json.loads(live.recv(timeout=10))["topic"] for _ in range(5))

@@ -1,6 +1,7 @@
 """A run by a parameter file: derived robot and profile, the chosen model server, the key."""
 
 import shutil
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from vla_deploy.gateways.ros.parameters import (
     PARAMS_FILE_VARIABLE,
     handed_over_parameters,
 )
+from vla_deploy.model_servers.credentials import GIVEN_FOLDER, find_credential, key_folders
 from vla_deploy.model_servers.settings import read_servers
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.loader import ROBOTS_DIR
@@ -108,11 +110,14 @@ def test_a_profile_that_is_a_file_is_inherited_with_its_parents(derived, tmp_pat
     assert profile.planning.remembered == 9
 
 
-def test_the_key_reaches_the_planner_alone_and_no_file(derived, base: Path) -> None:
+def test_the_key_reaches_the_planner_in_a_file_of_its_own_and_nothing_else(
+    derived, base: Path
+) -> None:
     options = derived({}, **CLOUD)
     assert load_profile(options.profile).planning.servers == ("cloud",)
-    assert options.variables["planner"] == {"HOUSE_KEY": KEY}
-    assert KEY not in str({**options.variables, "planner": ""}) + repr(options)
+    assert find_credential("house_key", key_folders(base, {})).reveal() == KEY
+    assert KEY not in str(options.variables) + repr(options)
+    assert stat.S_IMODE((base / GIVEN_FOLDER / "house_key").stat().st_mode) == 0o600
     written = [file.read_text() for file in base.rglob("*") if file.suffix in (".toml", ".yaml")]
     assert written
     assert not any(KEY in text for text in written)
@@ -120,7 +125,7 @@ def test_the_key_reaches_the_planner_alone_and_no_file(derived, base: Path) -> N
 
 def test_a_key_that_nobody_wants_is_told(derived) -> None:
     options = derived({}, max_speed=0.2)
-    assert options.variables["planner"] == {}
+    assert "planner" not in options.variables
     assert "vlm_api_key: not used: no server is asked that wants one" in options.notes
 
 

@@ -1,11 +1,19 @@
 import dataclasses
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from onnx import TensorProto, helper
 
 from drivers.clock import MonotonicClock
-from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ProviderUnavailable
+from vla_deploy.inference import opening
+from vla_deploy.inference.errors import (
+    ModelFileSpoiled,
+    ModelMismatch,
+    ProviderUnavailable,
+    RunFailed,
+)
 from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.opening import open_graph, session_options
 from vla_deploy.inference.runtime import available_providers
@@ -172,3 +180,37 @@ def test_a_spoiled_graph_is_read_or_refused_and_never_ends_the_process(
         open_graph(path)
     except ModelFileSpoiled as error:
         assert str(path) in str(error)
+
+
+def endless() -> bytes:
+    """A graph whose loop counts to 2^62."""
+    whole, truth, number = TensorProto.INT64, TensorProto.BOOL, TensorProto.FLOAT
+    tensor = helper.make_tensor_value_info
+    body = helper.make_graph(
+        [helper.make_node("Identity", [one], [f"{one}_next"]) for one in ("goes_on", "x")],
+        "body",
+        [tensor("i", whole, []), tensor("goes_on", truth, []), tensor("x", number, [1])],
+        [tensor("goes_on_next", truth, []), tensor("x_next", number, [1])],
+    )
+    graph = helper.make_graph(
+        [helper.make_node("Loop", ["count", "begins", "images"], ["output"], body=body)],
+        "endless",
+        [tensor("images", number, [1])],
+        [tensor("output", number, [1])],
+        [
+            helper.make_tensor("count", whole, [], [2**62]),
+            helper.make_tensor("begins", truth, [], [True]),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 9
+    return bytes(model.SerializeToString())
+
+
+def test_a_model_that_loops_for_ever_ends_at_its_first_run(tmp_path, cpu_choice, monkeypatch):
+    monkeypatch.setattr(opening, "FIRST_RUNS_WITHIN_S", 0.2)
+    path = tmp_path / "endless.onnx"
+    path.write_bytes(endless())
+    graph = open_graph(path, cpu_choice(threads=1))
+    with pytest.raises(RunFailed, match=r"no answer within 0.2 s, it may loop for ever"):
+        graph.run(["output"], {"images": np.zeros(1, np.float32)})

@@ -5,6 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vla_deploy.ipc import BadPayload
+from vla_deploy.ipc.memory.segment import _FORCED_WORD, _NEWEST_WORD
 
 SLOTS = 8
 
@@ -78,3 +79,18 @@ def test_a_payload_beyond_the_slot_names_topic_size_and_limit(space):
 def test_a_payload_that_is_no_object_is_refused(space):
     with pytest.raises(BadPayload, match="topic acts: expected a JSON object, got list"):
         space.ring_writer("acts").publish([1, 2])
+
+
+@pytest.mark.parametrize("word", [_NEWEST_WORD, _FORCED_WORD])
+@pytest.mark.parametrize("act", ["publish", "force"])
+def test_a_spoilt_counter_keeps_no_event_away(open_space, word, act):
+    reader = open_space().ring_reader("acts", from_start=False)
+    writer = open_space().ring_writer("acts")
+    writer.publish({"n": 0})
+    assert numbers(reader.drain()) == [0]
+    writer._segment._words[word] = 2**64 - 1
+    getattr(writer, act)({"n": 1})
+    assert numbers(reader.drain()) == [1]
+    getattr(writer, act)({"n": 2})
+    assert numbers(reader.drain()) == [2]
+    assert (reader.lost, reader.torn) == (0, 0)

@@ -42,7 +42,7 @@ def test_every_fault_of_a_table_is_listed() -> None:
     shape = {"name": TEXT, "count": integer(1), "note": TEXT.optional}
     faults = check_record({"count": 0, "colour": "red"}, "thing", shape)
     assert [str(fault) for fault in faults] == [
-        "thing.name: got nothing, expected a text",
+        "thing.name: got nothing, expected a text of one line",
         "thing.colour: got an unknown key, expected one of name, count, note",
         "thing.count: got 0, expected an integer of 1 or more",
     ]

@@ -181,9 +181,34 @@ def test_the_logs_of_a_dead_run_are_kept_by_the_next_start(tmp_path, shared):
 
 
 def test_logs_that_cannot_be_kept_are_told_and_hold_nobody_up(tmp_path, shared, caplog):
+    (tmp_path / "base-state").write_text("no folder")
     runtime = Runtime(tmp_path / "base", shared)
     (runtime.run_dir / "logs").mkdir()
-    (tmp_path / "base-state").write_text("no folder")
     runtime.close()
     assert f"the logs of run {runtime.run_id} are lost" in caplog.text
     assert not runtime.run_dir.exists()
+
+
+@pytest.mark.parametrize("suffix", ["state", "config"])
+@pytest.mark.parametrize(
+    ("owner", "mode", "complaint"),
+    [(4711, 0o700, "belongs to user 4711"), (None, 0o777, "everybody may write to it")],
+)
+def test_folders_that_another_user_has_prepared_are_refused(
+    tmp_path, shared, suffix, owner, mode, complaint
+):
+    prepared = tmp_path / f"base-{suffix}"
+    prepared.mkdir()
+    prepared.chmod(mode)
+    if owner is not None:
+        if os.getuid() != 0:
+            pytest.skip("only root gives files away")
+        os.chown(prepared, owner, owner)
+    with pytest.raises(RuntimeUnavailable, match=complaint):
+        Runtime(tmp_path / "base", shared)
+
+
+def test_what_outlives_a_run_is_for_its_user_alone(tmp_path, shared):
+    runtime = Runtime(tmp_path / "base", shared)
+    assert runtime.state_dir.stat().st_mode & 0o077 == 0
+    runtime.close()

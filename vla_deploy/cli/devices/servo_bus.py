@@ -15,6 +15,7 @@ from drivers.serial_port import SerialPort
 from drivers.servo.family import FAMILIES, ServoFamily, family_of, servo_family
 from drivers.servo.tools.bench import ServoBench
 from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.terminal import CLEAR_LINE, control
 from vla_deploy.robots import RobotDescription, load_robot
 
 _NO_TTY_SPEEDS = (4_500_000, 250_000, 128_000)
@@ -215,7 +216,8 @@ class ProgressLine:
     def __call__(self, text: str) -> None:
         """Replace the text."""
         if self._shown:
-            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+            control(CLEAR_LINE, sys.stderr)
+            print(text, end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         """Clear the line."""

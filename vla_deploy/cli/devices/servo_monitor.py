@@ -14,6 +14,7 @@ from drivers.servo.tools.scan import scan_speed
 from vla_deploy.cli.commands import add_command, number_within, whole_number
 from vla_deploy.cli.devices.servo_bus import ServoBusPort, add_bus_arguments, bus_of, servo_id
 from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.terminal import CLEAR_SCREEN, control
 
 COUNTERS: Final = ("timeouts", "crc_errors", "retries", "late")
 EXAMPLES: Final = """  vla-deploy servo monitor --robot butler
@@ -85,7 +86,7 @@ def _show(
         print(json.dumps({"servos": rows, "silent": silent, "counters": counters}), flush=True)
         return
     if sys.stdout.isatty():
-        print("\033[H\033[2J", end="")
+        control(CLEAR_SCREEN)
     print("\n".join(_lines(readings, silent, counters)), flush=True)
 
 

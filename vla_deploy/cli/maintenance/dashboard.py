@@ -7,6 +7,7 @@ import pwd
 import sys
 import webbrowser
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import MonotonicClock
@@ -22,16 +23,19 @@ from vla_deploy.client.access.accounts import (
     wall_s,
 )
 from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
+from vla_deploy.client.access.login_link import login_url
 from vla_deploy.client.access.passwords import LONGEST, SHORTEST, generate_password, hash_password
+from vla_deploy.client.access.private_file import open_private
 from vla_deploy.ipc import topics
 
-EXAMPLES = """  vla-deploy dashboard             print the page's address
+EXAMPLES = """  vla-deploy dashboard             print a link that logs one browser in, once
   vla-deploy dashboard --open      open it in this computer's browser
   vla-deploy dashboard password    make the first admin's account; see also users, token, audit
   curl --unix-socket /run/vla-deploy/current/dashboard.sock http://robot/api/v1/state
 """
 NAME: Final = "dashboard"
 ROLES: Final = tuple(role.value for role in UserRole if role is not UserRole.ANYONE)
+_LOGIN_PAGE: Final = "login.html"
 _FIRST_USER: Final = "admin"
 _DAY_S: Final = 86_400.0
 _MAX_DAYS: Final = 3650
@@ -123,18 +127,33 @@ def _add(
 
 
 def show_address(arguments: argparse.Namespace) -> int:
-    """Print the address of the page, and of its stop door.
+    """Print the address of the page, as a link that logs one browser in once.
 
     Raises:
         CommandFailed: the dashboard does not answer, or no browser is found.
+        LoginLinkUnavailable: it runs for another user.
     """
     session = attach(arguments.runtime_base)
     status = session.document(topics.DASHBOARD_STATUS, age_limit_s=_STATUS_AGE_S)
     if status is None:
         raise CommandFailed(f"the dashboard does not answer: {_why_silent(session)}")
-    if arguments.open and not webbrowser.open(status["url"]):
-        raise CommandFailed(f"no browser is found on this computer; open {status['url']} elsewhere")
-    return emit(arguments, status, status["url"])
+    link = login_url(session.run_dir, status["url"])
+    if arguments.open and not webbrowser.open(_private_page(session.run_dir, link)):
+        raise CommandFailed(f"no browser is found on this computer; open {link} elsewhere")
+    return emit(arguments, {**status, "login_url": link}, link)
+
+
+def _private_page(run_dir: Path, link: str) -> str:
+    """Return the address of a file that leads to a link.
+
+    Every user of this computer sees the words that a browser is started with.
+    """
+    page = run_dir / _LOGIN_PAGE
+    page.unlink(missing_ok=True)
+    handle = open_private(page, os.O_WRONLY | os.O_EXCL)
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(f'<meta http-equiv="refresh" content="0; url={link}">\n')
+    return page.resolve().as_uri()
 
 
 def _why_silent(session: RobotSession) -> str:

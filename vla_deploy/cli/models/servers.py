@@ -105,7 +105,7 @@ def _key(shelf: ServerShelf, settings: ServerSettings) -> str:
     if settings.credential is None:
         return "none"
     try:
-        find_credential(settings.credential, shelf.environment)
+        find_credential(settings.credential, shelf.key_folders)
     except CredentialMissing:
         return "missing"
     return "found"

@@ -7,6 +7,7 @@ from typing import Any, Final
 from vla_deploy.cli.commands import add_top_command
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.cli.terminal import CLEAR_SCREEN, control
 from vla_deploy.ipc import topics
 from vla_deploy.ipc.payloads.supervision import BudgetDocument, BudgetRow, LadderStepDocument
 
@@ -20,7 +21,6 @@ UNITS: Final = {
     "power_w": "W",
     "temperature_c": "degC",
 }
-_CLEAR_SCREEN: Final = "\x1b[2J\x1b[H"
 
 
 def register(commands: Any) -> None:
@@ -43,7 +43,9 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print(json.dumps(budget, indent=None if arguments.watch else 2), flush=True)
         else:
-            print((_CLEAR_SCREEN if arguments.watch else "") + as_text(budget), flush=True)
+            if arguments.watch:
+                control(CLEAR_SCREEN)
+            print(as_text(budget), flush=True)
         if not arguments.watch:
             return 0
         session.pause(WATCH_PERIOD_S)

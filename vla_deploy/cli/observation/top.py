@@ -23,6 +23,7 @@ from rich.text import Text
 from vla_deploy.cli.commands import add_top_command, number_within
 from vla_deploy.cli.observation.status import twin_words
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.cli.terminal import escaped_document, plain
 from vla_deploy.client.battery import battery_words
 from vla_deploy.ipc import TOPICS, PulseReader
 
@@ -67,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     reader = TopReader(attach(arguments.runtime_base))
     if arguments.json:
         return _print_json(reader, arguments)
-    console = Console()
+    console = Console(file=plain(sys.stdout))
     if arguments.once or not console.is_terminal:
         console.print(screen(reader.read()), soft_wrap=False)
         return 0
@@ -85,7 +86,9 @@ class TopReader:
 
     def read(self) -> dict[str, Any]:
         """Return the documents, None where a process is silent, and the topics that are late."""
-        documents = {name: self.session.document(name, AGE_LIMIT_S) for name in DOCUMENTS}
+        documents = {
+            name: escaped_document(self.session.document(name, AGE_LIMIT_S)) for name in DOCUMENTS
+        }
         return {**documents, **self._topics(self.session.clock.now_ns())}
 
     def _topics(self, now_ns: int) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from vla_deploy.cli.devices.servo_bus import ServoBusPort
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.attended_motion import AttendedMotion, attended_motion
 from vla_deploy.cli.session import RobotSession, attach
+from vla_deploy.cli.terminal import CLEAR_SCREEN, control
 from vla_deploy.client.motions import JointView, joint_view
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.calibration.lerobot_file import read_lerobot, write_lerobot
@@ -267,7 +268,8 @@ class JogScreen:
         robot = self._robot
         view = joint_view(self._session, robot.joint_index, robot.joint_names)
         if view is not None:
-            print("\033[H\033[2J" + "\n".join(self._lines(view)), flush=True)
+            control(CLEAR_SCREEN)
+            print("\n".join(self._lines(view)), flush=True)
 
     def _lines(self, view: JointView) -> Iterator[str]:
         keyboard = "arrows, page up, page down: the hand; any other key: stop; Ctrl-C: end"

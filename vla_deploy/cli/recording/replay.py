@@ -4,6 +4,7 @@ import argparse
 import os
 import shutil
 import signal
+from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
@@ -11,6 +12,8 @@ from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.recording.runs import find_recorded, stop_requested
 from vla_deploy.cli.session import RobotSession, attach, base_of
+from vla_deploy.client.access.errors import LoginLinkUnavailable
+from vla_deploy.client.access.login_link import login_url
 from vla_deploy.ipc import topics
 from vla_deploy.ipc.payloads.recording import ReplayAct, ReplayStatus
 from vla_deploy.runtime.logs import LOGS_DIR, RUN_ID_VARIABLE
@@ -108,7 +111,14 @@ class _Address:
         status = self._session.document(topics.DASHBOARD_STATUS) if self._wanted else None
         if status is not None:
             self._wanted = False
-            print(f"dashboard: {status['url']}", flush=True)
+            print(f"dashboard: {_link(self._session.run_dir, status['url'])}", flush=True)
+
+
+def _link(run_dir: Path, url: str) -> str:
+    try:
+        return login_url(run_dir, url)
+    except LoginLinkUnavailable as error:
+        return f"{url} ({error})"
 
 
 def _begin(node: ReplayNode, arguments: argparse.Namespace, now_ns: int) -> None:

@@ -30,7 +30,7 @@ _TOKEN: Final = re.compile(r"vla_([0-9a-f]{8})_([0-9a-f]{64})")
 _ID_BYTES: Final = 4
 _SECRET_BYTES: Final = 32
 # A clock that is set back by more than this cannot judge what has expired.
-_CLOCK_SLACK_S: Final = 600.0
+CLOCK_SLACK_S: Final = 600.0
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 _STRICT: Final = ConfigDict(extra="forbid", frozen=True, strict=True)
 ACCOUNTS_FILE: Final = "accounts.json"
@@ -104,7 +104,7 @@ class Token(BaseModel):
     def is_valid(self, secret: str, now_s: float) -> bool:
         """Return whether a secret is this token's, and the token is valid now."""
         is_own = hmac.compare_digest(_digest(secret), self.digest)
-        begun = now_s > self.made_s - _CLOCK_SLACK_S
+        begun = now_s > self.made_s - CLOCK_SLACK_S
         return is_own and begun and (self.expires_s is None or now_s < self.expires_s)
 
 
@@ -121,6 +121,10 @@ class Accounts(BaseModel):
         parts = _TOKEN.fullmatch(text)
         token = self.tokens.get(parts[1]) if parts else None
         return token if parts and token is not None and token.is_valid(parts[2], now_s) else None
+
+    def token_named(self, name: str) -> Token | None:
+        """Return the token of a name, None where there is none."""
+        return next((one for one in self.tokens.values() if one.name == name), None)
 
     def with_user(self, name: str, user: User) -> "Accounts":
         """Return the accounts with one user added or changed.

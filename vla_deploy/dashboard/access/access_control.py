@@ -16,8 +16,10 @@ from drivers.clock import Clock, MonotonicClock
 from vla_deploy.client.access.accounts import Accounts, AccountsFile, UserRole, wall_s
 from vla_deploy.client.access.audit_log import AuditLog
 from vla_deploy.client.access.errors import AccountsUnusable
+from vla_deploy.client.access.local_token import LOCAL
 from vla_deploy.client.access.passwords import DEFAULT_COST, Cost
 from vla_deploy.dashboard.access.identity import AuthMethod, Identity, unknown_user
+from vla_deploy.dashboard.access.login_links import LocalSession, LocalSessions, LoginLinks
 from vla_deploy.dashboard.access.rates import TokenBuckets
 from vla_deploy.dashboard.access.request import (
     FORWARDED,
@@ -46,14 +48,14 @@ _log = logging.getLogger(__name__)
 class AccessRules:
     """Configure access to one dashboard.
 
-    `trust_loopback` makes every user of this computer an admin; behind a reverse proxy on this
-    computer that is everyone whom the proxy admits. `hosts` are further names of the robot,
-    `origins` those of pages that a proxy serves for it, such as `https://robot.example`. A session
-    ends `session_idle_s` after its last use. A known user may change `acts_burst` things at once
-    and `acts_hz` in the long run.
+    `trust_loopback` makes every user of this computer an admin, and every container on its network;
+    behind a reverse proxy on this computer also everyone whom the proxy admits. `hosts` are further
+    names of the robot, `origins` those of pages that a proxy serves for it, such as
+    `https://robot.example`. A session ends `session_idle_s` after its last use. A known user may
+    change `acts_burst` things at once and `acts_hz` in the long run.
     """
 
-    trust_loopback: bool = True
+    trust_loopback: bool = False
     hosts: tuple[str, ...] = ()
     origins: tuple[str, ...] = ()
     is_https: bool = False
@@ -81,6 +83,8 @@ class AccessControl:
         self.audit = audit
         self._clock = clock
         self.sessions = Sessions(rules.session_idle_s, rules.session_longest_s, clock)
+        self.local_sessions = LocalSessions(rules.session_longest_s)
+        self.links = LoginLinks(clock)
         self.logins = Logins(accounts, self.sessions, clock, cost)
         self._now_s = now_s
         self._own_names = own_names() | {name.lower() for name in rules.hosts}
@@ -137,6 +141,29 @@ class AccessControl:
         """Return the channel of a WebSocket, which closes when its session or token ends."""
         return SessionExpiry(receive, send, lambda: self._role_now(request), self._clock)
 
+    def begin_local(self, code: str) -> tuple[str, Identity]:
+        """Return the id of a session for who followed a link, and the identity that it gives.
+
+        Raises:
+            AccessDenied: the code of the link does not count, or the accounts cannot be used.
+        """
+        session_id = None
+        if self.links.redeem(code):
+            session_id = self.local_sessions.begin(self._read(), self._now_s())
+        found = session_id and self.local_sessions.find(session_id, self._read(), self._now_s())
+        if not session_id or not found:
+            raise AccessDenied(
+                Denial.LINK_REFUSED,
+                "this link has been followed before, or is too old",
+                "make a new one, on the robot: vla-deploy dashboard",
+            )
+        return session_id, _of_link(found, "")
+
+    def end_session(self, session_id: str) -> None:
+        """End a session, if the id is of one."""
+        self.sessions.end(session_id)
+        self.local_sessions.end(session_id)
+
     def cookie_name(self) -> str:
         """Return the cookie's name; under https one that no other host can have set."""
         return f"__Host-{_COOKIE}" if self.rules.is_https else _COOKIE
@@ -173,6 +200,15 @@ class AccessControl:
 
     def _by_session(self, request: IncomingRequest) -> Identity | None:
         session_id = self.session_id(request)
+        return self._by_link(request, session_id) or self._by_password(request, session_id)
+
+    def _by_link(self, request: IncomingRequest, session_id: str) -> Identity | None:
+        if not session_id:
+            return None
+        found = self.local_sessions.find(session_id, self._read(), self._now_s())
+        return None if found is None else _of_link(found, request.peer.address)
+
+    def _by_password(self, request: IncomingRequest, session_id: str) -> Identity | None:
         session = self.sessions.find(session_id) if session_id else None
         if session is None:
             return None
@@ -193,7 +229,7 @@ class AccessControl:
         if not request.peer.is_socket and not self._is_trusted(request):
             return unknown_user(address)
         way = AuthMethod.SOCKET if request.peer.is_socket else AuthMethod.LOOPBACK
-        return Identity(role=UserRole.ADMIN, user="local", way=way, address=address)
+        return Identity(role=UserRole.ADMIN, user=LOCAL, way=way, address=address)
 
     def _is_trusted(self, request: IncomingRequest) -> bool:
         """Return whether the request comes from this computer, by its own name and no proxy."""
@@ -231,6 +267,16 @@ class AccessControl:
         except AccountsUnusable as error:
             _log.error("nobody can log in: %s", error)
             raise accounts_away() from error
+
+
+def _of_link(found: LocalSession, address: str) -> Identity:
+    return Identity(
+        role=found.token.role,
+        user=LOCAL,
+        way=AuthMethod.SESSION,
+        address=address,
+        csrf=found.csrf,
+    )
 
 
 def accounts_away() -> AccessDenied:

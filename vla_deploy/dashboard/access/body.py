@@ -14,7 +14,7 @@ MOST_BYTES: Final = 128 * 1024
 """A plan matches into 64 KiB of shared memory; no request needs more."""
 WITHIN_S: Final = 5.0
 _MOST_DEPTH: Final = 32
-_STOP_BYTES: Final = 4096
+STOP_BYTES: Final = 4096
 _STOP_WITHIN_S: Final = 0.1
 _REASON_LETTERS: Final = 150
 
@@ -39,12 +39,21 @@ async def read_body(request: IncomingRequest, receive: Receive) -> bytes:
 async def read_stop_body(receive: Receive) -> bytes:
     """Return the reason of a stop as JSON; one that is invalid, late or too long is left out."""
     try:
-        said = json.loads(await _whole(receive, _STOP_BYTES, _STOP_WITHIN_S))
-    except (AccessDenied, ValueError, RecursionError):
-        said = None
+        body = await _whole(receive, STOP_BYTES, _STOP_WITHIN_S)
+    except AccessDenied:
+        body = b""
+    return json.dumps({"reason": reason_in(body)}).encode()
+
+
+def reason_in(body: bytes) -> str:
+    """Return the reason of a stop, "" where the body gives none that can be read."""
+    try:
+        said = json.loads(body)
+    except (ValueError, RecursionError):
+        return ""
     given = said.get("reason") if isinstance(said, dict) else None
     reason = given[:_REASON_LETTERS] if isinstance(given, str) else ""
-    return json.dumps({"reason": reason.encode(errors="replace").decode()}).encode()
+    return reason.encode(errors="replace").decode()
 
 
 def replay(body: bytes, receive: Receive) -> Receive:

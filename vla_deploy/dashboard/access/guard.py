@@ -13,6 +13,7 @@ from vla_deploy.dashboard.access.access_control import AccessControl
 from vla_deploy.dashboard.access.audit_middleware import AuditMiddleware, note_code, note_required
 from vla_deploy.dashboard.access.body import read_body, read_stop_body, replay
 from vla_deploy.dashboard.access.identity import IDENTITY, Identity, unknown_user
+from vla_deploy.dashboard.access.read_turns import ReadTurns
 from vla_deploy.dashboard.access.request import WEBSOCKET, IncomingRequest, read_request
 from vla_deploy.dashboard.errors import AccessDenied, Denial, denial_response
 
@@ -27,6 +28,7 @@ class AccessGuard:
     def __init__(self, app: ASGIApp, access: AccessControl) -> None:
         self._app = app
         self._access = access
+        self._reads = ReadTurns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request or WebSocket."""
@@ -45,8 +47,17 @@ class AccessGuard:
             if request.method == WEBSOCKET:
                 session = self._access.session_expiry(request, receive, audited.send)
                 await self._app(scope, session.receive, session.send)
-            else:
+            elif request.is_change:
                 await self._app(scope, receive, audited.send)
+            else:
+                await self._read(scope, receive, audited.send)
+
+    async def _read(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            async with self._reads.turn(send) as turn:
+                await self._app(scope, receive, turn.send)
+        except AccessDenied as denied:  # of too many; those of routes are answered by the app
+            await _deny(denied, scope, receive, send)
 
     async def _admit(self, scope: Scope, receive: Receive, request: IncomingRequest) -> Receive:
         if request.is_stop:
@@ -83,7 +94,7 @@ class Require:
             raise AccessDenied(
                 Denial.LOGIN_NEEDED,
                 f"this needs the role {self.role}",
-                "log in, or send a token; none yet? On the robot: vla-deploy dashboard password",
+                "log in, or send a token; on the robot a link does it: vla-deploy dashboard",
             )
         raise AccessDenied(
             Denial.ROLE_TOO_LOW,
@@ -103,6 +114,7 @@ def require(role: UserRole) -> Require:
 Anyone = Annotated[Identity, Depends(require(UserRole.ANYONE))]
 Viewer = Annotated[Identity, Depends(require(UserRole.VIEWER))]
 Operator = Annotated[Identity, Depends(require(UserRole.OPERATOR))]
+Admin = Annotated[Identity, Depends(require(UserRole.ADMIN))]
 
 
 def guard(app: FastAPI, access: AccessControl) -> None:

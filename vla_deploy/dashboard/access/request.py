@@ -12,7 +12,7 @@ from vla_deploy.dashboard.errors import AccessDenied, Denial
 WEBSOCKET: Final = "WEBSOCKET"
 API_PREFIX: Final = "/api/v1"
 STOP_PATH: Final = f"{API_PREFIX}/stop"
-LOGIN_PATH: Final = f"{API_PREFIX}/login"
+LOGIN_PATHS: Final = frozenset({f"{API_PREFIX}/login", f"{API_PREFIX}/login/code"})
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _SECURE: Final = {"ws": "http", "wss": "https"}
 
@@ -50,7 +50,7 @@ class IncomingRequest:
     @property
     def is_login(self) -> bool:
         """Return whether it is a login, which needs no CSRF token."""
-        return self.method == "POST" and self.path == LOGIN_PATH
+        return self.method == "POST" and self.path in LOGIN_PATHS
 
     def first(self, name: str) -> str:
         """Return the first value of a header, "" when there is none."""

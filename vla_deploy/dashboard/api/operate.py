@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.acts import REACHED, Status, why_not
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import UserRole, note, require
+from vla_deploy.dashboard.access.connections import PRESSED
 from vla_deploy.dashboard.errors import ApiError
 from vla_deploy.ipc import topics
 from vla_deploy.ipc.payloads.motion import OperatorActName
@@ -51,7 +52,8 @@ class StopPressed(BaseModel):
 async def stop(request: Request, why: ReasonBody | None = None) -> StopPressed:
     """Press the software stop, which latches; it needs no login, and no body."""
     reason = why.reason if why else ""
-    request.app.state.link.operate(ESTOP, reason)
+    if not getattr(request.state, PRESSED, False):
+        request.app.state.link.operate(ESTOP, reason)
     note(request, reason=reason)
     return StopPressed()
 

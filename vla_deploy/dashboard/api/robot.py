@@ -7,6 +7,8 @@ from typing import Any, Final
 
 import cv2
 from fastapi import APIRouter, Depends, Request, Response
+from fastapi.encoders import jsonable_encoder
+from fastapi.responses import JSONResponse
 
 from vla_deploy.dashboard.access import UserRole, require
 from vla_deploy.dashboard.errors import ApiError
@@ -78,6 +80,21 @@ class StaticModel:
         }
 
     @cached_property
+    def model_json(self) -> bytes:
+        """Return the model as it is sent, written once."""
+        return _as_json(self.model)
+
+    @cached_property
+    def map_json(self) -> bytes:
+        """Return the map as it is sent, written once.
+
+        Raises:
+            MapInvalid: the robot's map cannot be used.
+            PartMissing: the robot has no home.
+        """
+        return _as_json(self.map)
+
+    @cached_property
     def map_png(self) -> bytes:
         """Return the map's shades; the first row is the northernmost.
 
@@ -101,17 +118,17 @@ def _rounded(value: Any) -> Any:
     return round(value, _DIGITS) if isinstance(value, float) else value
 
 
-@router.get("/robot/model")
-def model(request: Request) -> dict[str, Any]:
+@router.get("/robot/model", response_model=dict[str, Any])
+def model(request: Request) -> Response:
     """Return the robot's links, joints and shapes, and its safety zones, in the base frame."""
-    return _model(request).model
+    return _written(_model(request).model_json)
 
 
-@router.get("/map")
-def floor(request: Request) -> dict[str, Any]:
+@router.get("/map", response_model=dict[str, Any])
+def floor(request: Request) -> Response:
     """Return the lower left corner of the map's image, places and keep-out zones."""
     try:
-        return _model(request).map
+        return _written(_model(request).map_json)
     except MapInvalid as error:
         raise _no_map(error) from error
 
@@ -135,6 +152,14 @@ async def camera(request: Request) -> Response:
         raise ApiError(HTTPStatus.NOT_FOUND, "no_picture", what, "vla-deploy status")
     headers = {"cache-control": "no-store"}
     return Response(picture.jpeg, media_type="image/jpeg", headers=headers)
+
+
+def _as_json(document: dict[str, Any]) -> bytes:
+    return bytes(JSONResponse(jsonable_encoder(document)).body)
+
+
+def _written(document: bytes) -> Response:
+    return Response(document, media_type="application/json")
 
 
 def _model(request: Request) -> StaticModel:

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path, Query, Request
+from fastapi.responses import JSONResponse
 
 from vla_deploy.dashboard.access import Operator, UserRole, require
 from vla_deploy.dashboard.errors import ApiError
@@ -49,14 +50,14 @@ async def get_health() -> dict[str, bool]:
     return {"answers": True}
 
 
-@router.get("/logs", tags=["logs"], dependencies=_VIEWER)
+@router.get("/logs", tags=["logs"], dependencies=_VIEWER, response_model=dict[str, Any])
 def logs(
     request: Request,
     process: Annotated[str, Query(max_length=64)] = "",
     level: LogLevel = LogLevel.INFO,
     limit: Annotated[int, Query(ge=1, le=MOST_LINES)] = 200,
     before: Annotated[int | None, Query(ge=0, lt=2**63, description="stamp_ns")] = None,
-) -> dict[str, Any]:
+) -> JSONResponse:
     """Return the newest lines, older than `before`; of one process, or of all by time.
 
     Raises:
@@ -75,7 +76,8 @@ def logs(
     chosen = [process] if process else names
     lines = [line for name in chosen for line in newest_lines(folder, name, limit, lowest, before)]
     newest = sorted(lines, key=lambda line: int(line["stamp_ns"]), reverse=True)[:limit]
-    return {"processes": names, "lines": newest}
+    # Written here, in a thread: the event loop belongs to the stop.
+    return JSONResponse({"processes": names, "lines": newest})
 
 
 @router.get("/alarms", tags=["alarms"], dependencies=_VIEWER)

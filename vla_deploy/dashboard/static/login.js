@@ -38,8 +38,9 @@ export function Login() {
         </div>
         <button class="button" data-kind="main" type="submit" disabled=${isBusy} aria-busy=${isBusy}>Log in</button>
         <p class="quiet small">
-          The first password is told once on the robot: <code>vla-deploy dashboard password</code>. Anyone who sees this
-          page can stop the robot; nobody moves it without logging in.
+          On the robot's own computer <code>vla-deploy dashboard</code> gives a link that logs you in, and
+          <code>vla-deploy dashboard password</code> the first password. Anyone who sees this page can stop the robot;
+          nobody moves it without logging in.
         </p>
       </form>
     </main>

@@ -4,7 +4,7 @@ import { Questions } from "./dialog.js";
 import { connect, disconnect, subscribe } from "./live.js";
 import { Login } from "./login.js";
 import { Messages, tell } from "./messages.js";
-import { refresh, useSession } from "./session.js";
+import { followLink, refresh, useSession } from "./session.js";
 import { Shell } from "./shell.js";
 import { saw } from "./stop.js";
 import { html, render, useEffect } from "./ui.js";
@@ -21,6 +21,11 @@ function Page() {
 
 async function begin() {
   try {
+    await followLink();
+  } catch (error) {
+    tell("bad", error.what ?? error.message, error.advice);
+  }
+  try {
     await refresh();
   } catch (error) {
     tell("bad", error.what ?? error.message, error.advice);
@@ -31,4 +36,7 @@ async function begin() {
 render(html`<${Page} />`, document.getElementById("application"));
 render(html`<${Messages} />`, document.getElementById("messages"));
 subscribe("control_status", ({ data }) => saw(data));
+addEventListener("hashchange", () => {
+  if (location.hash.startsWith("#/login/")) begin();
+});
 begin();

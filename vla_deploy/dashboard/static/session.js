@@ -19,6 +19,14 @@ export async function login(user, password) {
   await refresh();
 }
 
+/** Log in by the link that the page was opened with, where it is one; its code counts once. */
+export async function followLink() {
+  const code = location.hash.match(/^#\/login\/([\w-]+)$/)?.[1];
+  if (!code) return;
+  history.replaceState(null, "", "#/now");
+  await post("login/code", { code });
+}
+
 /** Log out; what needs a role asks for it again. */
 export async function logout() {
   await post("logout");

@@ -159,7 +159,7 @@ def _read(file: Path) -> dict[str, object]:
     """Return the parameters of every section that is about our node, later ones before earlier."""
     try:
         document = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise ParametersUnusable(
             f"{file}: cannot read this file of parameters: {_why(error)}; give another file, "
             "or none, by the launch argument params_file or the option --params-file"
@@ -187,4 +187,6 @@ def _fault(parameter: RosParameter, value: object) -> str:
 def _why(error: Exception) -> str:
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         return f"line {error.problem_mark.line + 1}: {error.problem}"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
     return error.strerror or str(error) if isinstance(error, OSError) else type(error).__name__

@@ -18,10 +18,12 @@ from vla_deploy.ipc.topics import Topic
 
 _MAGIC = b"VLAIPC\x00\x01"
 _HEADER = struct.Struct("<8sIIQ36s")  # magic, version, schema hash, file size, boot id
+_SEQUENCE = struct.Struct("<Q")  # in front of each slot
 # The newest sequence lies in the 13th 64-bit word, on a cache line of its own; next to it that of
 # whoever went past the lock, so that its holder cannot take it back.
 _NEWEST_WORD = 12
 _FORCED_WORD = 13
+_MOST_SEQUENCE = 2**62  # a million a second take 146,000 years to it
 _LOCK_POLL_NS = NS_PER_S // 5000
 _SHM = Path("/dev/shm")
 
@@ -50,17 +52,32 @@ class Segment:
     @property
     def newest(self) -> int:
         """Return the newest published sequence, 0 before the first."""
-        newest, forced = self._words[_NEWEST_WORD], self._words[_FORCED_WORD]
+        newest, forced = self._counted(_NEWEST_WORD), self._counted(_FORCED_WORD)
         return newest if newest > forced else forced
 
     @newest.setter
     def newest(self, sequence: int) -> None:
         self._words[_NEWEST_WORD] = sequence
+        if self._words[_FORCED_WORD] > _MOST_SEQUENCE:
+            self._words[_FORCED_WORD] = 0
 
     def force_newest(self, sequence: int) -> bool:
         """Publish a sequence without the lock; False where its holders have come as far already."""
         self._words[_FORCED_WORD] = sequence
-        return bool(self._words[_NEWEST_WORD] < sequence)
+        return self._counted(_NEWEST_WORD) < sequence
+
+    def _counted(self, word: int) -> int:
+        """Return a sequence; one that nobody can have counted to is spoilt: the slots know better.
+
+        So neither writers nor readers stop, as a press of the stop must not.
+        """
+        sequence = self._words[word]
+        return sequence if sequence <= _MOST_SEQUENCE else self._newest_slot()
+
+    def _newest_slot(self) -> int:
+        offsets = (self.layout.offset(slot) for slot in range(self.layout.slots))
+        fronts = (_SEQUENCE.unpack_from(self.memory, offset)[0] for offset in offsets)
+        return max((front for front in fronts if front <= _MOST_SEQUENCE), default=0)
 
     @contextmanager
     def locked(self) -> Iterator[None]:

@@ -19,7 +19,9 @@ from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, PlanRequest, Proposal
 from vla_deploy.planning.prompts.composing import ROOM, chat_for, filled
+from vla_deploy.plans.catalogue import MOTIONLESS
 from vla_deploy.plans.errors import PlanError
+from vla_deploy.plans.plan import Plan
 from vla_deploy.runtime.deadline import Deadline
 from vla_deploy.runtime.one_line import one_line
 
@@ -37,6 +39,8 @@ class ChatModel(BackEnd):
     """
 
     is_language_model = True
+    is_trusted = True
+    """A plan of it may run without a person's yes where it says that it is sure."""
     uses = frozenset({Aid.MEMORY})
     room = ROOM
 
@@ -88,7 +92,7 @@ class ChatModel(BackEnd):
             plan=plan,
             back_end=self.name,
             confidence=round(answer.confidence, 3),
-            is_unsure=answer.confidence < SURE,
+            is_unsure=answer.confidence < SURE or (not self.is_trusted and _moves(plan)),
             knows_grammar=True,
         )
 
@@ -140,6 +144,7 @@ class ServedModel(ChatModel):
         # The schema is a part of the prompt, too.
         self.room = ROOM - self._asker.schema_characters
         settings = server.settings
+        self.is_trusted = settings.trust_plans
         if settings.vision and (settings.is_local or settings.allow_images_off_robot):
             self.uses = frozenset({Aid.MEMORY, Aid.IMAGE})
 
@@ -153,6 +158,10 @@ class ServedModel(ChatModel):
     def document(self) -> dict[str, Any]:
         """Return how the server has been doing."""
         return self._server.document()
+
+
+def _moves(plan: Plan) -> bool:
+    return any(action.skill not in MOTIONLESS for action in plan.actions)
 
 
 def _refused(chat: Chat, answer: PlanAnswer, error: PlanError) -> Chat:

@@ -25,6 +25,7 @@ from vla_deploy.runtime.table_schema import (
     build,
     check_record,
     check_tables,
+    parse_toml,
 )
 
 CALIBRATION_FILE = "calibration.toml"
@@ -150,7 +151,7 @@ def _with_file_name(fault: TableFault) -> TableFault:
 
 def _parse(file: Path) -> Document:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {"joints": {}}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -31,6 +31,7 @@ from vla_deploy.runtime.table_schema import (
     build,
     check_record,
     numbers,
+    parse_toml,
 )
 
 LENS_FILE: Final = "camera.yaml"
@@ -90,6 +91,8 @@ def read_lens(file: Path, camera: CameraDescription) -> LensCalibration | None:
         document = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise _unreadable(file, one_line(error), "a YAML document") from error
+    except RecursionError:
+        raise _unreadable(file, "one that is nested too deeply", "a YAML document") from None
     if not isinstance(document, dict):
         raise _unreadable(file, type(document).__name__, "the tables of ROS' camera_info")
     faults = tuple(lens_faults(document, camera, MODELS))
@@ -139,7 +142,7 @@ def read_mounting(file: Path, camera: CameraDescription) -> CameraMounting | Non
     if text is None:
         return None
     try:
-        document = tomllib.loads(text)
+        document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise _unreadable(file, str(error), "a TOML document") from error
     faults = tuple(check_record(document, "", MOUNTING)) or tuple(_wrong(document, camera))

@@ -290,6 +290,8 @@ def _entries(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "it is no text"
         raise MapInvalid(f"{path}: cannot read the map: {why}") from error
+    except RecursionError:
+        raise MapInvalid(f"{path}: expected `key: value`, in YAML: nested too deeply") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "context_mark", None) or getattr(error, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark else str(path)

@@ -160,7 +160,7 @@ class BoundedFolder:
         Raises:
             OSError: the folder cannot be written.
         """
-        self.path.mkdir(mode=0o755, parents=True, exist_ok=True)
+        self.path.mkdir(mode=0o750, parents=True, exist_ok=True)
         numbered = sorted(self._numbered())
         for _, path in numbered[: max(0, len(numbered) - self._keep + 1)]:
             _remove(path)

@@ -18,8 +18,7 @@ class RunOptions:
     chooses its time.
     `ros` puts the robot into a ROS 2 graph, whatever its file and the profile say.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
-    `variables` are added to the environment of single processes, and may hold keys; the run's log
-    begins with `notes`.
+    `variables` are added to the environment of single processes; the run's log begins with `notes`.
     """
 
     robot: str = "butler"

@@ -1,5 +1,6 @@
 """Own the directory of one run: its lock, its shared memory, and what dead runs left behind."""
 
+import contextlib
 import fcntl
 import json
 import logging
@@ -16,7 +17,13 @@ from typing import Final
 import psutil
 
 from vla_deploy.runtime.logs import RUN_ID_VARIABLE
-from vla_deploy.runtime.state_dir import state_dir_of, user_base
+from vla_deploy.runtime.state_dir import (
+    ROOT_CONFIG,
+    ROOT_STATE,
+    config_dir_of,
+    state_dir_of,
+    user_base,
+)
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.processes.usage import read_stat
 from vla_deploy.supervisor.runs.log_files import BoundedFolder
@@ -87,8 +94,12 @@ class Runtime:
         self._base = base
         self._shared_memory = shared_memory
         _make_private(base)
-        self._lock_fd = _lock(base)
         self.state_dir = state_dir_of(base)
+        for folder in (self.state_dir, config_dir_of(base)):
+            _require_trusted(folder)
+        with contextlib.suppress(OSError):  # whoever writes there says what is wrong with it
+            self.state_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._lock_fd = _lock(base)
         self._old_logs = old_logs(self.state_dir)
         self.orphans = _sweep_runs(base, self._old_logs)
         _sweep_shared_memory(shared_memory)
@@ -154,6 +165,31 @@ def _make_private(base: Path) -> None:
         raise RuntimeUnavailable(
             f"runtime directory {base}: everybody may write to it, expected its owner only: "
             f"`chmod o-w {base}`, or choose another with --runtime-base"
+        )
+
+
+def _require_trusted(folder: Path) -> None:
+    """Refuse a folder in which another user could put settings, accounts or models for this run.
+
+    Root runs by hand what a service's user runs usually, in that user's folders.
+
+    Raises:
+        RuntimeUnavailable: it belongs to another user, or everybody may write to it.
+    """
+    try:
+        found = folder.stat()
+    except OSError:
+        return  # missing: nobody has put anything there
+    owners = {0, os.getuid()}
+    is_services = os.getuid() == 0 and folder in (ROOT_STATE, ROOT_CONFIG)
+    if found.st_uid not in owners and not is_services:
+        raise RuntimeUnavailable(
+            f"{folder}: belongs to user {found.st_uid}, expected {os.getuid()}; remove it, or "
+            "choose another runtime directory with --runtime-base"
+        )
+    if found.st_mode & stat.S_IWOTH:
+        raise RuntimeUnavailable(
+            f"{folder}: everybody may write to it, expected its owner only: `chmod o-w {folder}`"
         )
 
 

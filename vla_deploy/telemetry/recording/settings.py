@@ -9,6 +9,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from vla_deploy.runtime.state_dir import config_dir_of
+from vla_deploy.runtime.table_schema import parse_toml
 from vla_deploy.telemetry.errors import RecordingSettingsInvalid
 from vla_deploy.telemetry.folder import FolderBounds
 from vla_deploy.telemetry.recording.request import EVERYTHING, RecordingRequest
@@ -94,7 +95,7 @@ def read_settings(base: Path) -> TelemetrySettings:
     """
     file = config_dir_of(base) / SETTINGS_FILE
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = parse_toml(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return TelemetrySettings()
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -14,11 +14,13 @@ from vla_deploy.client.access.errors import AccountRefused, AccountsUnusable
 from vla_deploy.client.access.passwords import Cost, hash_password, matches
 
 URL = "http://127.0.0.1:8088"
+LINK = f"{URL}/#/login/abc"
 CHEAP = Cost(log2_rounds=10, block=1, parallel=1)
 
 
 def show_address(session, monkeypatch, **options):
     monkeypatch.setattr(dashboard, "attach", lambda _: session)
+    monkeypatch.setattr(dashboard, "login_url", lambda run_dir, url: f"{url}/#/login/abc")
     chosen = {"runtime_base": None, "open": False, "json": False} | options
     return dashboard.show_address(SimpleNamespace(**chosen))
 
@@ -28,9 +30,10 @@ def test_the_address_is_one_line_for_a_person_and_json_for_a_script(
 ):
     robot.space.cell_writer("dashboard_status").put_document({"url": URL, "port": 8088})
     assert show_address(session, monkeypatch) == 0
-    assert capsys.readouterr().out == f"{URL}\n"
+    assert capsys.readouterr().out == f"{LINK}\n"
     show_address(session, monkeypatch, json=True)
-    assert json.loads(capsys.readouterr().out)["port"] == 8088
+    told = json.loads(capsys.readouterr().out)
+    assert (told["port"], told["url"], told["login_url"]) == (8088, URL, LINK)
 
 
 def test_a_dashboard_that_does_not_run_is_told_with_the_supervisors_reason(
@@ -44,9 +47,13 @@ def test_a_dashboard_that_does_not_run_is_told_with_the_supervisors_reason(
 
 def test_without_a_browser_the_address_is_told_for_another_computer(session, robot, monkeypatch):
     robot.space.cell_writer("dashboard_status").put_document({"url": URL, "port": 8088})
-    monkeypatch.setattr(dashboard.webbrowser, "open", lambda _: False)
-    with pytest.raises(CommandFailed, match=f"no browser .* open {URL} elsewhere"):
+    opened: list[str] = []
+    monkeypatch.setattr(dashboard.webbrowser, "open", lambda url: bool(opened.append(url)))
+    with pytest.raises(CommandFailed, match=f"no browser .* open {LINK} elsewhere"):
         show_address(session, monkeypatch, open=True)
+    page = session.run_dir / "login.html"  # others see what a browser is started with
+    assert opened == [page.resolve().as_uri()]
+    assert (LINK in page.read_text(), page.stat().st_mode & 0o077) == (True, 0)
 
 
 @pytest.fixture

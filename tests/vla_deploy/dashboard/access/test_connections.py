@@ -2,26 +2,37 @@
 
 import asyncio
 import contextlib
+import errno
+import queue
 import select
 import socket
+import ssl
 import threading
 import time
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from fastapi import FastAPI
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from drivers.clock import MonotonicClock
-from vla_deploy.dashboard.access import UserRole, connections
-from vla_deploy.dashboard.access.connections import Connections
-from vla_deploy.dashboard.access.identity import Peer, peer_at
+from vla_deploy.dashboard import accepting, door_probe
+from vla_deploy.dashboard.access import UserRole
+from vla_deploy.dashboard.access.connections import ConnectionLimits, Connections, PeerGroup
+from vla_deploy.dashboard.access.identity import Peer, peer_at, unknown_user
+from vla_deploy.dashboard.access.read_turns import ReadTurns
 from vla_deploy.dashboard.access.session_expiry import CHECK_NS
+from vla_deploy.dashboard.api import operate
+from vla_deploy.dashboard.door_probe import DoorProbe
+from vla_deploy.dashboard.errors import AccessDenied
 from vla_deploy.dashboard.serving import HttpSocket, serve
 
 FAR = peer_at("192.168.1.7")
 HEAD_WITHIN_S = 0.3
+SMALL = {PeerGroup.NETWORK: 3, PeerGroup.LOOPBACK: 2, PeerGroup.SOCKET: 1}
+LIMITS = ConnectionLimits(most=SMALL, per_address=2)
 FAR_TOO_MUCH = 40 * 2**20  # what the kernel keeps for both ends is less
 
 
@@ -54,9 +65,10 @@ class Robot:
 
     def answer(self, sent):
         """Return what comes back until the other end hangs up."""
-        with self.call() as called:
+        with contextlib.suppress(ConnectionError), self.call() as called:
             called.sendall(sent)
             return until_closed(called)
+        return b""
 
     def until_held(self, count):
         for _ in range(500):
@@ -74,26 +86,36 @@ def until_closed(called):
     return data
 
 
+@contextlib.contextmanager
+def serving(app, listener, bounds, tls=None, press=lambda _: False):
+    """Serve an application in a thread; give the port."""
+    with listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        ended = threading.Event()
+        sockets = [HttpSocket(listener, tls)]
+        served = serve(app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds, press=press)
+        thread = threading.Thread(target=asyncio.run, args=(served,))
+        thread.start()
+        port = listener.getsockname()[1]
+        try:
+            yield port
+        finally:
+            ended.set()
+            thread.join()
+
+
 @pytest.fixture
 def robot(world):
-    made = world()
-    listener = socket.create_server(("127.0.0.1", 0))
-    bounds = Connections(3, 2, HEAD_WITHIN_S)
-    ended = threading.Event()
-    sockets = [HttpSocket(listener)]
-    serving = serve(made.app, sockets, Idle(), MonotonicClock(), ended.is_set, bounds)
-    thread = threading.Thread(target=asyncio.run, args=(serving,))
-    thread.start()
-    yield Robot(listener.getsockname()[1], bounds, made)
-    ended.set()
-    thread.join()
-    listener.close()
+    made, bounds = world(trust_loopback=True), Connections(LIMITS, HEAD_WITHIN_S)
+    with serving(made.app, socket.socket(), bounds) as port:
+        yield Robot(port, bounds, made)
 
 
 @pytest.fixture
 def from_afar(monkeypatch):
     """Every connection counts as one from another computer."""
-    monkeypatch.setattr(connections, "peer_of", lambda scope: FAR)
+    monkeypatch.setattr(accepting, "peer_at", lambda address: FAR)
 
 
 def test_who_sends_a_head_byte_by_byte_is_hung_up_on(robot):
@@ -173,12 +195,27 @@ def test_a_stop_whose_body_never_comes_is_pressed_at_once(robot):
         assert called.recv(65536).startswith(b"HTTP/1.1 200")
 
 
-def test_one_computer_takes_so_many_places_and_no_more(robot, from_afar):
-    with robot.call(), robot.call():
+SESSION = b"GET /api/v1/session HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
+
+
+def test_who_holds_every_place_and_says_nothing_keeps_nobody_out(robot):
+    with robot.call() as oldest, robot.call() as other:
         robot.until_held(2)
-        assert robot.answer(b"GET /api/v1/session HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n") == b""
+        assert b"200 OK" in robot.answer(SESSION)
+        assert until_closed(oldest) == b""
+        assert other.fileno() >= 0
+    assert robot.bounds.crowded_out == 1
+
+
+def test_one_address_takes_so_many_places_that_it_uses_and_no_more(robot, from_afar):
+    url = f"ws://127.0.0.1:{robot.port}/api/v1/echo"
+    with connect(url) as one, connect(url) as other:
+        assert robot.answer(SESSION) == b""
+        one.send("here")
+        assert one.recv() == "here"
+        other.close()
     robot.until_held(0)
-    assert b"200 OK" in robot.answer(b"GET /api/v1/session HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    assert b"200 OK" in robot.answer(SESSION)
 
 
 def test_a_websocket_keeps_its_place_until_it_is_closed(robot, from_afar):
@@ -210,21 +247,114 @@ def test_a_websocket_ends_with_the_token_that_opened_it(robot):
     assert closed.value.rcvd.code == 1008
 
 
-def test_this_computer_is_let_in_however_many_there_are():
-    bounds = Connections(3, 2)
-    by_socket = Peer(address="socket", is_loopback=False, is_socket=True)
-    for number in range(5):
-        bounds.enter(peer_at(f"10.0.0.{number}"))
-    assert not bounds.enter(peer_at("10.0.0.9"))
-    assert all(bounds.enter(peer) for peer in (peer_at("127.0.0.1"), peer_at("::1"), by_socket))
+def entered(bounds, *peers):
+    """Return for each peer whether there was room; each uses its place."""
+    found = []
+    for peer in peers:
+        slot = bounds.enter(peer, lambda: None)
+        found.append(slot is not None)
+        if slot is not None:
+            slot.is_waiting = False
+    return found
+
+
+def test_neither_network_nor_loopback_nor_socket_takes_the_places_of_another():
+    bounds, by_socket = Connections(LIMITS), Peer(address="", is_loopback=False, is_socket=True)
+    far = [peer_at(f"10.0.0.{number}") for number in range(4)]
+    assert entered(bounds, *far) == [True] * 3 + [False]
+    assert entered(bounds, *[peer_at("127.0.0.1")] * 3) == [True, True, False]
+    assert entered(bounds, by_socket, by_socket) == [True, False]
 
 
 def test_addresses_of_one_home_count_together():
-    bounds = Connections(10, 2)
-    assert [bounds.enter(peer_at(f"2001:db8::{number}")) for number in (1, 2, 3)] == [
-        True, True, False
-    ]  # fmt: skip
-    assert bounds.enter(peer_at("2001:db8:0:1::1"))
+    bounds = Connections(LIMITS)
+    homes = [peer_at(f"2001:db8::{number}") for number in (1, 2, 3)]
+    assert entered(bounds, *homes, peer_at("2001:db8:0:1::1")) == [True, True, False, True]
+
+
+def test_who_floods_gives_way_first():
+    bounds, dropped = Connections(LIMITS), []
+    for name in ("10.0.0.1", "10.0.0.2", "10.0.0.2", "10.0.0.3"):
+        assert bounds.enter(peer_at(name), lambda name=name: dropped.append(name)) is not None
+    assert dropped == ["10.0.0.2"]
+
+
+def test_with_few_files_to_open_there_are_fewer_places():
+    usual, few = ConnectionLimits.within(10_000), ConnectionLimits.within(144)
+    assert [usual.most[group] for group in PeerGroup] == [256, 256, 64]
+    assert [few.most[group] for group in PeerGroup] == [64, 64, 16]
+
+
+def test_unfinished_tls_handshakes_count_and_end(world, monkeypatch):
+    monkeypatch.setattr(accepting, "HANDSHAKE_WITHIN_S", 0.3)
+    bounds, tls = Connections(LIMITS), ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    with serving(world().app, socket.socket(), bounds, tls) as port, contextlib.ExitStack() as held:
+        clients = [
+            held.enter_context(socket.create_connection(("127.0.0.1", port), timeout=10))
+            for _ in range(3)
+        ]
+        assert [until_closed(client) for client in clients] == [b"", b"", b""]
+        assert bounds.crowded_out == 1
+        robot = Robot(port, bounds, None)
+        robot.until_held(0)
+
+
+def test_the_dashboard_asks_itself_through_its_own_door(world, hand_clock, monkeypatch):
+    monkeypatch.setattr(door_probe, "WITHIN_S", 0.1)
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        probe = DoorProbe(deaf, is_tls=False, clock=hand_clock)
+        hand_clock.pass_s(door_probe.SILENT_S + 1)
+        asyncio.run(probe.ask())
+        assert probe.is_silent
+    monkeypatch.setattr(door_probe, "WITHIN_S", 10.0)
+    listener = socket.socket()
+    with serving(answering_health(), listener, Connections(LIMITS)):
+        probe = DoorProbe(listener, is_tls=False, clock=hand_clock)
+        hand_clock.pass_s(door_probe.SILENT_S + 1)
+        asyncio.run(probe.ask())
+        assert not probe.is_silent
+
+
+def answering_health():
+    app = FastAPI()
+
+    @app.get("/healthz")
+    async def healthz() -> None:
+        return None
+
+    return app
+
+
+class Exhausted(socket.socket):
+    """A listener of a process that may open no more files, until `is_over`."""
+
+    is_over = threading.Event()
+    asked = 0
+
+    def accept(self):
+        if not self.is_over.is_set():
+            Exhausted.asked += 1
+            raise OSError(errno.EMFILE, "Too many open files")
+        return super().accept()
+
+
+def test_without_a_file_left_it_rests_instead_of_spinning_and_goes_on_after(world, caplog):
+    Exhausted.is_over.clear()
+    with (
+        serving(world().app, Exhausted(), Connections(LIMITS)) as port,
+        socket.create_connection(("127.0.0.1", port), timeout=10) as called,
+    ):
+        called.sendall(SESSION)
+        called.settimeout(2.5 * accepting.PAUSE_S)
+        with pytest.raises(TimeoutError):
+            called.recv(1)
+        Exhausted.is_over.set()
+        called.settimeout(10)
+        assert b"200 OK" in until_closed(called)
+    assert 1 <= Exhausted.asked <= 4
+    assert [one.message.partition(":")[0] for one in caplog.records] == [
+        f"no connection is accepted for {accepting.PAUSE_S} s at a time"
+    ]
 
 
 def test_a_client_that_pings_without_end_and_reads_nothing_is_not_heard_without_end(robot):
@@ -240,3 +370,87 @@ def test_a_client_that_pings_without_end_and_reads_nothing_is_not_heard_without_
         while select.select([], [called], [], 0.5)[1] and taken < FAR_TOO_MUCH:
             taken += called.send(500 * ping)
         assert taken < FAR_TOO_MUCH
+
+
+WHY = b'{"reason": "it smokes"}'
+STOP_WHY = (
+    b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n" % len(WHY)
+) + WHY
+STOP = b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
+
+
+def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_room(world):
+    entered, goes_on, reasons = threading.Event(), threading.Event(), queue.Queue()
+    app = FastAPI()
+
+    def press(reason):
+        reasons.put(reason)
+        return True
+
+    @app.get("/slow")
+    async def slow() -> None:
+        entered.set()
+        await asyncio.to_thread(goes_on.wait)
+
+    bounds = Connections(LIMITS)
+    with serving(app, socket.socket(), bounds, press=press) as port:
+        robot = Robot(port, bounds, None)
+        with robot.call() as one, robot.call() as other:
+            for called in (one, other):
+                called.sendall(b"GET /slow HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert entered.wait(10)
+            robot.until_held(2)
+            one.sendall(STOP)  # on a connection that waits for an answer
+            assert reasons.get(timeout=10) == ""
+            assert robot.answer(STOP_WHY) == b""  # there is no room for a third
+            assert reasons.get(timeout=10) == "it smokes"
+            goes_on.set()
+
+
+@pytest.mark.parametrize("went_ahead", [True, False])
+def test_a_press_that_went_ahead_is_not_pressed_again_by_its_route(went_ahead):
+    pressed = []
+
+    class Link:
+        def operate(self, act, reason):
+            pressed.append((act, reason))
+
+    app = FastAPI()
+    app.state.link = Link()
+    app.include_router(operate.router, prefix="/api/v1")
+
+    @app.middleware("http")
+    async def known(request, call_next):
+        request.state.identity = unknown_user("127.0.0.1")
+        return await call_next(request)
+
+    with serving(app, socket.socket(), Connections(LIMITS), press=lambda _: went_ahead) as port:
+        assert b"200 OK" in Robot(port, None, None).answer(
+            STOP.replace(b"Host", b"Connection: close\r\nHost")
+        )
+    assert pressed == ([] if went_ahead else [("estop", "")])
+
+
+def test_reads_take_turns_and_a_client_that_takes_nothing_keeps_none():
+    async def reads() -> list[Any]:
+        turns, sent, came = ReadTurns(at_once=1, most_waiting=1), [], []
+
+        async def send(message):
+            sent.append(message)
+
+        async def wait():
+            async with turns.turn(send):
+                came.append("second")
+
+        async with turns.turn(send) as first:
+            waiting = asyncio.create_task(wait())
+            await asyncio.sleep(0)
+            with pytest.raises(AccessDenied, match="too many reads"):
+                async with turns.turn(send):
+                    pass
+            came.append("first")
+            await first.send({"type": "http.response.start"})
+            await waiting  # though the first answer is still being sent
+        return came
+
+    assert asyncio.run(reads()) == ["first", "second"]

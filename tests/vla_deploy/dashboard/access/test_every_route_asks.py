@@ -13,6 +13,7 @@ OPEN = {
     "/healthz",
     f"{API_PREFIX}/session",
     f"{API_PREFIX}/login",
+    f"{API_PREFIX}/login/code",
     f"{API_PREFIX}/logout",
     f"{API_PREFIX}/stop",
 }

@@ -8,8 +8,16 @@ def code(response):
     return response.json()["error"]["code"]
 
 
-def test_who_sits_at_the_robot_is_its_admin(world):
-    told = world().client().get(STATE).json()
+def test_a_user_of_this_computer_is_unknown_like_any_other(world):
+    client = world().client()
+    refused = client.get(STATE)
+    assert (refused.status_code, code(refused)) == (401, "login_needed")
+    assert client.post("/api/v1/profile", json={}).status_code == 401
+    assert client.post(STOP).json()["pressed_by"] == "anyone"
+
+
+def test_where_the_settings_trust_loopback_all_of_this_computer_are_admins(world):
+    told = world(trust_loopback=True).client().get(STATE).json()
     assert told == {"user": "local", "role": "admin", "way": "loopback"}
 
 
@@ -21,11 +29,7 @@ def test_whoever_comes_from_elsewhere_logs_in_first(world):
 
 @pytest.mark.parametrize("name", ["forwarded", "x-forwarded-for", "via", "x-real-ip"])
 def test_what_a_proxy_on_this_computer_passes_on_is_not_believed(world, name):
-    assert world().client().get(STATE, headers={name: "1"}).status_code == 401
-
-
-def test_loopback_counts_for_nothing_where_the_settings_say_so(world):
-    assert world(trust_loopback=False).client().get(STATE).status_code == 401
+    assert world(trust_loopback=True).client().get(STATE, headers={name: "1"}).status_code == 401
 
 
 def test_a_name_that_only_resolves_to_the_robot_is_refused(world):
@@ -46,13 +50,13 @@ def test_no_other_page_changes_anything(world, origin):
 
 
 def test_the_own_page_does(world):
-    client = world().client()
+    client = world(trust_loopback=True).client()
     asked = {"origin": "http://127.0.0.1:8088"}
     assert client.post("/api/v1/commands", json={}, headers=asked).json()["user"] == "local"
 
 
 def test_a_proxys_page_does_where_the_settings_name_it(world):
-    client = world(origins=("https://robot.example",)).client()
+    client = world(origins=("https://robot.example",), trust_loopback=True).client()
     asked = {"origin": "https://robot.example"}
     assert client.post("/api/v1/commands", json={}, headers=asked).status_code == 200
 
@@ -64,7 +68,7 @@ def test_no_other_page_reads_anything_where_browsers_tell_the_site(world):
 
 def test_a_link_from_another_site_opens_the_page(world):
     asked = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
-    assert world().client().get(STATE, headers=asked).status_code == 200
+    assert world(trust_loopback=True).client().get(STATE, headers=asked).status_code == 200
 
 
 def test_no_other_page_opens_a_websocket(world):
@@ -81,7 +85,7 @@ def test_no_other_page_opens_a_websocket(world):
 def test_the_own_page_opens_a_websocket(world):
     asked = {"origin": "http://127.0.0.1:8088"}
     url = LIVE.format("127.0.0.1")
-    with world().client().websocket_connect(url, headers=asked) as socket:
+    with world(trust_loopback=True).client().websocket_connect(url, headers=asked) as socket:
         assert socket.receive_json() == {"user": "local"}
 
 
@@ -119,7 +123,7 @@ def test_nothing_that_is_wrong_with_a_press_refuses_the_stop(world, body, asked)
 
 
 def test_a_stop_carries_its_reason(world):
-    pressed = world().client().post(STOP, json={"reason": "it smokes"})
+    pressed = world(trust_loopback=True).client().post(STOP, json={"reason": "it smokes"})
     assert pressed.json() == {"pressed_by": "local", "reason": "it smokes"}
 
 
@@ -165,7 +169,7 @@ def test_a_stranger_is_slowed_down(world):
 
 
 def test_one_who_is_slowed_down_does_not_hold_up_another(world):
-    made = world()
+    made = world(trust_loopback=True)
     slow = made.client("192.168.1.7")
     while slow.post("/api/v1/commands", json={}).status_code != 429:
         pass

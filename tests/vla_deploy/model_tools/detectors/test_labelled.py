@@ -126,10 +126,16 @@ def test_a_coco_file_is_read_by_the_names_of_its_categories(tmp_path, image, fol
             "bbox: expected left, top, width, height, got [5, 5, 0, 1]",
         ),
         ({"images": [{"id": 7, "file_name": "c.png"}]}, "image 'c.png' is neither "),
-        ({"images": [{"id": 7, "file_name": 7}]}, "images[0].file_name: expected a text, got 7"),
+        (
+            {"images": [{"id": 7, "file_name": 7}]},
+            "images[0].file_name: expected a text of one line, got 7",
+        ),
         ({"images": [{"id": [7], "file_name": "a.png"}]}, "images[0].id: expected a number or a"),
         ({"categories": [{"id": [3], "name": "cup"}]}, "categories[0].id: expected a number or a"),
-        ({"categories": [{"id": 3, "name": ["cup"]}]}, "categories[0].name: expected a text, got"),
+        (
+            {"categories": [{"id": 3, "name": ["cup"]}]},
+            "categories[0].name: expected a text of one line, got",
+        ),
         (
             {"annotations": [{"image_id": [7], "category_id": 3, "bbox": [5, 5, 1, 1]}]},
             "annotations[0].image_id: expected a number or a text, got [7]",

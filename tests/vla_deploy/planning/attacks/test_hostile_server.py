@@ -26,6 +26,7 @@ connect_timeout_s = 2.0
 read_timeout_s = 1.0
 total_timeout_s = 4.0
 max_calls_per_minute = 1000
+trust_plans = true
 """
 PROFILE: Final = """inherits = "desktop"
 [planning]

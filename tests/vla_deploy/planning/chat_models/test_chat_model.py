@@ -70,14 +70,18 @@ def said(loopback, number: int = -1) -> str:
     return content if isinstance(content, str) else content[-1]["text"]
 
 
-@pytest.mark.parametrize(("confidence", "is_unsure"), [(0.95, False), (0.4, True)])
-def test_the_answer_is_the_plan(loopback, served, ask, confidence, is_unsure):
+@pytest.mark.parametrize(
+    ("trusted", "confidence", "is_unsure"),
+    [(True, 0.95, False), (True, 0.4, True), (False, 1, True)],
+)
+def test_the_answer_is_the_plan(loopback, served, ask, trusted, confidence, is_unsure):
+    """How sure a server is, is its own claim: until its owner trusts it, a person agrees first."""
     loopback.then(loopback.says(answer(GO, confidence=confidence)))
-    back_end = served()
+    back_end = served(trust_plans=trusted)
     proposal = back_end.propose(ask(TIDY), within())
     assert places_of(proposal) == ["kitchen"]
     assert proposal.back_end == "server bench"
-    assert (proposal.confidence, proposal.is_unsure) == (confidence, is_unsure)
+    assert (proposal.confidence, proposal.is_read_back) == (confidence, is_unsure)
     told = back_end.document()
     assert (told["tokens_in"], told["tokens_out"], told["answers"]) == (11, 7, 1)
     assert len(loopback.heard) == 1
@@ -217,3 +221,8 @@ def test_the_picture_is_shown_to_a_model_that_sees_and_may(loopback, served, ask
     assert "The image shows what the robot sees now" in body
     remote = served(vision=True, location="remote", allow_text_off_robot=True)
     assert remote.uses == {Aid.MEMORY}
+
+
+def test_of_a_server_that_is_not_trusted_words_alone_need_no_yes(loopback, served, ask):
+    loopback.then(loopback.says(answer({"skill": "speak", "text": "hello"})))
+    assert not served().propose(ask("greet us"), within()).is_read_back
