@@ -18,7 +18,7 @@ from drivers.dynamixel.tools.bench import DynamixelBench
 from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
-from drivers.servo.joint_servo import JointServo
+from drivers.servo.joint_servo import JointServo, WheelLimits
 
 HOLD_GAINS: Final = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
 """Written whenever a servo is powered, since a reboot forgets them.
@@ -78,12 +78,15 @@ class DynamixelFamily:
         offset_rad: float,
         travel_per_rad: float,
         goal_range: tuple[float, float] | None = None,
+        wheel: WheelLimits | None = None,
     ) -> ServoSpec:
-        """Declare a servo.
+        """Declare a servo; this driver lets none turn a wheel.
 
         Raises:
-            ValueError: a value is out of its range.
+            ValueError: a value is out of its range, or it is to turn a wheel.
         """
+        if wheel is not None:
+            raise ValueError(f"servo {servo_id} ({joint}): this driver turns no wheels")
         return ServoSpec(
             id=servo_id,
             model_name=model_name,

@@ -40,6 +40,7 @@ from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
+from vla_deploy.robots.servos import wheel_checks
 from vla_deploy.robots.ros_settings import ROS, RosSettings
 from vla_deploy.robots.twin_settings import twin_settings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
@@ -56,6 +57,7 @@ SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
     "servo_bus.servos": schema.SERVO,
     "servo_bus.shadows": schema.SERVO,
+    "servo_bus.wheels": schema.WHEEL,
     "servo_bus.supplies": schema.SUPPLY,
     "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,
@@ -182,7 +184,10 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     yield from check_record(document, "", schema.ROBOT)
     yield from check_tables(document, SHAPES)
     yield from missing_files(document, directory)
-    for check in (*CHECKS, *supplies.CHECKS, *protection_schema.CHECKS, *home_devices.CHECKS):
+    for check in (
+        *(*CHECKS, *supplies.CHECKS, *wheel_checks.CHECKS),
+        *(*protection_schema.CHECKS, *home_devices.CHECKS),
+    ):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
@@ -238,7 +243,7 @@ def _parts(document: Document, directory: Path, camera: CameraDescription | None
         return make(document[key]) if key in document else None
 
     return RobotParts(
-        base=made("base", lambda row: BaseGeometry(**row)),
+        base=made("base", lambda row: build(BaseGeometry, row)),
         can_bus=made("can_bus", lambda row: _can_bus(row, directory)),
         lidar=made("lidar", lambda row: SerialSensor(**row)),
         imu=made("imu", lambda row: SerialSensor(**row)),

@@ -45,11 +45,12 @@ def retuned(robot: RobotDescription, before: Profile, after: Profile) -> Tuning:
 
 def _refuse_busy_bus(robot: RobotDescription, profile: Profile) -> None:
     bus = robot.servo_bus
-    limit_hz = _MAX_BUS_RATIO * bus.baud / (_WIRE_BITS * len(bus.servos))
+    count = len(bus.all_servos)
+    limit_hz = _MAX_BUS_RATIO * bus.baud / (_WIRE_BITS * count)
     if profile.control_rate_hz > limit_hz:
         raise ProfileError(
             (
-                f"control_rate_hz: expected at most {limit_hz:.0f} Hz, for {len(bus.servos)} "
+                f"control_rate_hz: expected at most {limit_hz:.0f} Hz, for {count} "
                 f"servos at {bus.baud} baud, got {profile.control_rate_hz:g}",
             )
         )

@@ -15,7 +15,7 @@ from vla_deploy.telemetry.schemas.foxglove_json import Json
 
 JOINT_TOPIC: Final = "joint_state"
 _JOINT_COUNT: Final = "joint_count"
-_SENT: Final = ("sent", "sent_v_m_s", "sent_w_rad_s")
+_SENT: Final = ("sent", "sent_v_m_s", "sent_w_rad_s", "sent_left_m_s")
 DOCUMENT_NUMBERS: Final[Mapping[str, tuple[str, ...]]] = {
     "control_status": (
         "period_s",
