@@ -117,11 +117,13 @@ class LockstepControl(RobotUnderTest):
     def _base_command(self) -> CellWriter:
         return self.space.cell_writer(topics.BASE_COMMAND)
 
-    def drive_for(self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0) -> None:
+    def drive_for(
+        self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0, left_m_s: float = 0.0
+    ) -> None:
         """Drive for a time, past the executor: control wants its commands again and again."""
         end_s = self.lockstep.now_s + duration_s
         while self.lockstep.now_s < end_s - 1e-9:
-            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
+            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s, left_m_s=left_m_s)
             self.lockstep.run_for(min(_COMMAND_S, end_s - self.lockstep.now_s))
 
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
@@ -293,7 +295,7 @@ def lockstep_robot(
     if takes_all:
         return LockstepStack(tmp_path, seed, robot=robot)
     control = LockstepControl(tmp_path, seed, robot=robot)
-    if control.robot.parts.base is not None:
+    if control.robot.parts.lidar is not None:
         control.add_senses()
     return control
 

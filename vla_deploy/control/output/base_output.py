@@ -35,4 +35,4 @@ class BaseOutput:
     def _command(self) -> None:
         if not self._wheels.enabled:
             self.ramp.halt()
-        self._wheels.cycle(self.ramp.velocity)
+        self._wheels.cycle(*self.ramp.velocity)
