@@ -24,7 +24,7 @@ class PoseTracker:
             MapInvalid: the robot file's map cannot be used.
         """
         lidar = lidar_place(robot, model)
-        self.localiser = Localiser(_start_pose(robot, space), load_map(robot.home.map_path), lidar)
+        self.localiser = Localiser(start_pose(robot, space), load_map(robot.home.map_path), lidar)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
         self._base_stamp_ns = -1
@@ -74,6 +74,7 @@ def lidar_place(robot: RobotDescription, model: RobotModel) -> Pose2D:
     return Pose2D(float(x_m), float(y_m), 0.0)
 
 
-def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+def start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+    """Return where an earlier instance in this run ended, else where the robot is switched on."""
     last = space.cell_reader(topics.POSE).latest()
     return robot.start_pose if last is None else Pose2D.of(last.data)

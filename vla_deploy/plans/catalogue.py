@@ -76,6 +76,8 @@ class SkillSpec:
     one_of: tuple[tuple[str, ...], ...] = ()
     resources: tuple[str, ...] = ()
     may_lack: frozenset[str] = frozenset()
+    finds_way: bool = False
+    """It takes a map, and a lidar to know the place on it."""
     own_timeout_s: float | None = None
     estimated_duration_s: float = 1.0
     retryable: bool = False
@@ -118,6 +120,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             estimated_duration_s=15.0,
             retryable=True,
         ),
@@ -126,6 +129,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="drive to the charging station, and see that the battery charges there",
             parameters={"place": SkillParameter(type=Type.PLACE, required=False)},
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             estimated_duration_s=20.0,
             retryable=True,
         ),

@@ -163,6 +163,10 @@ MOUNT: Final[Mapping[str, Place]] = MappingProxyType(
     }
 )
 """What a robot without a base stands on, whatever people call it."""
+FLOOR: Final[Mapping[str, Place]] = MappingProxyType(
+    {"floor": Place(name="floor", pose=_HERE, aliases=("ground",), viewpoints=(_HERE,))}
+)
+"""Where a robot works that drives, but has no map of where."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -337,8 +341,15 @@ class RobotDescription:
 
     @property
     def places(self) -> Mapping[str, Place]:
-        """Return the named places: those of its home, or what it is mounted on."""
-        return self.parts.home.places if self.parts.home else MOUNT
+        """Return the named places: those of its home, else the floor, or what it is mounted on."""
+        if self.parts.home is not None:
+            return self.parts.home.places
+        return MOUNT if self.parts.base is None else FLOOR
+
+    @property
+    def finds_its_way(self) -> bool:
+        """Return whether it knows its place on a map, and so can be sent to a place."""
+        return self.parts.base is not None and self.parts.home is not None
 
     @property
     def start_pose(self) -> Pose2D:
