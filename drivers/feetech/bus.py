@@ -31,9 +31,10 @@ class FeetechBus:
     transport and a new bus, and connect.
 
     These servos have **no bus watchdog**: when the host or the cable dies they keep their torque
-    and go on to their last goal, and wheels go on turning. Who opens the bus must not send goals that are far ahead. In
-    `state.watchdog` stands 1 for each servo that holds because this bus has told it to, 0 for those
-    that were found holding: what another program wrote to them is not known.
+    and go on to their last goal, and wheels go on turning. Who opens the bus must not send goals
+    that are far ahead. In `state.watchdog` stands 1 for each servo that holds because this bus has
+    told it to, 0 for those that were found holding: what another program wrote to them is not
+    known.
     """
 
     def __init__(

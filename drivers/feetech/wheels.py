@@ -1,4 +1,4 @@
-"""Tell servos in velocity mode how fast to turn the wheels; in doubt, not at all."""
+"""Send servos in velocity mode how fast to turn the wheels; in doubt, not at all."""
 
 from collections.abc import Collection, Sequence
 from typing import Final
@@ -46,7 +46,7 @@ class FeetechWheels:
             self._link.write_each(self._servos, _SPEED, values)
 
     def halt(self) -> None:
-        """Tell all wheels to stand still, whoever hears it; nobody answers.
+        """Send every wheel the speed zero; nobody answers.
 
         Raises:
             LinkLost: the adapter is gone.
@@ -55,7 +55,7 @@ class FeetechWheels:
             self._link.write_each(self._servos, _SPEED, [0] * len(self._servos))
 
     def confirm_halt(self) -> None:
-        """Tell all wheels to stand still, and read back that they have heard it.
+        """Send every wheel the speed zero, and read back that it holds it.
 
         Raises:
             NotKept: a wheel holds another speed.

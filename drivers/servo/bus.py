@@ -28,7 +28,8 @@ class ServoBusDriver(Protocol):
     def connect(self, *, thorough: bool = True) -> object:
         """Check that every servo is the declared one and set it up; torque is left as it is.
 
-        Wheels are told to stand still, first of all. Unless `thorough` it ends with the first silent servo.
+        Wheels are told to stand still, first of all. Unless `thorough` it ends with the first
+        silent servo.
 
         Raises:
             DriverError: a servo is silent or not as declared, or the adapter is unfit.

@@ -40,8 +40,8 @@ from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
 from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
-from vla_deploy.robots.servos import wheel_checks
 from vla_deploy.robots.ros_settings import ROS, RosSettings
+from vla_deploy.robots.servos import wheel_checks
 from vla_deploy.robots.twin_settings import twin_settings
 from vla_deploy.runtime.table_schema import Shape, TableFault, build, check_record, check_tables
 

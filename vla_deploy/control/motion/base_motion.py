@@ -62,9 +62,7 @@ class BaseRamp:
         """Return whether the commanded velocity is zero."""
         return self.velocity == STANDING
 
-    def advance(
-        self, v_m_s: float, w_rad_s: float, period_s: float, left_m_s: float = 0.0
-    ) -> None:
+    def advance(self, v_m_s: float, w_rad_s: float, period_s: float, left_m_s: float = 0.0) -> None:
         """Move towards a wanted velocity for one period; all parts reach it together."""
         limits = self._limits
         speed_m_s = hypot(v_m_s, left_m_s)

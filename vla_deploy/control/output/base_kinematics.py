@@ -32,7 +32,9 @@ class DifferentialDrive:
     wheel_radius_m: float
     track_m: float
 
-    def wheel_speeds(self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0) -> tuple[float, ...]:
+    def wheel_speeds(
+        self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0
+    ) -> tuple[float, ...]:
         """Return left and right wheel speed in rad/s; sideways it cannot go."""
         turn = 0.5 * self.track_m * w_rad_s
         return (v_m_s - turn) / self.wheel_radius_m, (v_m_s + turn) / self.wheel_radius_m
@@ -57,9 +59,11 @@ class OmniDrive:
         rows = [(-sin(one), base_radius_m, cos(one)) for one in bearings_rad]
         matrix = np.array(rows) / wheel_radius_m
         self._rows = _plain(matrix)
-        self._inverse = _plain(np.linalg.pinv(matrix))
+        self._inverse = _plain(np.linalg.pinv(matrix).astype(np.float64))
 
-    def wheel_speeds(self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0) -> tuple[float, ...]:
+    def wheel_speeds(
+        self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0
+    ) -> tuple[float, ...]:
         """Return each wheel's speed in rad/s for a base velocity."""
         return tuple(a * v_m_s + b * w_rad_s + c * left_m_s for a, b, c in self._rows)
 

@@ -41,9 +41,9 @@ class WheelServoFault:
 class ServoDrives:
     """Keep the contract of a bus of wheel drives by servos in velocity mode.
 
-    The line's own read in each tick brings their state, and its reopening brings them back, standing
-    still. **They do not stop by themselves when the calls of `cycle` stop**, which the contract asks
-    for: servos without a bus watchdog go on turning (docs/safety.md).
+    The line's own read in each tick brings their state, and its reopening brings them back at
+    rest. **They do not stop by themselves when the calls of `cycle` stop**, which the contract
+    asks for: servos without a bus watchdog go on turning (docs/safety.md).
     """
 
     def __init__(self, line: ServoLine, clock: Clock) -> None:
@@ -128,7 +128,9 @@ class ServoDrives:
         """Begin to power the wheels, one in each cycle; each begins at rest."""
         self._goal = DriveGoal.ENABLED
         powered = self._line.wheels.torque_on
-        self._waking = [row for row, on in zip(self._line.wheel_rows, powered, strict=True) if not on]
+        self._waking = [
+            row for row, on in zip(self._line.wheel_rows, powered, strict=True) if not on
+        ]
 
     def disable(self) -> None:
         """Take the power off all wheels."""
@@ -153,7 +155,9 @@ class ServoDrives:
         """Reboot the servos that report an error; they come back without power."""
         self._goal = DriveGoal.FAULT_RESET
         line = self._line
-        faulted = [row for row, bits in zip(line.wheel_rows, line.wheels.error, strict=True) if bits]
+        faulted = [
+            row for row, bits in zip(line.wheel_rows, line.wheels.error, strict=True) if bits
+        ]
         return () if line.reboot(faulted) else (line.failure,)
 
     def close(self) -> None:
@@ -170,7 +174,7 @@ class ServoDrives:
             self._line.remove_power(self._line.wheel_rows)
 
     def _wake_next(self) -> None:
-        """Power one wheel; one that refuses is tried again until whoever asked gives up."""
+        """Power one wheel; one that refuses is tried again, as long as the base is to be driven."""
         if not self._waking:
             return
         row = self._waking.pop(0)
@@ -180,7 +184,9 @@ class ServoDrives:
 
     def _silent(self) -> list[str]:
         ages_s = self._line.wheels.age_s
-        return [name for name, age in zip(self._line.wheel_names, ages_s, strict=True) if age > SILENT_S]
+        return [
+            name for name, age in zip(self._line.wheel_names, ages_s, strict=True) if age > SILENT_S
+        ]
 
     def _state(self) -> DriveState:
         wheels = self._line.wheels

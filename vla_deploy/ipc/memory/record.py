@@ -25,7 +25,7 @@ class Scratch:
         self._may_lack = {field.name: 0 for field in topic.fields if field.may_lack}
 
     def fill(self, fields: Mapping[str, Any]) -> None:
-        """Set every field, one that may lack to zero where it does; a shorter array leaves zeros behind it.
+        """Set every field; what is not given of one that may lack, and of an array, is zero.
 
         Raises:
             BadPayload: a field is missing, unknown, or does not fit its declaration.

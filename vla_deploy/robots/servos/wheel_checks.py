@@ -73,9 +73,9 @@ def _bearings_span_the_floor(bearings: object, count: int) -> Iterator[TableFaul
     if bearings is not None and not given:
         return  # the schema says so
     spanned = np.array([(-sin(one), cos(one), 1.0) for one in given]).reshape(-1, 3)
-    if len(given) == count and count >= 3:
-        if np.linalg.svd(spanned, compute_uv=False)[-1] >= _LEAST_LEVERAGE:
-            return
+    is_spanned = len(given) >= 3 and np.linalg.svd(spanned)[1][-1] >= _LEAST_LEVERAGE
+    if is_spanned and len(given) == count:
+        return
     yield TableFault(
         key="base.wheel_bearings_rad",
         got=repr(bearings) if given else "nothing",
