@@ -104,8 +104,8 @@ class TickPlotter:
             yield curve(f"{TICKS}/period_s", (now_ns - before[1]) / NS_PER_S)
         yield curve(f"{TICKS}/speed_ratio", row["verdict"].speed_ratio)
         for name in _SENT:
-            if row[name] is not None:
-                yield curve(f"{TICKS}/{name}", _plain(row[name]))
+            if (value := row.get(name)) is not None:  # an older version sent less
+                yield curve(f"{TICKS}/{name}", _plain(value))
 
 
 def _plain(value: Any) -> Any:
