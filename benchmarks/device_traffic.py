@@ -10,8 +10,8 @@ from drivers.imu.bno085_rvc import Bno085Rvc
 from drivers.lidar.ld19 import Ld19
 from platforms import load_profile
 from sim_twin.harness.lockstep import Lockstep
+from vla_deploy.control.output.base_drive import can_wheels
 from vla_deploy.control.output.servos import ServoLine
-from vla_deploy.control.output.wheels import Wheels
 
 PERIOD_S: Final = 0.004
 _SENSORS_EVERY: Final = 5
@@ -38,7 +38,7 @@ class DeviceTraffic:
         profile = load_profile(lockstep.context.profile)
         self._clock = clock
         self._servos = ServoLine(robot, profile, devices, clock)
-        self._wheels = Wheels(robot, profile, devices, clock)
+        self._wheels = can_wheels(robot, profile, devices, clock)
         self._lidar = Ld19(devices.serial(robot.lidar.device), clock)
         self._imu = Bno085Rvc(devices.serial(robot.imu.device), clock)
         self._low, self._high = robot.position_min, robot.position_max

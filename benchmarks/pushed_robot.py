@@ -23,7 +23,8 @@ from sim_twin.ports.lines import MemoryLine
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses
-from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.output.base_kinematics import base_kinematics
+from vla_deploy.control.output.odometry import Odometry
 from vla_deploy.navigation.follower import AT_REST, DriveLimits, FollowerPhase, PathFollower, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
@@ -66,9 +67,7 @@ class PushedRobot:
             self._put(name, placed.position_m, placed.yaw_rad)
         self._random = np.random.default_rng(seed)
         self._slip_ratio, self._slip_change = slip_ratio, np.zeros(2)
-        drive = DifferentialDrive(
-            wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
-        )
+        drive = base_kinematics(robot.base)
         self._drive, self._odometry = drive, Odometry(drive)
         self._wheels_rad = np.zeros(2)
         self._odometry.update(0.0, 0.0)

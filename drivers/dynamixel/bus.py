@@ -26,7 +26,7 @@ from drivers.errors import DriverError
 from drivers.servo.counters import BusCounters
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.journal import BusJournal
-from drivers.servo.members import BusMembers
+from drivers.servo.members import BusMembers, require_goals
 from drivers.servo.state import BusState
 
 
@@ -156,6 +156,14 @@ class DynamixelBus:
         """
         cycle = self._cycle or self._connected()
         cycle.goals.write(position_rad)
+
+    def write_speeds(self, speed_rad_s: NDArray[np.float64]) -> None:
+        """Do nothing: no servo of this bus turns a wheel.
+
+        Raises:
+            ValueError: there is a speed.
+        """
+        require_goals((), speed_rad_s)
 
     @property
     def sent_goals(self) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from drivers.dynamixel.torque import HOLD_GAINS
 from drivers.dynamixel.wire.codec import MAX_SERVO_ID
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
-from drivers.servo.joint_servo import JointServo
+from drivers.servo.joint_servo import JointServo, WheelLimits
 
 FULL_DUTY_ERROR_RAD: Final = PWM_FULL * 128.0 / HOLD_GAINS["position_p_gain"] * PULSE_RAD
 """e-manual: duty in PWM units is the error in pulses times P / 128."""
@@ -76,12 +76,15 @@ class DynamixelFamily:
         offset_rad: float,
         travel_per_rad: float,
         goal_range: tuple[float, float] | None = None,
+        wheel: WheelLimits | None = None,
     ) -> ServoSpec:
-        """Declare a servo.
+        """Declare a servo; this driver lets none turn a wheel.
 
         Raises:
-            ValueError: a value is out of its range.
+            ValueError: a value is out of its range, or it is to turn a wheel.
         """
+        if wheel is not None:
+            raise ValueError(f"servo {servo_id} ({joint}): this driver turns no wheels")
         return ServoSpec(
             id=servo_id,
             model_name=model_name,

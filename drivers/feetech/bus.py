@@ -15,6 +15,7 @@ from drivers.feetech.link import FeetechLink
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.settings import FeetechSetup, set_up_all
 from drivers.feetech.torque import switch_torque_off, switch_torque_on
+from drivers.feetech.wheels import FeetechWheels
 from drivers.servo.counters import BusCounters
 from drivers.servo.fault_policy import FaultPolicy
 from drivers.servo.journal import BusJournal
@@ -30,9 +31,10 @@ class FeetechBus:
     transport and a new bus, and connect.
 
     These servos have **no bus watchdog**: when the host or the cable dies they keep their torque
-    and go on to their last goal. Who opens the bus must not send goals that are far ahead. In
-    `state.watchdog` stands 1 for each servo that holds because this bus has told it to, 0 for those
-    that were found holding: what another program wrote to them is not known.
+    and go on to their last goal, and wheels go on turning. Who opens the bus must not send goals
+    that are far ahead. In `state.watchdog` stands 1 for each servo that holds because this bus has
+    told it to, 0 for those that were found holding: what another program wrote to them is not
+    known.
     """
 
     def __init__(
@@ -51,17 +53,20 @@ class FeetechBus:
         A `fault_policy` that outlives the bus remembers its reboots when the bus is opened anew.
 
         Raises:
-            ValueError: no servo, an id or joint twice, or servos of both byte orders.
+            ValueError: no joint, an id or joint twice, a wheel before a joint, or servos of both
+                byte orders.
         """
         self._members = BusMembers(servos)
         _check_byte_order(servos)
         self.servos = tuple(servos)
+        self._joint_count = _count_joints(servos)
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
         self.journal = BusJournal(self.servos, self.state, fault_policy or FaultPolicy())
         self._margin_s = reply_margin_s
         self._health_every_cycles = health_every_cycles
         self._link = FeetechLink(transport, clock, baud, self.counters)
+        self._wheels = FeetechWheels(self._link, self.servos[self._joint_count :])
         self._cycle: FeetechCycle | None = None
         self._setups: list[FeetechSetup] = []
 
@@ -70,6 +75,7 @@ class FeetechBus:
     def connect(self, *, thorough: bool = True) -> list[FeetechSetup]:
         """Check that every servo is the declared one and set it up; torque is left as it is.
 
+        Wheels, which may turn since somebody else was here, are told to stand still, first of all.
         Unless `thorough` it ends with the first silent servo.
 
         Raises:
@@ -79,7 +85,9 @@ class FeetechBus:
             NotKept: a servo does not keep a setting.
             LinkLost: the adapter is gone.
         """
+        self._wheels.halt()
         self._setups = set_up_all(self._link, self.servos, thorough=thorough)
+        self._wheels.confirm_halt()
         self.state.torque_on[:] = [setup.torque_on for setup in self._setups]
         self.state.error[:] = [setup.error for setup in self._setups]
         self._cycle = FeetechCycle(
@@ -113,7 +121,7 @@ class FeetechBus:
         return self.state
 
     def write_goals(self, position_rad: NDArray[np.float64]) -> None:
-        """Send a goal to every servo, rounded to pulses and clamped; see `sent_goals`.
+        """Send a goal to every joint's servo, rounded to pulses and clamped; see `sent_goals`.
 
         One that has not answered for 50 ms gets none until it has been read again: it would go to
         where nobody knows how far it is.
@@ -125,6 +133,19 @@ class FeetechBus:
         """
         cycle = self._connected()
         cycle.goals.write(position_rad, cycle.silent_rows)
+
+    def write_speeds(self, speed_rad_s: NDArray[np.float64]) -> None:
+        """Send a speed to every wheel, rounded to steps and bounded.
+
+        One that has not answered for 50 ms is told to stand still: nobody knows what it does.
+
+        Raises:
+            ValueError: a speed is not finite, or there is not one per wheel.
+            DriverError: the bus is not connected.
+            LinkLost: the adapter is gone.
+        """
+        silent = self._connected().silent_rows
+        self._wheels.write(speed_rad_s, [row - self._joint_count for row in silent])
 
     @property
     def sent_goals(self) -> NDArray[np.float64]:
@@ -238,6 +259,15 @@ class FeetechBus:
         if self._cycle is None:
             raise DriverError("the servo bus is not connected; call connect() first")
         return self._cycle
+
+
+def _count_joints(servos: Sequence[FeetechServo]) -> int:
+    """Return how many servos, the first ones, are joints."""
+    count = sum(servo.wheel is None for servo in servos)
+    if not count or any(servo.wheel is not None for servo in servos[:count]):
+        names = ", ".join(servo.joint for servo in servos)
+        raise ValueError(f"a bus needs servos of joints first, then those of wheels, got {names}")
+    return count
 
 
 def _check_byte_order(servos: Sequence[FeetechServo]) -> None:

@@ -9,8 +9,8 @@ from drivers.feetech.link import SETUP_PATIENCE, FeetechLink, value_in
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.table import (
     FEETECH_VOLTAGE_UNIT_V,
+    FINE_SPEEDS,
     MULTI_TURN_FEEDBACK,
-    FeetechMode,
     hardware_errors,
     model_names,
     models_of,
@@ -120,8 +120,10 @@ def differences(servo: FeetechServo, eeprom: bytes) -> dict[str, tuple[int, int]
     wanted = {"return_delay_time": 0, "status_return_level": 1}
     if "operating_mode" in servo.datasheet.registers:
         phase = value_in(servo, eeprom, 0, "phase")
-        wanted["operating_mode"] = FeetechMode.POSITION
+        wanted["operating_mode"] = servo.mode
         wanted["phase"] = phase & ~MULTI_TURN_FEEDBACK | _ZERO_SPEED_IS_MOST
+        if servo.wheel is not None:
+            wanted["phase"] |= FINE_SPEEDS
     found = {name: (value_in(servo, eeprom, 0, name), value) for name, value in wanted.items()}
     return {name: pair for name, pair in found.items() if pair[0] != pair[1]}
 

@@ -59,7 +59,8 @@ class FeetechCycle:
         self._count = self._turn = self._probes = 0
         self._returns: dict[int, Iterator[None]] = {}
         self._urgent: deque[int] = deque()
-        self.goals = FeetechGoals(link, servos, setups, margin_s=margin_s)
+        joints = [servo for servo in servos if servo.wheel is None]
+        self.goals = FeetechGoals(link, joints, setups[: len(joints)], margin_s=margin_s)
         self.notices: deque[str] = deque(maxlen=_MOST_NOTICES)
         for servo, setup in zip(servos, setups, strict=True):
             self.notices += [f"{servo}: set {text}" for text in setup.written]
@@ -228,6 +229,9 @@ class FeetechCycle:
             return
         yield
         told = []
+        if servo.wheel is not None:
+            self._link.write(servo, "goal_velocity", 0, self._patience)
+            yield
         torque = self._link.read(servo, "torque_enable", self._patience)
         if torque != TorqueSwitch.ON:
             told.append("torque is off until it is armed anew")

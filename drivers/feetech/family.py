@@ -8,12 +8,17 @@ from drivers.clock import Clock
 from drivers.feetech.bus import FeetechBus
 from drivers.feetech.codec import FEETECH_MAX_ID
 from drivers.feetech.servo import FeetechServo
-from drivers.feetech.table import FEETECH_BAUD_RATES, FEETECH_MODELS, FEETECH_VOLTAGE_UNIT_V
+from drivers.feetech.table import (
+    FEETECH_BAUD_RATES,
+    FEETECH_MODELS,
+    FEETECH_VOLTAGE_UNIT_V,
+    turns_wheels,
+)
 from drivers.feetech.tools.bench import FeetechBench
 from drivers.feetech.torque import HOLD_GAINS
 from drivers.servo.family import ServoFacts
 from drivers.servo.fault_policy import FaultPolicy
-from drivers.servo.joint_servo import JointServo
+from drivers.servo.joint_servo import JointServo, WheelLimits
 
 FULL_DUTY_STEPS_AT_GAIN_1: Final = 1600.0
 """Full duty is reached at this error divided by P.
@@ -59,6 +64,7 @@ class FeetechFamily:
             has_watchdog=False,
             protocol=f"feetech {sheet.byte_order}-endian",
             cycle_bits=_CYCLE_BITS if sheet.has_sync_read else _SINGLE_CYCLE_BITS,
+            turns_wheels=turns_wheels(model),
         )
 
     def servo(
@@ -71,8 +77,9 @@ class FeetechFamily:
         offset_rad: float,
         travel_per_rad: float,
         goal_range: tuple[float, float] | None = None,
+        wheel: WheelLimits | None = None,
     ) -> FeetechServo:
-        """Declare a servo.
+        """Declare a servo; one with the limits of a `wheel` is used in velocity mode.
 
         Raises:
             ValueError: a value is out of its range.
@@ -85,6 +92,7 @@ class FeetechFamily:
             offset_rad=offset_rad,
             travel_per_rad=travel_per_rad,
             goal_range=goal_range,
+            wheel=wheel,
         )
 
     def bus(

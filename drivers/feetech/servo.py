@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from drivers.feetech.codec import FEETECH_MAX_ID
-from drivers.feetech.table import FEETECH_MODELS, FeetechDatasheet
+from drivers.feetech.table import FEETECH_MODELS, FeetechDatasheet, FeetechMode, turns_wheels
 from drivers.servo.joint_servo import JointServo
 
 
@@ -26,8 +26,17 @@ class FeetechServo(JointServo):
                 self.model_name not in FEETECH_MODELS,
                 f"model must be one of {sorted(FEETECH_MODELS)}, got {self.model_name!r}",
             ),
+            (
+                self.wheel is not None and not turns_wheels(self.model_name),
+                f"{self.model_name} has no velocity mode, and cannot turn a wheel",
+            ),
             *JointServo._checks(self),
         ]
+
+    @property
+    def mode(self) -> FeetechMode:
+        """Return the operating mode that the servo is used in."""
+        return FeetechMode.POSITION if self.wheel is None else FeetechMode.VELOCITY
 
     @property
     def datasheet(self) -> FeetechDatasheet:

@@ -23,6 +23,8 @@ FEETECH_CURRENT_UNIT_A: Final = 6.5e-3
 FEETECH_VOLTAGE_UNIT_V: Final = 0.1
 ACCELERATION_UNIT_STEP_S2: Final = 100.0
 PROTECTION_TIME_UNIT_S: Final = 0.01
+FINE_SPEEDS: Final = 0x04
+"""Bit of phase (18): speeds count in steps per second, not in fifties of them."""
 MULTI_TURN_FEEDBACK: Final = 0x10
 """Bit of phase (18): positions go on beyond one turn."""
 
@@ -292,6 +294,11 @@ FEETECH_MODELS: Final[Mapping[str, FeetechDatasheet]] = MappingProxyType(
 Stall current of the 7.4 V versions, gear of the STS3250, and current, gear and weight of the
 SCS0009 are in no table that we have: chosen from servos of that size.
 """
+
+
+def turns_wheels(model: str) -> bool:
+    """Return whether a model has a velocity mode."""
+    return model in FEETECH_MODELS and "operating_mode" in FEETECH_MODELS[model].registers
 
 
 def hardware_errors(bits: int) -> int:

@@ -1,13 +1,14 @@
 """Switch torque on without a jump to an old goal; switch it off whatever happens."""
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import Final
 
 from drivers.errors import DriverError, LinkLost
 from drivers.feetech.link import SETUP_PATIENCE, FeetechLink, register_of
 from drivers.feetech.servo import FeetechServo
 from drivers.feetech.settings import FeetechSetup
-from drivers.feetech.table import TorqueSwitch, hardware_errors
+from drivers.feetech.table import ACCELERATION_UNIT_STEP_S2, TorqueSwitch, hardware_errors
 from drivers.servo.errors import NotKept, ServoFault, ServoSilent
 from drivers.servo.patience import ReplyPatience
 from drivers.servo.state import hardware_error_text
@@ -17,6 +18,7 @@ HOLD_GAINS: Final[Mapping[str, int]] = {"position_p_gain": 32, "position_d_gain"
 _MOTION: Final = ("acceleration", "goal_position", "goal_time", "goal_velocity", "torque_limit")
 """What a servo forgets with its power, in the order of the addresses; SCS have no torque limit."""
 _ATTEMPTS: Final = 3
+_MOST_ACCELERATION: Final = 254
 _URGENT: Final = ReplyPatience(margin_s=0.005, attempts=2)
 
 
@@ -27,7 +29,8 @@ def switch_torque_on(
 
     A servo goes to the goal that it was given last as soon as it has torque, however old that is:
     so the present position is written first, and with it all that makes it follow goals as this
-    driver expects. The EEPROM is locked before the gains, which it keeps otherwise.
+    driver expects. The EEPROM is locked before the gains, which it keeps otherwise. A wheel begins
+    at rest.
 
     Raises:
         ServoFault: a servo reports an error that takes its torque away, or stands outside its own
@@ -39,19 +42,20 @@ def switch_torque_on(
     _check_fitness(link, servos, setups)
     try:
         link.write_each(servos, "lock", [1] * len(servos))
-        _write_kept(link, servos, [HOLD_GAINS] * len(servos))
+        write_kept(link, servos, [HOLD_GAINS] * len(servos))
         present = _read_each(link, servos, "present_position")
         _check_limits(servos, setups, present)
         motion = [
             {
                 **dict.fromkeys(_MOTION, 0),
+                "acceleration": acceleration_units(servo),
                 "goal_position": present[servo.id],
                 "torque_limit": setup.torque_limit,
             }
             for servo, setup in zip(servos, setups, strict=True)
         ]
-        _write_kept(link, servos, motion)
-        _write_kept(link, servos, [{"torque_enable": TorqueSwitch.ON}] * len(servos))
+        write_kept(link, servos, motion)
+        write_kept(link, servos, [{"torque_enable": TorqueSwitch.ON}] * len(servos))
     except LinkLost:
         raise
     except DriverError:
@@ -82,10 +86,16 @@ def switch_torque_off(link: FeetechLink, servos: Sequence[FeetechServo]) -> dict
     return failures
 
 
-def _write_kept(
+def write_kept(
     link: FeetechLink, servos: Sequence[FeetechServo], values: Sequence[Mapping[str, int]]
 ) -> None:
-    """Write neighbouring registers of many servos at one instant, and read back what they hold."""
+    """Write neighbouring registers of many servos at one instant, and read back what they hold.
+
+    Raises:
+        NotKept: a servo holds another value.
+        ServoSilent: a servo does not answer.
+        LinkLost: the adapter is gone.
+    """
     spans = [_span(servo, wanted) for servo, wanted in zip(servos, values, strict=True)]
     wrong: list[str] = []
     for _ in range(_ATTEMPTS):
@@ -101,6 +111,14 @@ def _write_kept(
         if not wrong:
             return
     raise NotKept("; ".join(wrong) + "; check the servo's limits and errors")
+
+
+def acceleration_units(servo: FeetechServo) -> int:
+    """Return what bounds how fast a servo changes its speed; 0 is no bound, as joints have it."""
+    if servo.wheel is None:
+        return 0
+    units = servo.wheel.acceleration_rad_s2 / servo.pulse_rad / ACCELERATION_UNIT_STEP_S2
+    return min(max(1, ceil(units)), _MOST_ACCELERATION)
 
 
 def _span(servo: FeetechServo, values: Mapping[str, int]) -> tuple[int, bytes]:
@@ -129,6 +147,8 @@ def _check_limits(
     servos: Sequence[FeetechServo], setups: Sequence[FeetechSetup], present: Mapping[int, int]
 ) -> None:
     for servo, setup in zip(servos, setups, strict=True):
+        if servo.wheel is not None:
+            continue
         if not setup.minimum_pulse <= present[servo.id] <= setup.maximum_pulse:
             raise ServoFault(
                 f"{servo}: stands at {present[servo.id]}, outside its own position limits "

@@ -28,7 +28,8 @@ class ServoBusDriver(Protocol):
     def connect(self, *, thorough: bool = True) -> object:
         """Check that every servo is the declared one and set it up; torque is left as it is.
 
-        Unless `thorough` it ends with the first silent servo.
+        Wheels are told to stand still, first of all. Unless `thorough` it ends with the first
+        silent servo.
 
         Raises:
             DriverError: a servo is silent or not as declared, or the adapter is unfit.
@@ -44,10 +45,20 @@ class ServoBusDriver(Protocol):
         ...
 
     def write_goals(self, position_rad: NDArray[np.float64]) -> None:
-        """Send a goal to every servo.
+        """Send a goal to every servo but those that turn wheels.
 
         Raises:
             ValueError: a goal is not finite, or there is not one per servo.
+        """
+        ...
+
+    def write_speeds(self, speed_rad_s: NDArray[np.float64]) -> None:
+        """Send a speed to every servo that turns a wheel, in their order.
+
+        One that has been silent is told to stand still, whatever its speed here.
+
+        Raises:
+            ValueError: a speed is not finite, or there is not one per wheel.
         """
         ...
 

@@ -10,7 +10,7 @@ from drivers.clock import Clock
 from drivers.errors import UnknownModel
 from drivers.servo.bus import ServoBusDriver
 from drivers.servo.fault_policy import FaultPolicy
-from drivers.servo.joint_servo import JointServo
+from drivers.servo.joint_servo import JointServo, WheelLimits
 from drivers.servo.tools.bench import ServoBench
 
 
@@ -32,6 +32,8 @@ class ServoFacts:
     """What is spoken on its wire: servos of one bus have the same."""
     cycle_bits: int
     """What it adds to a control cycle on the wire: its goal, and its share of the answer."""
+    turns_wheels: bool = False
+    """Its driver can let it turn on and on, at a speed."""
 
 
 class ServoFamily(Protocol):
@@ -71,11 +73,14 @@ class ServoFamily(Protocol):
         offset_rad: float,
         travel_per_rad: float,
         goal_range: tuple[float, float] | None = None,
+        wheel: WheelLimits | None = None,
     ) -> JointServo:
         """Declare a servo; connecting refuses one whose own limits clip the `goal_range`.
 
+        One with the limits of a `wheel` turns on and on. Those of a bus come last.
+
         Raises:
-            ValueError: a value is out of its range.
+            ValueError: a value is out of its range, or the model turns no wheels.
         """
         ...
 

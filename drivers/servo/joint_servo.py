@@ -4,6 +4,14 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WheelLimits:
+    """Bound a servo that turns a wheel: the speed it is sent, and how fast it changes its own."""
+
+    speed_rad_s: float
+    acceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointServo:
     """Describe a servo as the robot file declares it.
 
@@ -22,6 +30,8 @@ class JointServo:
     travel_per_rad: float = 1.0
     goal_range: tuple[float, float] | None = None
     """Between which joint values goals will lie, as the robot file limits them."""
+    wheel: WheelLimits | None = None
+    """Of a servo that is told speeds instead, and turns on and on."""
 
     def __post_init__(self) -> None:
         faults = [text for wrong, text in self._checks() if wrong]

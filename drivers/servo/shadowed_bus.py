@@ -91,6 +91,15 @@ class ShadowedBus:
         goals[self._count :] += self._apart
         self._bus.write_goals(goals)
 
+    def write_speeds(self, speed_rad_s: Floats) -> None:
+        """Send a speed to every servo that turns a wheel.
+
+        Raises:
+            ValueError: a speed is not finite, or there is not one per wheel.
+            LinkLost: the adapter is gone.
+        """
+        self._bus.write_speeds(speed_rad_s)
+
     def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the servos of joints, by the id of one; return those that did not take it.
 

@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 SILENT_S: Final = 0.05
 """A servo whose values are older has missed goals: it gets none, and begins where it is found."""
-_READINGS: Final = 5
+_ROWS: Final = ("position_rad", "velocity_rad_s", "effort_ratio", "voltage_v", "temperature_c")
+_READINGS: Final = len(_ROWS)
 
 
 @dataclass(slots=True, eq=False)
@@ -73,6 +74,20 @@ class BusState:
             torque_on=np.zeros(count, dtype=np.bool_),
             watchdog=np.zeros(count, dtype=np.int16),
         )
+
+    def part(self, rows: slice) -> "BusState":
+        """Return the state of some servos, which goes on showing what this one holds.
+
+        But for `stamp_ns`, which is a copy.
+        """
+        readings = self.readings[:, rows]
+        arrays = {
+            field.name: getattr(self, field.name)[rows]
+            for field in fields(self)
+            if field.name not in (*_ROWS, "readings", "stamp_ns")
+        }
+        shown = dict(zip(_ROWS, readings, strict=True))
+        return BusState(readings=readings, stamp_ns=self.stamp_ns, **shown, **arrays)
 
     def copy(self) -> "BusState":
         """Return a state that the next cycle does not change."""

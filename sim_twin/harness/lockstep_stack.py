@@ -30,6 +30,7 @@ from vla_deploy.memory import MemoryStore
 from vla_deploy.missions.store import FILE_NAME, MissionStore
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.perception.pose_tracker import PoseTracker
+from vla_deploy.perception.wheel_pose import WheelPose
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.battery_settings import BatterySettings
@@ -80,9 +81,15 @@ class LockstepControl(RobotUnderTest):
         return self.lockstep.faults
 
     def add_senses(self) -> None:
-        """Give control what the base does not drive without: scan, attitude, pose and depth."""
+        """Give control what the base does not drive without: scan, attitude, pose and depth.
+
+        A base without a lidar has its pose by its wheels.
+        """
         context, devices = self.lockstep.context, self.lockstep.devices
-        self.lockstep.add(SensesNode(context, self.robot, devices))
+        if self.robot.finds_its_way:
+            self.lockstep.add(SensesNode(context, self.robot, devices))
+        else:
+            self.lockstep.add(WheelSenseNode(context, self.robot))
 
     def restart_control(self) -> None:
         """Start control anew, as the supervisor does after it died."""
@@ -117,11 +124,13 @@ class LockstepControl(RobotUnderTest):
     def _base_command(self) -> CellWriter:
         return self.space.cell_writer(topics.BASE_COMMAND)
 
-    def drive_for(self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0) -> None:
+    def drive_for(
+        self, duration_s: float, v_m_s: float, w_rad_s: float = 0.0, left_m_s: float = 0.0
+    ) -> None:
         """Drive for a time, past the executor: control wants its commands again and again."""
         end_s = self.lockstep.now_s + duration_s
         while self.lockstep.now_s < end_s - 1e-9:
-            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
+            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s, left_m_s=left_m_s)
             self.lockstep.run_for(min(_COMMAND_S, end_s - self.lockstep.now_s))
 
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
@@ -368,3 +377,26 @@ class SensesNode:
         if scan is not None:
             ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
             self._scan.put(range_m=scan.range_m, beam_age_s=ages_s)
+
+
+class WheelSenseNode:
+    """Publish the pose of a base by its wheels where perception, which needs a camera, is away."""
+
+    period_s = 0.02
+
+    def __init__(self, context: NodeContext, robot: RobotDescription) -> None:
+        self._clock = context.clock
+        self._space = SharedSpace(context.run_dir / "ipc", context.clock)
+        self._pose = WheelPose(robot, self._space)
+
+    def start(self) -> None:
+        """Open the topics."""
+        self._pose.start(self._space)
+
+    def step(self) -> None:
+        """Publish the pose."""
+        self._pose.predict(self._clock.now_ns())
+
+    def stop(self) -> None:
+        """Close the topics."""
+        self._space.close()

@@ -26,7 +26,9 @@ def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
                 f"world {found.name}: {robot.name} does not drive, and this world's file has no "
                 "[mount] to screw it down; take one that has, such as table"
             )
-        return compose(robot.mjcf_path, found.mjcf_path, found.mount)
+        base = robot.parts.base
+        omni = robot.wheel_joints if base and base.is_holonomic else ()
+        return compose(robot.mjcf_path, found.mjcf_path, found.mount, omni)
     except FileNotFoundError as error:
         raise TwinModelMismatch(str(error)) from error
 
@@ -48,7 +50,7 @@ def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
 
 
 def servo_shafts(robot: RobotDescription) -> list[Shaft]:
-    """Return how each servo's shaft drives its joint, those of shadows last."""
+    """Return how each servo's shaft drives its joint: those of shadows, then of wheels last."""
     bus = robot.servo_bus
     return [
         Shaft(
@@ -57,7 +59,9 @@ def servo_shafts(robot: RobotDescription) -> list[Shaft]:
             offset=servo.offset,
             ratio=servo.sign * servo.travel_per_rad,
         )
-        for servo, named in zip((*bus.servos, *bus.shadows), bus.all_servos, strict=True)
+        for servo, named in zip(
+            (*bus.servos, *bus.shadows, *bus.wheels), bus.all_servos, strict=True
+        )
     ]
 
 

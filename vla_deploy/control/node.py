@@ -69,7 +69,7 @@ class ControlNode:
         space = SharedSpace(context.run_dir / "ipc", clock)
         self._payload = Payload(robot, space.cell_reader(topics.EXECUTOR_STATUS))
         servos = self._servos = ServoLine(robot, profile, devices, clock)
-        wheels = self._wheels = base_drive(robot, profile, devices, clock)
+        wheels = self._wheels = base_drive(robot, profile, devices, servos, clock)
         self._motions = MotionSet(axis_limits(robot))
         self._joints = JointOutput(robot, self._motions, servos, self._payload)
         self._base = BaseOutput(robot, wheels)
@@ -280,14 +280,13 @@ class ControlNode:
 
     def _move_base(self, period_s: float) -> None:
         if self._modes.mode is Mode.ARMED:
-            watch = self._judging.watch
-            self._base.follow((watch.v_m_s, watch.w_rad_s), self._judging.verdict, period_s)
+            wanted = self._judging.watch.wanted
+            self._base.follow(wanted, self._judging.verdict, period_s)
         else:
             self._base.brake(period_s)
 
     def _tell(self) -> None:
-        ramp = self._base.ramp
-        self._judging.note_sent(self._joints.sent, ramp.v_m_s, ramp.w_rad_s)
+        self._judging.note_sent(self._joints.sent, self._base.ramp.velocity)
         self._telemetry.tell_joints(self._servos.state, self._joints.sent)
         self._telemetry.tell_base(self._wheels)
         document = self._status.due(self._tuning.status_every)

@@ -7,7 +7,7 @@ and the metric all come from here.
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any, Generic
+from typing import TYPE_CHECKING, Annotated, Any, Final, Generic
 
 from vla_deploy.ipc.claims import Book
 from vla_deploy.ipc.payloads import motion, recording, scene, services, speech, supervision, tasks
@@ -39,12 +39,16 @@ class TopicKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PackedField:
-    """Describe one packed field; `dtype` is a numpy code, little-endian, "json" is bounded text."""
+    """Describe one packed field; `dtype` is a numpy code, little-endian, "json" is bounded text.
+
+    A writer that leaves out one that it `may_lack` puts zero.
+    """
 
     name: str
     dtype: str
     shape: int = 1
     unit: str = ""
+    may_lack: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,6 +98,7 @@ JOINT_STATE = Topic(
         _joint("torque_enabled", "u1", ""),
     ),
 )
+_LEFT: Final = PackedField("left_m_s", "f8", unit="m/s, of omni wheels", may_lack=True)
 BASE_STATE = Topic(
     name="base_state",
     kind=TopicKind.CELL,
@@ -108,6 +113,7 @@ BASE_STATE = Topic(
         PackedField("v_m_s", "f8", unit="m/s"),
         PackedField("w_rad_s", "f8", unit="rad/s"),
         PackedField("enabled", "u1"),
+        _LEFT,
     ),
 )
 BASE_COMMAND = Topic(
@@ -117,7 +123,11 @@ BASE_COMMAND = Topic(
     rate_hz=50,
     deadline_s=0.25,
     summary="wanted base velocity; too old means ramp to zero",
-    fields=(PackedField("v_m_s", "f8", unit="m/s"), PackedField("w_rad_s", "f8", unit="rad/s")),
+    fields=(
+        PackedField("v_m_s", "f8", unit="m/s"),
+        PackedField("w_rad_s", "f8", unit="rad/s"),
+        _LEFT,
+    ),
 )
 CONTROL_STATUS = Topic(
     name="control_status",
@@ -488,6 +498,7 @@ REMOTE_BASE_COMMAND = Topic(
         PackedField("v_m_s", "f8", unit="m/s"),
         PackedField("w_rad_s", "f8", unit="rad/s"),
         PackedField("valid_s", "f8", unit="s, then it is stale"),
+        _LEFT,
     ),
 )
 PAGE_SOUND = Topic(

@@ -214,15 +214,36 @@ class NoWays(PathPlanner):
         return 0.0
 
 
+class OpenFloor(NoWays):
+    """Answer for a base without a map: it may stand anywhere, and finds its way nowhere."""
+
+    def __init__(self, name: str) -> None:
+        """Take the robot's name, which says why."""
+        self._reason = (
+            f"{name} has no lidar: it does not know its place on a map, and drives by distances "
+            "and turns only"
+        )
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Return that nothing is known against it."""
+        return True
+
+    def room_m(self, x_m: float, y_m: float) -> float:
+        """Return that nothing is known to be near."""
+        return math.inf
+
+
 def base_planner(robot: RobotDescription) -> PathPlanner:
     """Return the planner for a robot's base on its own map, around its keep-out zones.
 
-    That of a robot without a base finds no way.
+    That of a robot without a base, or without a map, finds no way.
 
     Raises:
         MapInvalid: the robot file's map cannot be used.
     """
     if robot.parts.base is None:
         return NoWays(robot.name)
+    if robot.parts.home is None:
+        return OpenFloor(robot.name)
     grid = with_zones(load_map(robot.home.map_path), robot.home.zones)
     return PathPlanner(grid, robot.base.footprint_radius_m + CLEARANCE_MARGIN_M)

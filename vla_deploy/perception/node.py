@@ -24,6 +24,7 @@ from vla_deploy.perception.mounted_pose import MountedPose
 from vla_deploy.perception.objects.body_state import BodyState
 from vla_deploy.perception.pose_tracker import PoseTracker
 from vla_deploy.perception.sensors import Sensors
+from vla_deploy.perception.wheel_pose import WheelPose
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
 from vla_deploy.runtime.executors import InlineExecutor
@@ -75,16 +76,13 @@ class PerceptionNode:
         rate_hz = profile.camera_rate_hz
         self._sensors = Sensors(robot, model, devices, context.clock, rate_hz)
         self._body = BodyState(robot, model)
-        self._drives = robot.parts.base is not None
-        self._pose_tracker: PoseTracker | MountedPose = (
-            PoseTracker(robot, model, self._space)
-            if self._drives
-            else MountedPose(robot.start_pose)
-        )
+        self._looks_around = robot.finds_its_way
+        self._pose_tracker = _pose_of(robot, model, self._space)
         executor = InlineExecutor() if executor is None else executor
         self._worker = DetectorWorker(executor, context.clock)
         furniture = furniture_points(robot.places)
-        localiser, floor_m = self._pose_tracker.localiser, 0.0 if self._drives else None
+        # Without a map the floor is where things lie, and the robot takes them from there.
+        localiser, floor_m = self._pose_tracker.localiser, 0.0 if self._looks_around else None
         has_depth = robot.camera.has_depth
         plane_depth = None if has_depth else PlaneDepth(robot.reach, robot.things)
         self._pipeline = ImagePipeline(
@@ -191,7 +189,7 @@ class PerceptionNode:
         self._next_image_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
         self._next_scene_ns = 0  # a scene for each image, whatever its use
-        if self._pipeline.process(frame) and self._drives:
+        if self._pipeline.process(frame) and self._looks_around:
             self._publish_obstacles(1.0 / rate_hz)
 
     def _publish_obstacles(self, period_s: float) -> None:
@@ -233,3 +231,12 @@ class PerceptionNode:
         if now_ns >= self._next_scene_ns:
             self._next_scene_ns = now_ns + SCENE_PERIOD_NS
             self._scene.put_document(self._pipeline.document(now_ns, self._sensors.away()))
+
+
+def _pose_of(
+    robot: RobotDescription, model: RobotModel, space: SharedSpace
+) -> PoseTracker | WheelPose | MountedPose:
+    """Return what tells where the robot is: lidar and map, its wheels alone, or where it stands."""
+    if robot.finds_its_way:
+        return PoseTracker(robot, model, space)
+    return MountedPose(robot.start_pose) if robot.parts.base is None else WheelPose(robot, space)

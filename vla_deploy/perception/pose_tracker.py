@@ -34,7 +34,7 @@ class PoseTracker:
             MapInvalid: the robot file's map cannot be used.
         """
         lidar, grid = lidar_place(robot, model), load_map(robot.home.map_path)
-        self.localiser = Localiser(_start_pose(robot, space), grid, lidar)
+        self.localiser = Localiser(start_pose(robot, space), grid, lidar)
         self._live = LiveObstacles(grid)
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
@@ -112,6 +112,7 @@ def lidar_place(robot: RobotDescription, model: RobotModel) -> Pose2D:
     return Pose2D(float(x_m), float(y_m), 0.0)
 
 
-def _start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+def start_pose(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+    """Return where an earlier instance in this run ended, else where the robot is switched on."""
     last = space.cell_reader(topics.POSE).latest()
     return robot.start_pose if last is None else Pose2D.of(last.data)

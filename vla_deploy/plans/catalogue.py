@@ -76,6 +76,8 @@ class SkillSpec:
     one_of: tuple[tuple[str, ...], ...] = ()
     resources: tuple[str, ...] = ()
     may_lack: frozenset[str] = frozenset()
+    finds_way: bool = False
+    """It takes a map, and a lidar to know the place on it."""
     own_timeout_s: float | None = None
     estimated_duration_s: float = 1.0
     retryable: bool = False
@@ -118,6 +120,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             estimated_duration_s=15.0,
             retryable=True,
         ),
@@ -126,6 +129,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="drive to the charging station, and see that the battery charges there",
             parameters={"place": SkillParameter(type=Type.PLACE, required=False)},
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             estimated_duration_s=20.0,
             retryable=True,
         ),
@@ -134,6 +138,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="follow the person who walks nearby, for a while or until told otherwise",
             parameters={"duration_s": _number(0, 1800, required=False)},
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             own_timeout_s=2000.0,
             estimated_duration_s=60.0,
         ),
@@ -142,6 +147,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="drive over all the floor of a place, and tell which share was covered",
             parameters={"place": SkillParameter(type=Type.PLACE)},
             resources=("base", "head", "camera", "arms"),
+            finds_way=True,
             own_timeout_s=1800.0,
             estimated_duration_s=150.0,
         ),

@@ -242,6 +242,10 @@ def _lacks_of(robot: RobotDescription) -> dict[str, str]:
         name: [part for part in spec.resources if part not in parts | spec.may_lack]
         for name, spec in SKILLS.items()
     }
+    if robot.parts.lidar is None:
+        for name, spec in SKILLS.items():
+            if spec.finds_way and "base" not in missing[name]:
+                missing[name] = ["lidar"]
     lacks = {
         name: f"{robot.name} has no {' and no '.join(lacked)}"
         for name, lacked in missing.items()

@@ -59,17 +59,22 @@ def _servos(document: Document) -> list[Document]:
 
 
 def _motors(document: Document) -> list[tuple[str, Document]]:
-    """Return the servos and their shadows with their keys."""
+    """Return the servos, their shadows and those that turn wheels, with their keys."""
     bus = table(document, "servo_bus")
     return [
         (f"servo_bus.{kind}[{i}]", row)
-        for kind in ("servos", "shadows")
+        for kind in ("servos", "shadows", "wheels")
         for i, row in enumerate(rows(bus, kind))
     ]
 
 
 def _drives(document: Document) -> list[Document]:
     return rows(table(document, "can_bus"), "drives")
+
+
+def wheels(document: Document) -> list[Document]:
+    """Return what turns wheels: the drives of the CAN bus, and servos of the servo bus."""
+    return [*_drives(document), *rows(table(document, "servo_bus"), "wheels")]
 
 
 def _joints(records: list[Document]) -> set[str]:
@@ -108,20 +113,18 @@ NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
 
 
 def parts_come_together(document: Document) -> Iterator[TableFault]:
-    """A base has its drives and a home to drive in; what guards a base needs one."""
-    together = ("base", "can_bus", "home")
-    if any(key in document for key in together):
-        for key in (one for one in together if one not in document):
-            yield TableFault(
-                key=key, got="nothing", expected="a table: base, can_bus and home come together"
-            )
-    else:
+    """What drives needs a base, a home the lidar that finds it, what guards a base needs one."""
+    if "base" not in document:
         for key in (one for one in ("zones", "tip_over") if one in document):
             yield TableFault(key=key, got="a table", expected="nothing: the robot has no base")
-    needs = {"base": "lidar", "tip_over": "imu"}
-    for key, needed in needs.items():
-        if key in document and needed not in document:
-            yield TableFault(key=needed, got="nothing", expected=f"a table: [{key}] needs it")
+    needs = {"can_bus": ("base",), "home": ("base", "lidar"), "tip_over": ("imu",)}
+    if "lidar" in document:
+        needs["base"] = ("home",)
+    missing: dict[str, str] = {}
+    for key in (one for one in needs if one in document):
+        missing.update({one: key for one in needs[key] if one not in document})
+    for key, needing in missing.items():
+        yield TableFault(key=key, got="nothing", expected=f"a table: [{needing}] needs it")
 
 
 def drives_fit_protocol(document: Document) -> Iterator[TableFault]:
@@ -246,7 +249,7 @@ def servos_reach(document: Document) -> Iterator[TableFault]:
 
 def groups_cover_joints(document: Document) -> Iterator[TableFault]:
     """Each driven joint is in exactly one group."""
-    driven = _joints(_servos(document)) | _joints(_drives(document))
+    driven = _joints(_servos(document)) | _joints(wheels(document))
     placed: list[tuple[str, object]] = [
         (f"groups.{name}.joints", joint)
         for name, row in subtables(document, "groups").items()

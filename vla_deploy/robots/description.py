@@ -47,16 +47,35 @@ class StopCategory(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseGeometry:
-    """Give the differential drive's dimensions and the speeds it may reach."""
+    """Give the base's dimensions and the speeds it may reach.
+
+    One with a `track_m` has two wheels side by side; one with a `base_radius_m` has omni wheels,
+    each at that distance from the middle and at its bearing, its axle pointing outwards.
+    """
 
     wheel_radius_m: float
-    track_m: float
+    track_m: float | None = None
+    base_radius_m: float | None = None
+    wheel_bearings_rad: tuple[float, ...] = ()
+    """Where each omni wheel is, counter-clockwise from the front, in the order of the wheels."""
+    max_wheel_rad_s: float | None = None
+    """Faster than this no wheel is asked to turn; the base as a whole slows down instead."""
     max_speed_m_s: float
     max_turn_rad_s: float
     max_acceleration_m_s2: float
     max_turn_acceleration_rad_s2: float
     footprint_radius_m: float
     stop_deceleration_m_s2: float | None = None
+
+    @property
+    def is_holonomic(self) -> bool:
+        """Return whether it can drive sideways."""
+        return self.base_radius_m is not None
+
+    @property
+    def lever_m(self) -> float:
+        """Return how far a wheel runs when the base turns by one radian."""
+        return self.base_radius_m or 0.5 * (self.track_m or 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,6 +169,10 @@ MOUNT: Final[Mapping[str, Place]] = MappingProxyType(
     }
 )
 """What a robot without a base stands on, whatever people call it."""
+FLOOR: Final[Mapping[str, Place]] = MappingProxyType(
+    {"floor": Place(name="floor", pose=_HERE, aliases=("ground",), viewpoints=(_HERE,))}
+)
+"""Where a robot works that drives, but has no map of where."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,7 +198,8 @@ class Home:
 class RobotParts:
     """Hold what a robot may have beside its servos; None is a part that it does not have.
 
-    A base drives by the CAN bus, in its home: those three come together.
+    A base is driven by the CAN bus or by wheels of the servo bus. With a lidar it has a home, whose
+    map tells it where it is; without one it drives by what its wheels tell.
     """
 
     base: BaseGeometry | None = None
@@ -325,9 +349,9 @@ class RobotDescription:
 
     @property
     def wheel_joints(self) -> tuple[str, ...]:
-        """Return the joints that the drives of the CAN bus turn, none without a base."""
+        """Return the joints that drives or servos turn as wheels, none without a base."""
         bus = self.parts.can_bus
-        return tuple(drive.joint for drive in bus.drives) if bus else ()
+        return tuple(one.joint for one in (bus.drives if bus else self.servo_bus.wheels))
 
     @property
     def joint_index(self) -> dict[str, int]:
@@ -336,8 +360,15 @@ class RobotDescription:
 
     @property
     def places(self) -> Mapping[str, Place]:
-        """Return the named places: those of its home, or what it is mounted on."""
-        return self.parts.home.places if self.parts.home else MOUNT
+        """Return the named places: those of its home, else the floor, or what it is mounted on."""
+        if self.parts.home is not None:
+            return self.parts.home.places
+        return MOUNT if self.parts.base is None else FLOOR
+
+    @property
+    def finds_its_way(self) -> bool:
+        """Return whether it knows its place on a map, and so can be sent to a place."""
+        return self.parts.base is not None and self.parts.home is not None
 
     @property
     def start_pose(self) -> Pose2D:

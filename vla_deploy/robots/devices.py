@@ -27,8 +27,8 @@ class Servo:
     model: str
     joint: str
     sign: int
-    offset: float
-    travel_per_rad: float
+    offset: float = 0.0
+    travel_per_rad: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,14 +52,16 @@ class ServoBus:
     servos: tuple[Servo, ...]
     shadows: tuple[Servo, ...] = ()
     """Second servos of joints, which turn them together with the one in `servos`."""
+    wheels: tuple[Servo, ...] = ()
+    """Servos in velocity mode that turn the wheels of the base; they are no joints."""
     supplies: tuple[ServoSupply, ...] = ()
     """Each servo hangs on one of them; none are declared where one supply feeds all."""
 
     @property
     def all_servos(self) -> tuple[Servo, ...]:
-        """Return every servo on the wire, shadows last and under names of their own."""
+        """Return every servo on the wire: shadows, under names of their own, then wheels last."""
         named = (replace(one, joint=shadow_name(one.joint)) for one in self.shadows)
-        return (*self.servos, *named)
+        return (*self.servos, *named, *self.wheels)
 
     def supply_of(self, servo_id: int) -> ServoSupply | None:
         """Return the declared supply that feeds a servo."""

@@ -43,6 +43,7 @@ from vla_deploy.robots.kinematics.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import PlanBounds
 from vla_deploy.robots.reach import Reach
 from vla_deploy.robots.ros_settings import ROS, RosSettings
+from vla_deploy.robots.servos import wheel_checks
 from vla_deploy.robots.twin_settings import twin_settings
 from vla_deploy.runtime.table_schema import (
     Shape,
@@ -65,6 +66,7 @@ SHAPES: Mapping[str, Shape] = {
     "servo_bus": schema.SERVO_BUS,
     "servo_bus.servos": schema.SERVO,
     "servo_bus.shadows": schema.SERVO,
+    "servo_bus.wheels": schema.WHEEL,
     "servo_bus.supplies": schema.SUPPLY,
     "servo_models.*": schema.SERVO_MODEL,
     "can_bus": schema.CAN_BUS,
@@ -202,6 +204,7 @@ def _faults(document: Document, directory: Path) -> Iterator[TableFault]:
     for check in (
         *CHECKS,
         *supplies.CHECKS,
+        *wheel_checks.CHECKS,
         *protection_schema.CHECKS,
         *home_devices.CHECKS,
         *stop_approach.CHECKS,
@@ -268,7 +271,7 @@ def _parts(document: Document, directory: Path, camera: CameraDescription | None
         return make(document[key]) if key in document else None
 
     return RobotParts(
-        base=made("base", lambda row: BaseGeometry(**row)),
+        base=made("base", lambda row: build(BaseGeometry, row)),
         can_bus=made("can_bus", lambda row: _can_bus(row, directory)),
         lidar=made("lidar", lambda row: SerialSensor(**row)),
         imu=made("imu", lambda row: SerialSensor(**row)),

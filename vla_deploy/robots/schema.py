@@ -82,6 +82,7 @@ SERVO_BUS: Shape = {
     "protocol": one_of(2).optional,
     "servos": TABLES,
     "shadows": TABLES.optional,
+    "wheels": TABLES.optional,
     "supplies": TABLES.optional,
 }
 SUPPLY: Shape = {"name": TEXT, "voltage_v": POSITIVE, "servos": _IDS}
@@ -93,6 +94,7 @@ SERVO: Shape = {
     "offset": NUMBER,
     "travel_per_rad": POSITIVE,
 }
+WHEEL: Shape = {key: SERVO[key] for key in ("id", "model", "joint", "sign")}
 SERVO_MODEL: Shape = {
     "stall_torque_nm": POSITIVE,
     "no_load_speed_rad_s": POSITIVE,
@@ -119,7 +121,10 @@ DRIVE: Shape = {
 }
 BASE: Shape = {
     "wheel_radius_m": POSITIVE,
-    "track_m": POSITIVE,
+    "track_m": POSITIVE.optional,
+    "base_radius_m": POSITIVE.optional,
+    "wheel_bearings_rad": NUMBERS.optional,
+    "max_wheel_rad_s": POSITIVE.optional,
     "max_speed_m_s": POSITIVE,
     "max_turn_rad_s": POSITIVE,
     "max_acceleration_m_s2": POSITIVE,

@@ -107,7 +107,7 @@ def voltage_mismatches(bus: ServoBus, volts: Mapping[int, float]) -> list[str]:
 
 
 def _servo_rows(bus: Document) -> list[Document]:
-    return [*rows(bus, "servos"), *rows(bus, "shadows")]
+    return [row for kind in ("servos", "shadows", "wheels") for row in rows(bus, kind)]
 
 
 def _ids(value: object) -> list[int]:

@@ -110,7 +110,7 @@ RULES: tuple[CauseRule, ...] = (
     CauseRule(Cause.SERVO_BUS_LOST,          Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_bus_lost, "check the bus cable and the servo's power"),
     CauseRule(Cause.CAN_BUS_LOST,            Reaction.HOLD,            Latch.ENERGISED, 1,   0,
-         probes.can_bus_lost, "check the CAN cable, its termination and the drive's power"),
+         probes.can_bus_lost, "check cable and power of the wheel drives, on CAN its termination"),
     CauseRule(Cause.SERVO_HARDWARE_ERROR,    Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_hardware_error, "remove the load, let the servo cool, then reboot it"),
     CauseRule(Cause.DRIVE_FAULT,             Reaction.HOLD,            Latch.ENERGISED, 1,   0,

@@ -124,7 +124,8 @@ def _content(topic: Topic[Any]) -> dict[str, Any]:
         return {"properties": _TICK, "required": ["record"]}
     if topic.kind is TopicKind.CELL and not is_document(topic):
         properties = {field.name: _property(field) for field in topic.fields}
-        return {"properties": properties, "required": list(properties)}
+        required = [field.name for field in topic.fields if not field.may_lack]
+        return {"properties": properties, "required": required}
     return {}
 
 

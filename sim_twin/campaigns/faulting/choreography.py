@@ -52,8 +52,11 @@ _BUTLERS: Final = Choreography(
 
 
 def choreography_of(robot: RobotDescription) -> Choreography:
-    """Return that of a robot: Butler's, or that of an arm on a table with its usual poses."""
-    if robot.parts.base is not None:
+    """Return that of a robot: Butler's, or that of an arm with its usual poses.
+
+    An arm on a base that does not find its way stands still; a wheel's servo fails under it, too.
+    """
+    if robot.finds_its_way:
         return _BUTLERS
     hand = next(iter(robot.hands))
     joints, gripper = robot.group(robot.hands[hand].arm).joints, robot.gripper_joint(hand)
@@ -64,6 +67,6 @@ def choreography_of(robot: RobotDescription) -> Choreography:
         hold=ready,
         reach=ready,
         carry_reach=aside,
-        servos=(joints[2], gripper),
+        servos=(joints[2], gripper, *(one.joint for one in robot.servo_bus.wheels[:1])),
         phases=(Phase.IDLE, Phase.REACHING, Phase.CARRYING),
     )

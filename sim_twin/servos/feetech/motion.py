@@ -4,7 +4,7 @@ Positions are steps, speeds steps per second, duties shares of full PWM. The reg
 from FEETECH's tables; how strong a gain is, no source says. Chosen: P = 32 puts full duty on an
 error of 50 steps (owners measure 20 to 30 steps of error at half of the stall torque), D damps with
 10 ms of P's strength, I reaches P's in a second; velocity P and I are such that the factory's reach
-a speed within 0.5 s.
+a speed within 0.2 s.
 
 A damped motor (torque_enable = 2) and a free one do the same here: at zero duty a motor brakes.
 """
@@ -29,8 +29,8 @@ from sim_twin.servos.firmware.profile import UNBOUNDED, Floats, SetpointProfile
 POSITION_GAIN: Final = 1 / 1600
 """Duty per step of error and unit of P."""
 _DAMPING_S: Final = 0.01
-_VELOCITY_P: Final = 1e-5
-_VELOCITY_I_PER_S: Final = 1e-5
+_VELOCITY_P: Final = 5e-5
+_VELOCITY_I_PER_S: Final = 5e-5
 _INTEGRAL_UNIT: Final = 4 / LOAD_FULL
 _COARSE_STEP_S: Final = 50.0
 """Unit of speeds where phase does not choose 1 step/s: 0.732 rpm."""

@@ -27,7 +27,7 @@ from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.power_stage import MotorSpec
 from sim_twin.timing.clock import SimClock
 from sim_twin.twin import Twin
-from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.control.output.base_drive import can_wheels
 from vla_deploy.robots import RobotDescription, load_robot
 
 TICK_NS = 4_000_000
@@ -55,7 +55,7 @@ class Bench:
 
     def __init__(self, robot: RobotDescription, clock: Clock, wire: CanWire) -> None:
         self.clock, self.wire = clock, wire
-        self.wheels = Wheels(robot, load_profile("desktop"), self, clock)  # type: ignore[arg-type]
+        self.wheels = can_wheels(robot, load_profile("desktop"), self, clock)  # type: ignore[arg-type]
 
     def can(self, name: str) -> can.BusABC:
         return MemoryBus(self.wire)
@@ -122,7 +122,7 @@ def test_a_base_with_another_gear_and_encoder_drives_as_fast(
     wheel_rad_s = 0.3 / BUTLER.base.wheel_radius_m
     for wheel, drive in zip(bench.world.wheels, BUTLER.can_bus.drives, strict=True):
         assert abs(wheel.velocity_rad_s) == pytest.approx(wheel_rad_s, abs=0.1), drive.joint
-    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
+    assert bench.wheels.velocity.v_m_s == pytest.approx(0.3, abs=0.02)
     travelled_m = bench.world.wheels[0].position_rad * BUTLER.base.wheel_radius_m
     assert bench.wheels.odometry.x_m == pytest.approx(travelled_m, abs=0.01)
     bench.wheels.close()
@@ -138,7 +138,7 @@ def test_the_whole_robot_goes_as_far_with_other_gears(
     twin = Twin(robot)
     bench = Bench(robot, SimClock(twin), twin.can_wire)
     bench.set_off()
-    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
+    assert bench.wheels.velocity.v_m_s == pytest.approx(0.3, abs=0.02)
     assert bench.wheels.odometry.x_m == pytest.approx(0.27, abs=0.02)
     assert not bench.wheels.faulted
     bench.wheels.close()
@@ -169,7 +169,7 @@ def test_a_drive_shows_the_identity_and_the_objects_of_its_eds_file(tmp_path: Pa
     )
     bench = FreeBench(robot_with("cia402", 2.0, 4096, eds_path=path))
     bench.set_off()
-    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.02)
+    assert bench.wheels.velocity.v_m_s == pytest.approx(0.3, abs=0.02)
     first = bench.world.wheels[0].drive
     assert isinstance(first, WheelDrive)
     assert first._objects.read(0x1018, 1) == (0x1234).to_bytes(4, "little")
@@ -180,7 +180,7 @@ def test_a_drive_shows_the_identity_and_the_objects_of_its_eds_file(tmp_path: Pa
 def test_a_drive_that_is_not_the_eds_files_is_refused(tmp_path: Path) -> None:
     bench = FreeBench(robot_with("cia402", 1.0, 16384))
     other = robot_with("cia402", 1.0, 16384, eds_path=written_eds(tmp_path, _1018sub2="0x77"))
-    wheels = Wheels(other, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
+    wheels = can_wheels(other, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     with pytest.raises(WrongDevice, match="product"):
         wheels.open()
 

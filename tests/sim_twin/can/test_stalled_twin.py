@@ -17,7 +17,7 @@ from sim_twin.can import WheelDrive
 from sim_twin.physics.engine import STEP_NS
 from sim_twin.priority import Priority
 from sim_twin.process import TwinOptions, TwinProcess
-from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.control.output.base_drive import can_wheels
 from vla_deploy.robots import load_robot
 
 TICK_NS = 4_000_000
@@ -44,7 +44,7 @@ class Bench:
         self.channel = str(run_dir / "dev" / load_robot("butler").can_bus.device)
         options = TwinOptions(robot="butler", world="flat", seed=0, run_dir=run_dir, camera=False)
         self.twin = TwinProcess(options, self.clock)
-        self.wheels = Wheels(load_robot("butler"), load_profile("desktop"), self, self.clock)  # type: ignore[arg-type]
+        self.wheels = can_wheels(load_robot("butler"), load_profile("desktop"), self, self.clock)  # type: ignore[arg-type]
 
     def can(self, name: str) -> can.BusABC:
         return open_can_bus(self.channel)

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.control.motion.base_motion import BaseLimits, BaseRamp
-from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.output.base_kinematics import DifferentialDrive
+from vla_deploy.control.output.odometry import Odometry
 
 DRIVE = DifferentialDrive(wheel_radius_m=0.1, track_m=0.4)
 LIMITS = BaseLimits(
@@ -54,7 +55,7 @@ def test_a_new_wheel_reference_keeps_the_pose() -> None:
 
 @given(st.floats(-2.0, 2.0), st.floats(-3.0, 3.0))
 def test_wheel_speeds_and_base_velocity_are_inverse(v: float, w: float) -> None:
-    assert DRIVE.base_velocity(*DRIVE.wheel_speeds(v, w)) == pytest.approx((v, w))
+    assert DRIVE.base_velocity(*DRIVE.wheel_speeds(v, w)) == pytest.approx((v, w, 0.0))
 
 
 def test_the_base_speeds_up_no_faster_than_allowed() -> None:

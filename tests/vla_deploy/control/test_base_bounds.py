@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.control.motion.base_motion import BaseLimits, permitted
+from vla_deploy.control.motion.base_velocity import BaseVelocity
 from vla_deploy.safety import Direction
 
 LIMITS = BaseLimits(
@@ -36,15 +37,15 @@ ratios = st.floats(0.0, 1.0)
 def test_a_blocked_motion_is_taken_out_and_its_opposite_stays(
     wanted: tuple[float, float], blocked: tuple[Direction, ...], left: tuple[float, float]
 ) -> None:
-    assert permitted(wanted, LIMITS, 1.0, blocked) == left
+    assert permitted(BaseVelocity(*wanted), LIMITS, 1.0, blocked) == BaseVelocity(*left)
 
 
 def test_a_slow_motion_is_not_slowed_further() -> None:
-    assert permitted((0.1, 0.0), LIMITS, 0.2, ()) == (0.1, 0.0)
+    assert permitted(BaseVelocity(0.1), LIMITS, 0.2, ()) == BaseVelocity(0.1)
 
 
 def test_the_base_slows_down_on_its_curve() -> None:
-    v_m_s, w_rad_s = permitted((0.5, 0.3), LIMITS, 0.5, ())
+    v_m_s, w_rad_s, _ = permitted(BaseVelocity(0.5, 0.3), LIMITS, 0.5, ())
     assert v_m_s == pytest.approx(0.25)
     assert w_rad_s == pytest.approx(0.15)
 
@@ -53,7 +54,7 @@ def test_the_base_slows_down_on_its_curve() -> None:
 def test_nothing_permitted_is_blocked_or_above_the_ratio(
     v_m_s: float, w_rad_s: float, ratio: float, blocked: set[Direction]
 ) -> None:
-    left_v, left_w = permitted((v_m_s, w_rad_s), LIMITS, ratio, blocked)
+    left_v, left_w, _ = permitted(BaseVelocity(v_m_s, w_rad_s), LIMITS, ratio, blocked)
     assert abs(left_v) <= ratio * LIMITS.speed_m_s + 1e-9
     assert abs(left_w) <= ratio * LIMITS.turn_rad_s + 1e-9
     assert not (left_v > 0 and FORWARD in blocked) and not (left_v < 0 and BACKWARD in blocked)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.control.judging.surroundings import SurroundingsWatch
+from vla_deploy.control.motion.base_velocity import STANDING
 from vla_deploy.control.motion.setpoint_rates import SetpointRates
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots.kinematics.model import full_positions
@@ -193,7 +194,7 @@ def refreshed(watch: SurroundingsWatch, rig: Any, position: np.ndarray, ticks: i
     now_ns = rig.lockstep.clock.now_ns()
     for tick in range(ticks):
         known = watch.refresh(
-            now_ns + tick * 4_000_000, position, still, still, position, 0.0, 0.0, powered=True
+            now_ns + tick * 4_000_000, position, still, still, position, STANDING, powered=True
         )
     return known
 

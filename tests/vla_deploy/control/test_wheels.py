@@ -13,7 +13,7 @@ from sim_twin.can import MemoryBus, MotorMounting, WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive.axis import ODriveAxis
-from vla_deploy.control.output.wheels import Wheels
+from vla_deploy.control.output.base_drive import can_wheels
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.devices import Drive
 
@@ -38,7 +38,7 @@ class Bench:
         butler = load_robot("butler")
         wiring = replace(butler.can_bus, protocol=protocol, endpoints_path=EMULATED_ENDPOINTS)
         self.robot: RobotDescription = replace(butler, parts=replace(butler.parts, can_bus=wiring))
-        self.wheels = Wheels(self.robot, load_profile("desktop"), self, self.world)  # type: ignore[arg-type]
+        self.wheels = can_wheels(self.robot, load_profile("desktop"), self, self.world)  # type: ignore[arg-type]
 
     def can(self, name: str) -> can.BusABC:
         if self.missing:
@@ -76,7 +76,7 @@ def test_the_base_drives_by_either_protocol(bench: Bench) -> None:
     bench.run(60)
     assert bench.wheels.enabled
     bench.run(250, 0.3)
-    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.01)
+    assert bench.wheels.velocity.v_m_s == pytest.approx(0.3, abs=0.01)
     assert bench.wheels.odometry.x_m > 0.15
     bench.wheels.close()
 
@@ -134,7 +134,7 @@ def test_the_drives_mode_and_gear_come_from_the_robot_file() -> None:
         for drive in bench.robot.can_bus.drives
     ]
     robot = with_drives(bench.robot, tuple(drives))
-    wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
+    wheels = can_wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     wheels.open()
     first = bench.world.wheels[0].drive
     assert isinstance(first, WheelDrive)
@@ -151,7 +151,7 @@ def test_other_motor_counts_than_declared_are_refused() -> None:
     bench = Bench("cia402")
     drives = tuple(replace(drive, counts_per_rev=4096) for drive in bench.robot.can_bus.drives)
     robot = with_drives(bench.robot, drives)
-    wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
+    wheels = can_wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     with pytest.raises(WrongDevice, match="encoder increments"):
         wheels.open()
 

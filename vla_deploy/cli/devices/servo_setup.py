@@ -90,9 +90,12 @@ def _chosen(robot: RobotDescription, joints: Sequence[str]) -> Sequence[Servo]:
     """Return the servos to set up, the highest id first: a new servo has a low one.
 
     Raises:
-        UsageError: the robot has no such joint.
+        UsageError: the robot has no such joint or wheel.
     """
-    names = chosen_joints(robot, joints)
+    turning = [one.joint for one in robot.servo_bus.wheels]
+    names = [one for one in turning if one in joints or not joints]
+    if len(names) < len(joints) or not joints:
+        names += chosen_joints(robot, [one for one in joints if one not in turning])
     names += [shadow_name(one.joint) for one in robot.servo_bus.shadows if one.joint in names]
     chosen = [one for one in robot.servo_bus.all_servos if one.joint in names]
     return sorted(chosen, key=lambda one: one.id, reverse=True)

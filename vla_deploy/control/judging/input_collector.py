@@ -1,11 +1,13 @@
 """Gather what the safety judge sees each tick."""
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.control.motion.axes import Floats, any_of
+from vla_deploy.control.motion.base_velocity import STANDING, BaseVelocity
 from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.joint_steps import JointSteps
 from vla_deploy.control.output.servos import ServoLine
@@ -25,8 +27,8 @@ class InputCollector:
     def __init__(
         self, space: SharedSpace, servos: ServoLine, wheels: BaseDrive, clock: Clock
     ) -> None:
-        self.v_m_s = 0.0
-        self.w_rad_s = 0.0
+        self.wanted = STANDING
+        """What the newest command asks of the base."""
         self._base_commands = tuple(map(space.cell_reader, BASE_COMMANDS))
         self._process_table = space.cell_reader(topics.PROCESS_TABLE)
         self._budget = BudgetWatch(space.cell_reader(topics.BUDGET_STOP))
@@ -50,9 +52,8 @@ class InputCollector:
         self._base_age_s = _age_s(sample, self._clock.now_ns())
         if (sample.topic, sample.sequence) != self._base_taken:
             self._base_taken = (sample.topic, sample.sequence)
-            v_m_s, w_rad_s = float(sample.data["v_m_s"]), float(sample.data["w_rad_s"])
-            valid = np.isfinite(v_m_s) and np.isfinite(w_rad_s)
-            self.v_m_s, self.w_rad_s = (v_m_s, w_rad_s) if valid else (0.0, 0.0)
+            wanted = BaseVelocity(*(float(sample.data[name]) for name in BaseVelocity._fields))
+            self.wanted = wanted if all(map(isfinite, wanted)) else STANDING
 
     def inputs(
         self,
@@ -76,7 +77,7 @@ class InputCollector:
         powers = energised and not stop_latched
         self._powered = self._powered | state.torque_on if powers else self._quiet
         guarded = energised and not reset_requested
-        commanded = not base_at_rest or self.v_m_s != 0.0 or self.w_rad_s != 0.0
+        commanded = not base_at_rest or self.wanted != STANDING
         return SafetyInputs(
             energised=energised,
             estop_source=estop_source,

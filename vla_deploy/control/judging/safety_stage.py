@@ -8,6 +8,7 @@ from vla_deploy.control.judging.surroundings import SurroundingsWatch
 from vla_deploy.control.judging.thresholds import safety_limits
 from vla_deploy.control.judging.tick_recorder import TickRecorder
 from vla_deploy.control.motion.axes import Flags, Floats, all_of
+from vla_deploy.control.motion.base_velocity import BaseVelocity
 from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.ipc import SharedSpace
@@ -59,8 +60,7 @@ class Judging:
             joints.velocity_rad_s,
             joints.effort_ratio,
             setpoint,
-            wheels.v_m_s,
-            wheels.w_rad_s,
+            wheels.velocity,
             powered=energised and all_of(joints.torque_on),
         )
         self.external_torque_nm = around.external_torque_nm
@@ -81,9 +81,9 @@ class Judging:
         # A joint that jumps is a finding, which counts: most ticks have none, of any rule.
         return jumped_joints(inputs, self.limits) if any(self.state.counts) else self._none
 
-    def note_sent(self, setpoint: Floats, v_m_s: float, w_rad_s: float) -> None:
+    def note_sent(self, setpoint: Floats, velocity: BaseVelocity) -> None:
         """Record what the tick has sent to joints and wheels."""
-        self._record.sent(setpoint, v_m_s, w_rad_s)
+        self._record.sent(setpoint, velocity)
 
     def close(self) -> None:
         """Record a tick that did not come to its end, and unmap the topics."""

@@ -17,6 +17,7 @@ from vla_deploy.control.judging.contact_torque import ContactTorque
 from vla_deploy.control.judging.thresholds import IMU_AGE_S, POSE_AGE_S
 from vla_deploy.control.judging.zone_watch import ZoneWatch
 from vla_deploy.control.motion.axes import Floats, all_of
+from vla_deploy.control.motion.base_velocity import BaseVelocity
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematics.model import RobotModel
@@ -94,8 +95,7 @@ class SurroundingsWatch:
         velocity: Floats,
         effort_ratio: Floats,
         setpoint: Floats,
-        v_m_s: float,
-        w_rad_s: float,
+        velocity_of_base: BaseVelocity,
         powered: bool,
     ) -> Surroundings:
         """Do the part that is most overdue, if any, and return all that is known.
@@ -110,7 +110,9 @@ class SurroundingsWatch:
         if now_ns >= part.due_ns and _is_known(position) and _is_known(velocity):
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
             motion = BaseMotion(
-                v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=self._deceleration_m_s2
+                v_m_s=velocity_of_base.v_m_s,
+                w_rad_s=velocity_of_base.w_rad_s,
+                deceleration_m_s2=self._deceleration_m_s2,
             )
             part.work(_Body(now_ns, position, velocity, setpoint, motion))
         return self._known

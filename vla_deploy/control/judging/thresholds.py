@@ -68,7 +68,7 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         voltage_max_v=highest_v,
         standstill_velocity=_STANDSTILL_SHARE * robot.velocity_max,
         standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / base.wheel_radius_m if base else np.inf,
-        scan_required=base is not None,
+        scan_required=robot.parts.lidar is not None,
         scan_age_s=BY_NAME["scan"].deadline_s,
         depth_age_s=BY_NAME["near_obstacles"].deadline_s if _looks_by_depth(robot) else np.inf,
         pose_age_s=POSE_AGE_S if home and home.zones else np.inf,

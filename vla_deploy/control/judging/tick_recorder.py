@@ -4,6 +4,7 @@ from dataclasses import fields
 from operator import attrgetter
 
 from vla_deploy.control.motion.axes import Floats
+from vla_deploy.control.motion.base_velocity import BaseVelocity
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.memory.delta import DeltaWriter
 from vla_deploy.ipc.memory.packing import Catalogue, types_within
@@ -14,7 +15,7 @@ _JUDGED = (
     *("tick", "now_ns", "state", "limits", "verdict"),
     *(f"inputs.{name}" for name in _INPUTS),
 )
-_SENT = ("sent", "sent_v_m_s", "sent_w_rad_s")
+_SENT = ("sent", *(f"sent_{name}" for name in BaseVelocity._fields))
 _read_inputs = attrgetter(*_INPUTS)
 _KEY_EVERY = 250
 
@@ -41,14 +42,14 @@ class TickRecorder:
         self._delta.put(0, (tick, now_ns, state, limits, verdict, *_read_inputs(inputs)))
         self._is_open = True
 
-    def sent(self, setpoint: Floats, v_m_s: float, w_rad_s: float) -> None:
+    def sent(self, setpoint: Floats, velocity: BaseVelocity) -> None:
         """Record the tick with what it sent to joints and wheels."""
-        self._append(setpoint, v_m_s, w_rad_s)
+        self._append(setpoint, *velocity)
 
     def close(self) -> None:
         """Record a tick that was judged and did not come to its end, and unmap the topic."""
         if self._is_open:
-            self._append(None, None, None)
+            self._append(*(None for _ in _SENT))
         self._ring.close()
 
     def _append(self, *sent: Floats | float | None) -> None:

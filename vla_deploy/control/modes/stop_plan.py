@@ -23,9 +23,8 @@ class StopPlan:
             joint: group.stop_category for group in robot.groups.values() for joint in group.joints
         }
         joints = [category[name] for name in robot.joint_names]
-        can_bus = robot.parts.can_bus
         self.base = min(
-            (category[drive.joint] for drive in (can_bus.drives if can_bus else ())),
+            (category[joint] for joint in robot.wheel_joints),
             default=StopCategory.STOP_THEN_REMOVE_POWER,
         )
         self.every_joint: Axes = np.arange(len(joints))

@@ -2,7 +2,9 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from math import hypot
 
+from vla_deploy.control.motion.base_velocity import STANDING, BaseVelocity
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import Direction
 
@@ -42,64 +44,82 @@ class BaseRamp:
     """Hold the base velocity that is being commanded."""
 
     def __init__(self, limits: BaseLimits) -> None:
-        self.v_m_s = 0.0
-        self.w_rad_s = 0.0
+        self.velocity = STANDING
         self._limits = limits
+
+    @property
+    def v_m_s(self) -> float:
+        """Return the commanded velocity ahead."""
+        return self.velocity.v_m_s
+
+    @property
+    def w_rad_s(self) -> float:
+        """Return the commanded turning velocity."""
+        return self.velocity.w_rad_s
 
     @property
     def at_rest(self) -> bool:
         """Return whether the commanded velocity is zero."""
-        return self.v_m_s == 0.0 and self.w_rad_s == 0.0
+        return self.velocity == STANDING
 
-    def advance(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
-        """Move towards a wanted velocity for one period; both parts reach it together."""
+    def advance(self, v_m_s: float, w_rad_s: float, period_s: float, left_m_s: float = 0.0) -> None:
+        """Move towards a wanted velocity for one period; all parts reach it together."""
         limits = self._limits
-        self._move(
-            _clamp(v_m_s, limits.speed_m_s), _clamp(w_rad_s, limits.turn_rad_s), 1.0, period_s
+        speed_m_s = hypot(v_m_s, left_m_s)
+        if left_m_s and speed_m_s > limits.speed_m_s:
+            v_m_s *= limits.speed_m_s / speed_m_s
+            left_m_s *= limits.speed_m_s / speed_m_s
+        wanted = BaseVelocity(
+            _clamp(v_m_s, limits.speed_m_s), _clamp(w_rad_s, limits.turn_rad_s), left_m_s
         )
+        self._move(wanted, 1.0, period_s)
 
     def brake(self, period_s: float) -> None:
         """Move towards rest for one period, as fast as the robot can bear where it must stop."""
         limits = self._limits
         harder = max(1.0, limits.stop_deceleration_m_s2 / limits.acceleration_m_s2)
-        self._move(0.0, 0.0, harder, period_s)
+        self._move(STANDING, harder, period_s)
 
-    def _move(self, v_m_s: float, w_rad_s: float, harder: float, period_s: float) -> None:
-        limits = self._limits
-        dv, dw = v_m_s - self.v_m_s, w_rad_s - self.w_rad_s
+    def _move(self, wanted: BaseVelocity, harder: float, period_s: float) -> None:
+        limits, before = self._limits, self.velocity
+        dv, dw = wanted.v_m_s - before.v_m_s, wanted.w_rad_s - before.w_rad_s
+        dl = wanted.left_m_s - before.left_m_s
         needed_s = (
-            max(abs(dv) / limits.acceleration_m_s2, abs(dw) / limits.turn_acceleration_rad_s2)
+            max(hypot(dv, dl) / limits.acceleration_m_s2, abs(dw) / limits.turn_acceleration_rad_s2)
             / harder
         )
         share = 1.0 if needed_s <= period_s else period_s / needed_s
-        self.v_m_s += share * dv
-        self.w_rad_s += share * dw
+        self.velocity = BaseVelocity(
+            before.v_m_s + share * dv, before.w_rad_s + share * dw, before.left_m_s + share * dl
+        )
 
     def halt(self) -> None:
         """Forget the velocity: the drives no longer follow it."""
-        self.v_m_s = self.w_rad_s = 0.0
+        self.velocity = STANDING
 
 
 def permitted(
-    wanted: tuple[float, float],
+    wanted: BaseVelocity,
     limits: BaseLimits,
     speed_ratio: float,
     blocked: Collection[Direction],
-) -> tuple[float, float]:
+) -> BaseVelocity:
     """Return what remains of a wanted velocity: no blocked motion, none above the speed ratio.
 
-    Both parts shrink together, so that the base slows down on its curve instead of leaving it.
+    All parts shrink together, so that the base slows down on its curve instead of leaving it. While
+    any direction is blocked the base does not move sideways: nothing judges that.
     """
-    v_m_s, w_rad_s = wanted
+    v_m_s, w_rad_s, left_m_s = wanted
+    left_m_s = 0.0 if blocked else left_m_s
     v_m_s = 0.0 if _direction(v_m_s, Direction.FORWARD, Direction.BACKWARD) in blocked else v_m_s
     w_rad_s = (
         0.0
         if _direction(w_rad_s, Direction.TURN_LEFT, Direction.TURN_RIGHT) in blocked
         else w_rad_s
     )
-    share = max(abs(v_m_s) / limits.speed_m_s, abs(w_rad_s) / limits.turn_rad_s)
+    share = max(hypot(v_m_s, left_m_s) / limits.speed_m_s, abs(w_rad_s) / limits.turn_rad_s)
     scale = 1.0 if share <= speed_ratio else speed_ratio / share
-    return scale * v_m_s, scale * w_rad_s
+    return BaseVelocity(v_m_s, w_rad_s, left_m_s).times(scale)
 
 
 def _direction(speed: float, positive: Direction, negative: Direction) -> Direction | None:

@@ -4,8 +4,15 @@ from typing import Protocol
 
 from drivers.clock import Clock
 from drivers.opener import DeviceOpener
+from drivers.servo.state import SILENT_S
+from drivers.wheel_drives.bus import DriveBus
 from platforms import Profile
-from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.motion.base_velocity import STANDING, BaseVelocity
+from vla_deploy.control.output.base_kinematics import DifferentialDrive
+from vla_deploy.control.output.drive_buses import drive_bus
+from vla_deploy.control.output.odometry import Odometry
+from vla_deploy.control.output.servo_drives import ServoDrives
+from vla_deploy.control.output.servos import ServoLine
 from vla_deploy.control.output.wheels import Wheels
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import DriveSample
@@ -17,8 +24,7 @@ class BaseDrive(Protocol):
     name: str
     lost: bool
     failure: str
-    v_m_s: float
-    w_rad_s: float
+    velocity: BaseVelocity
     odometry: Odometry
 
     @property
@@ -62,7 +68,11 @@ class BaseDrive(Protocol):
         """Return what the safety judge wants to know of each drive."""
         ...
 
-    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+    def within(self, velocity: BaseVelocity) -> BaseVelocity:
+        """Return a velocity on the same curve that asks no wheel for more than it may turn."""
+        ...
+
+    def cycle(self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0) -> None:
         """Command a base velocity, and take in what the drives tell."""
         ...
 
@@ -103,8 +113,7 @@ class FixedBase:
         self.name = "base"
         self.lost = False
         self.failure = ""
-        self.v_m_s = 0.0
-        self.w_rad_s = 0.0
+        self.velocity = STANDING
         self.odometry = Odometry(DifferentialDrive(wheel_radius_m=1.0, track_m=1.0))
 
     @property
@@ -123,7 +132,11 @@ class FixedBase:
         """Return nothing: there are no drives to judge."""
         return ()
 
-    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+    def within(self, velocity: BaseVelocity) -> BaseVelocity:
+        """Return that nothing moves."""
+        return STANDING
+
+    def cycle(self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0) -> None:
         """Do nothing."""
 
     def enable(self) -> None:
@@ -146,9 +159,38 @@ class FixedBase:
 
 
 def base_drive(
-    robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+    robot: RobotDescription,
+    profile: Profile,
+    devices: DeviceOpener,
+    servos: ServoLine,
+    clock: Clock,
 ) -> BaseDrive:
-    """Return the wheels of a robot, or what stands in for them."""
+    """Return the wheels of a robot, on whichever bus they hang, or what stands in for them."""
     if robot.parts.base is None:
         return FixedBase()
-    return Wheels(robot, profile, devices, clock)
+    if robot.servo_bus.wheels:
+        return servo_wheels(robot, servos, clock)
+    return can_wheels(robot, profile, devices, clock)
+
+
+def can_wheels(
+    robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+) -> Wheels:
+    """Return wheels that drives of a CAN bus turn."""
+    wiring = robot.can_bus
+
+    def open_bus() -> DriveBus:
+        return drive_bus(wiring, profile, devices.can(wiring.device), clock)
+
+    return Wheels(robot, wiring.device, open_bus, clock, age_limit_s=profile.can_heartbeat_s)
+
+
+def servo_wheels(robot: RobotDescription, servos: ServoLine, clock: Clock) -> Wheels:
+    """Return wheels that servos turn, on the bus of the joints."""
+    return Wheels(
+        robot,
+        f"{servos.name}: wheels",
+        lambda: ServoDrives(servos, clock),
+        clock,
+        age_limit_s=SILENT_S,
+    )

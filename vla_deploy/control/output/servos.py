@@ -1,6 +1,6 @@
 """Keep the servo bus: open, lose and reopen it, and take servos in and out of power one by one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from drivers.opener import DeviceOpener
 from drivers.servo.bus import ServoBusDriver
 from drivers.servo.shadowed_bus import ShadowedBus
 from drivers.servo.state import BusState
+from drivers.servo.wheeled_bus import WheeledBus
 from platforms import Profile
 from vla_deploy.control.motion.axes import Axes, Floats
 from vla_deploy.control.output.servo_faults import ServoFaults
@@ -20,6 +21,8 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.servos.declared import bus_family, servo_specs
 
 REOPEN_NS = NS_PER_S
+_REOPEN_WHEELS_NS = NS_PER_S // 5
+"""Wheels go on turning while nobody talks to them: their line is tried again sooner."""
 _FIRST_READS = 10
 
 
@@ -40,11 +43,17 @@ class ServoLine:
         self._watchdog_s = profile.bus_watchdog_s
         self._family = bus_family(robot)
         self._specs = servo_specs(robot)
-        self._ids = [servo.id for servo in robot.servo_bus.servos]
+        bus = robot.servo_bus
+        self._ids = [servo.id for servo in (*bus.servos, *bus.wheels)]
+        self.wheel_rows: Axes = np.arange(len(bus.servos), len(self._ids))
+        """The places, behind those of the joints, of the servos that turn wheels."""
+        self.wheel_names = robot.wheel_joints
+        self.wheels = BusState.of(len(bus.wheels))
         self._leaders = [robot.joint_index[one.joint] for one in robot.servo_bus.shadows]
         self._bus: ServoBusDriver | None = None
         self._next_open_ns = self._aged_ns = 0
-        self.state = BusState.of(len(self._ids))
+        self._reopen_ns = _REOPEN_WHEELS_NS if bus.wheels else REOPEN_NS
+        self.state = BusState.of(len(bus.servos))
 
     def open(self, *, thorough: bool = True) -> None:
         """Connect and read once; torque is left as the servos have it.
@@ -63,6 +72,9 @@ class ServoLine:
             watchdog_s=self._watchdog_s,
             fault_policy=self.faults.policy,
         )
+        wheeled = None
+        if len(self.wheel_rows):
+            bus = wheeled = WheeledBus(bus, len(self.wheel_rows))
         if self._leaders:
             bus = ShadowedBus(bus, self._leaders)
         try:
@@ -72,13 +84,14 @@ class ServoLine:
             bus.close()
             raise
         self._bus = bus
+        self.wheels = self.wheels if wheeled is None else wheeled.wheels
         self.lost = False
 
     def try_reopen(self) -> bool:
         """Open a lost line again, at most once a second, and tell whether it is back."""
         if not self.lost or self._clock.now_ns() < self._next_open_ns:
             return False
-        self._next_open_ns = self._clock.now_ns() + REOPEN_NS
+        self._next_open_ns = self._clock.now_ns() + self._reopen_ns
         try:
             self.open(thorough=False)
         except DriverError as error:
@@ -145,6 +158,15 @@ class ServoLine:
         except LinkLost as error:
             self._note_loss(error)
 
+    def write_speeds(self, speed_rad_s: Floats) -> None:
+        """Send a speed to every wheel."""
+        if self._bus is None or self.lost:
+            return
+        try:
+            self._bus.write_speeds(speed_rad_s)
+        except LinkLost as error:
+            self._note_loss(error)
+
     def energise(self, servo: int) -> bool:
         """Hold one servo where it is, its watchdog armed; False with `failure` when it refuses."""
         if self._never_moves:
@@ -159,6 +181,11 @@ class ServoLine:
     def reboot_faulted(self) -> bool:
         """Restart the servos that report a hardware error, the only way out of it."""
         return self._attempt(self._reboot_faulted)
+
+    def reboot(self, servos: Sequence[int]) -> bool:
+        """Restart these servos, whatever they report."""
+        self.faults.policy.acknowledge()
+        return self._attempt(lambda bus: _reboot_each(bus, [self._ids[servo] for servo in servos]))
 
     def remove_power(self, servos: Axes) -> bool:
         """Switch torque off; False with `failure` when a servo did not confirm it."""
@@ -203,7 +230,8 @@ class ServoLine:
 
     def _age(self) -> None:
         now_ns = self._clock.now_ns()
-        self.state.age_s += (now_ns - self._aged_ns) / NS_PER_S
+        for state in (self.state, self.wheels):
+            state.age_s += (now_ns - self._aged_ns) / NS_PER_S
         self._aged_ns = now_ns
 
     def _note_loss(self, error: LinkLost) -> None:
@@ -221,6 +249,11 @@ def _first_state(bus: ServoBusDriver) -> BusState:
             return state
     silent = np.flatnonzero(~np.isfinite(state.position_rad))
     raise NoReply(f"no position from {', '.join(str(bus.servos[n]) for n in silent)}; see cables")
+
+
+def _reboot_each(bus: ServoBusDriver, ids: Sequence[int]) -> None:
+    for servo_id in ids:
+        bus.reboot(servo_id)
 
 
 def _raise_first(failures: dict[int, DriverError]) -> None:

@@ -1,20 +1,20 @@
 """Keep the wheel drives: open, lose and reopen their bus, drive the base, tell where it went."""
 
 import logging
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from math import inf
 from typing import Final
 
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.errors import DriverError, LinkLost
-from drivers.opener import DeviceOpener
 from drivers.stepping import wait_for
 from drivers.wheel_drives.bus import DriveBus, DriveState
-from platforms import Profile
-from vla_deploy.control.output.drive_buses import drive_bus
+from vla_deploy.control.motion.base_velocity import STANDING, BaseVelocity
+from vla_deploy.control.output.base_kinematics import base_kinematics, within_wheels
 from vla_deploy.control.output.drive_samples import drive_samples
-from vla_deploy.control.output.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.output.odometry import Odometry
 from vla_deploy.control.output.wheel_tracking import WheelTracking
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import DriveSample
@@ -26,29 +26,35 @@ _LOG = logging.getLogger(__name__)
 
 
 class Wheels:
-    """Own the bus of both drives, left before right; a lost link is remembered after `open`."""
+    """Own the drives of all wheels; a lost link is remembered after `open`.
+
+    `open_bus` gives them anew after each loss, not yet connected.
+    """
 
     has_wheels: Final = True
 
     def __init__(
-        self, robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+        self,
+        robot: RobotDescription,
+        name: str,
+        open_bus: Callable[[], DriveBus],
+        clock: Clock,
+        *,
+        age_limit_s: float,
     ) -> None:
-        self.name = robot.can_bus.device
+        self.name = name
         self.lost = False
         self.failure = ""
         self.state: DriveState | None = None
-        self._devices = devices
+        self._open_bus = open_bus
         self._clock = clock
-        self._profile = profile
-        self._wiring = robot.can_bus
-        self._joints = [drive.joint for drive in self._wiring.drives]
-        self._geometry = DifferentialDrive(
-            wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
-        )
+        self._age_limit_s = age_limit_s
+        self._joints = robot.wheel_joints
+        self._most_rad_s = robot.base.max_wheel_rad_s or inf
+        self._geometry = base_kinematics(robot.base)
         self.odometry = Odometry(self._geometry)
-        self._tracking = WheelTracking(len(self._wiring.drives))
-        self.v_m_s = 0.0
-        self.w_rad_s = 0.0
+        self._tracking = WheelTracking(len(self._joints))
+        self.velocity = STANDING
         self._bus: DriveBus | None = None
         self._next_open_ns = 0
         self._followed = False
@@ -94,8 +100,7 @@ class Wheels:
         self._reopening = self._connecting()
 
     def _connecting(self) -> Generator[None, None, None]:
-        opened = self._devices.can(self.name)
-        bus = drive_bus(self._wiring, self._profile, opened, self._clock)
+        bus = self._open_bus()
         try:
             yield from bus.connecting()
         except (DriverError, GeneratorExit):
@@ -110,7 +115,7 @@ class Wheels:
 
     @property
     def enabled(self) -> bool:
-        """Return whether both drives follow the commanded speed."""
+        """Return whether all drives follow the commanded speed."""
         return self._bus is not None and not self.lost and self._bus.enabled
 
     @property
@@ -138,11 +143,15 @@ class Wheels:
             self._joints,
             self.state,
             self._tracking,
-            age_limit_s=self._profile.can_heartbeat_s,
+            age_limit_s=self._age_limit_s,
             dropped_out=self._dropped_out,
         )
 
-    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+    def within(self, velocity: BaseVelocity) -> BaseVelocity:
+        """Return a velocity on the same curve that asks no wheel for more than it may turn."""
+        return within_wheels(velocity, self._geometry, self._most_rad_s)
+
+    def cycle(self, v_m_s: float, w_rad_s: float, left_m_s: float = 0.0) -> None:
         """Command a base velocity, take in the drives' state and move the odometry on."""
         if self._bus is None:
             return
@@ -152,12 +161,12 @@ class Wheels:
         if self._off_at_ns is not None and self._clock.now_ns() >= self._off_at_ns:
             self.disable()
         try:
-            wanted_rad_s = self._geometry.wheel_speeds(v_m_s, w_rad_s)
+            wanted_rad_s = self._geometry.wheel_speeds(v_m_s, w_rad_s, left_m_s)
             state = self._bus.cycle(np.array(wanted_rad_s))
         except LinkLost as error:
             self.failure = str(error)
             self._note_loss()
-            self.v_m_s = self.w_rad_s = 0.0
+            self.velocity = STANDING
             return
         self.state = state
         self._followed = self._followed or state.enabled
@@ -169,7 +178,7 @@ class Wheels:
         else:
             self._tracking.forget()
         self.odometry.update(*position_rad)
-        self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
+        self.velocity = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
 
     def _attend(self, bus: DriveBus) -> None:
         """Command drives that were lost to stop until they are connected again.
@@ -200,14 +209,14 @@ class Wheels:
             self._bus.enable()
 
     def disable(self) -> None:
-        """Take the power off both drives."""
+        """Take the power off all drives."""
         self._followed = False
         self._off_at_ns = None
         if self._bus is not None:
             self._bus.disable()
 
     def cut_power(self) -> None:
-        """Take the power off both drives at once, as a stop of category 0 asks."""
+        """Take the power off all drives at once, as a stop of category 0 asks."""
         self.disable()
         if self._bus is None:
             return

@@ -45,8 +45,7 @@ class Telemetry:
         record["x_m"] = odometry.x_m
         record["y_m"] = odometry.y_m
         record["yaw_rad"] = odometry.yaw_rad
-        record["v_m_s"] = wheels.v_m_s
-        record["w_rad_s"] = wheels.w_rad_s
+        record["v_m_s"], record["w_rad_s"], record["left_m_s"] = wheels.velocity
         record["enabled"] = wheels.enabled
         self._base.commit()
 

@@ -22,13 +22,16 @@ class Scratch:
         self._columns: dict[str, NDArray[Any]] = {
             field.name: array[field.name].reshape(field.shape) for field in topic.fields
         }
+        self._may_lack = {field.name: 0 for field in topic.fields if field.may_lack}
 
     def fill(self, fields: Mapping[str, Any]) -> None:
-        """Set every field; a shorter array leaves zeros behind it.
+        """Set every field; what is not given of one that may lack, and of an array, is zero.
 
         Raises:
             BadPayload: a field is missing, unknown, or does not fit its declaration.
         """
+        if fields.keys() != self._columns.keys():
+            fields = {**self._may_lack, **fields}
         if fields.keys() != self._columns.keys():
             missing = sorted(self._columns.keys() - fields.keys())
             unknown = sorted(fields.keys() - self._columns.keys())

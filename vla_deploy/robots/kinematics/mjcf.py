@@ -94,8 +94,9 @@ def _root_moves_as_declared(document: Document, mjcf: MjcfNames) -> Iterator[Tab
 
 
 def _motor_names(document: Document) -> Iterator[tuple[str, object]]:
-    for i, row in enumerate(rows(table(document, "servo_bus"), "servos")):
-        yield f"servo_bus.servos[{i}].joint", row.get("joint")
+    for kind in ("servos", "wheels"):
+        for i, row in enumerate(rows(table(document, "servo_bus"), kind)):
+            yield f"servo_bus.{kind}[{i}].joint", row.get("joint")
 
 
 def _named(
@@ -108,7 +109,8 @@ def _named(
 
 
 def _joint_names(document: Document) -> Iterator[tuple[str, object]]:
-    for outer, inner in (("servo_bus", "servos"), ("can_bus", "drives")):
+    turning = (("servo_bus", "servos"), ("servo_bus", "wheels"), ("can_bus", "drives"))
+    for outer, inner in turning:
         for i, row in enumerate(rows(table(document, outer), inner)):
             yield f"{outer}.{inner}[{i}].joint", row.get("joint")
 

@@ -231,7 +231,7 @@ def _wheel_limit(robot: RobotDescription, attributes: Attributes) -> dict[str, s
     if "actuatorfrcrange" not in attributes:
         return None
     base = robot.base
-    speed = base.max_speed_m_s + base.max_turn_rad_s * base.track_m / 2
+    speed = base.max_speed_m_s + base.max_turn_rad_s * base.lever_m
     effort = np.abs(numbers(attributes["actuatorfrcrange"])).max()
     return {"velocity": _text((speed / base.wheel_radius_m,)), "effort": _text((effort,))}
 

@@ -18,6 +18,8 @@ from vla_deploy.world import Query
 # Where the heading goes, left of a thing that a hand before one shoulder may hide.
 PAST_HAND_RAD: Final = {("left",): 0.15, ("right",): -0.15, ("left", "right"): 0.0}
 
+_NO_WAY: Final = "and without a lidar I do not find my way to it; drive me nearer"
+
 T = TypeVar("T")
 Solving = Generator[None, None, T]
 
@@ -73,9 +75,10 @@ def reach(
     for place in () if scene is None else scene.below(known["id"]):
         if place in context.keeps_out:
             raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
-    if context.robot.parts.base is None:
+    if not context.robot.finds_its_way:
         if anew or not context.robot.reach.has(to_base(context.link.pose, known["position_m"])):
-            raise OutOfReach(f"the {query} is out of my reach, and I cannot drive")
+            why = "and I cannot drive" if context.robot.parts.base is None else _NO_WAY
+            raise OutOfReach(f"the {query} is out of my reach, {why}")
         return
     reasons = []
     for goal in standing_poses(context, known["position_m"], anew=anew):
@@ -116,7 +119,7 @@ def _see_past_hands(context: SkillContext, query: Query) -> Skill:
         yield from see(context, query)
     except TryAgain:
         known, full = remembered(context, query), _full_hands(context)
-        if known is None or not full or context.robot.parts.base is None:
+        if known is None or not full or not context.robot.finds_its_way:
             raise
         x_m, y_m, _ = to_base(context.link.pose, known["position_m"])
         yield from turn_by(context, math.atan2(y_m, x_m) + PAST_HAND_RAD[full])

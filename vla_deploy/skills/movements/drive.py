@@ -338,7 +338,12 @@ def hindrance_of(
 
 
 def _why_blind(context: SkillContext) -> str:
-    """Say why the robot does not know where it drives: no scan, or one off the map; else ""."""
+    """Say why the robot does not know where it drives: no scan, or one off the map; else "".
+
+    A base without a lidar drives blindly, as far as it is told.
+    """
+    if context.robot.parts.lidar is None:
+        return ""
     if context.link.ranges_m is None:
         return "the lidar tells nothing, and without it the robot does not drive"
     if context.link.match_ratio < MATCH_RATIO:

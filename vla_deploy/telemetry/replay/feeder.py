@@ -147,7 +147,11 @@ class TopicFeeder:
 
 def fields_of(topic: Topic[Any], document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a packed cell; what another version did not record is zero."""
-    return {field.name: _value(field, document.get(field.name)) for field in topic.fields}
+    return {
+        field.name: _value(field, document.get(field.name))
+        for field in topic.fields
+        if field.name in document or not field.may_lack
+    }
 
 
 def shifted(document: Any, shift_ns: int) -> Any:

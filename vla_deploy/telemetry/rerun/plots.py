@@ -15,7 +15,7 @@ from vla_deploy.telemetry.schemas.foxglove_json import Json
 
 JOINT_TOPIC: Final = "joint_state"
 _JOINT_COUNT: Final = "joint_count"
-_SENT: Final = ("sent", "sent_v_m_s", "sent_w_rad_s")
+_SENT: Final = ("sent", "sent_v_m_s", "sent_w_rad_s", "sent_left_m_s")
 DOCUMENT_NUMBERS: Final[Mapping[str, tuple[str, ...]]] = {
     "control_status": (
         "period_s",
@@ -104,8 +104,8 @@ class TickPlotter:
             yield curve(f"{TICKS}/period_s", (now_ns - before[1]) / NS_PER_S)
         yield curve(f"{TICKS}/speed_ratio", row["verdict"].speed_ratio)
         for name in _SENT:
-            if row[name] is not None:
-                yield curve(f"{TICKS}/{name}", _plain(row[name]))
+            if (value := row.get(name)) is not None:  # an older version sent less
+                yield curve(f"{TICKS}/{name}", _plain(value))
 
 
 def _plain(value: Any) -> Any:

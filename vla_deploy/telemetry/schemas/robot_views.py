@@ -100,7 +100,7 @@ def odometry(state: np.void, stamp_ns: int) -> Json:
         "frame_id": ODOM,
         "body_frame_id": BASE,
         "pose": floor_pose_json(state["x_m"], state["y_m"], state["yaw_rad"]),
-        "linear_velocity": point_json(state["v_m_s"], 0.0),
+        "linear_velocity": point_json(state["v_m_s"], state["left_m_s"]),
         "angular_velocity": point_json(0.0, 0.0, state["w_rad_s"]),
     }
 

@@ -88,8 +88,12 @@ class Velocity(GatewayPart):
         if not all(map(math.isfinite, parts)):
             self._refusals.note("it holds numbers that are not finite")
             return
-        if any((twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y)):
-            self._refusals.note("this base moves along x and turns about z only")
+        base = self._gateway.robot.parts.base
+        sideways = base is not None and base.is_holonomic
+        left_m_s = float(twist.linear.y) if sideways else 0.0
+        if any((twist.linear.y - left_m_s, twist.linear.z, twist.angular.x, twist.angular.y)):
+            along = "along x and y" if sideways else "along x"
+            self._refusals.note(f"this base moves {along} and turns about z only")
             return
         why = refusal_of(self._gateway.control_status()) or self._claim.why_not_taken()
         if why:
@@ -97,9 +101,15 @@ class Velocity(GatewayPart):
             return
         self._last_ns = self._clock.now_ns()
         v_m_s, w_rad_s = float(twist.linear.x), float(twist.angular.z)
-        # Both by the same ratio: the curve stays.
-        ratio = min(1.0, self._claim.most_m_s() / abs(v_m_s)) if v_m_s else 1.0
-        self._command.put(v_m_s=v_m_s * ratio, w_rad_s=w_rad_s * ratio, valid_s=HOLDS_S)
+        # All by the same ratio: the curve stays.
+        speed_m_s = math.hypot(v_m_s, left_m_s)
+        ratio = min(1.0, self._claim.most_m_s() / speed_m_s) if speed_m_s else 1.0
+        self._command.put(
+            v_m_s=v_m_s * ratio,
+            w_rad_s=w_rad_s * ratio,
+            left_m_s=left_m_s * ratio,
+            valid_s=HOLDS_S,
+        )
 
 
 class JointCommands(GatewayPart):

@@ -127,6 +127,7 @@ class BodyTopics(GatewayPart):
         message.header.frame_id = ODOM
         fill_pose(message.pose.pose, pose)
         message.twist.twist.linear.x = float(data["v_m_s"])
+        message.twist.twist.linear.y = float(data["left_m_s"])
         message.twist.twist.angular.z = float(data["w_rad_s"])
         message.pose.covariance = message.twist.covariance = _COVARIANCE
         self._odometry.publish(message)
