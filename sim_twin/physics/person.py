@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_twin.errors import RefereeRefusal
-from sim_twin.physics.compose import STEP_S
+from sim_twin.physics.compose import ROBOT_ROOT, STEP_S
 from sim_twin.physics.engine import Engine
 
 PULL_N_S: Final = 15.0
@@ -28,6 +28,8 @@ AWAY_M: Final = (100.0, 0.0)
 BODY: Final = "person"
 """The mocap body of a world that has a person to be seen."""
 FASTEST_M_S: Final = 3.0
+YIELDS_M: Final = 0.6
+"""Nobody walks into a robot: so near before its middle they stand until it is out of their way."""
 REACH_M: Final = 50.0
 """The map's bounds: nothing is put further away."""
 
@@ -49,6 +51,7 @@ class WorldPerson:
         self._furniture = tuple(one for one in engine.brought if one != BODY)
         self._taken: list[str] = list(self._furniture)
         self._told = ""
+        self._robot = engine.model.body(ROBOT_ROOT).id
         self._at: NDArray[np.float64] | None = None
         self._way: list[NDArray[np.float64]] = []
         self._speed_m_s = 0.0
@@ -156,7 +159,9 @@ class WorldPerson:
     def _walk_on(self) -> None:
         if self._at is None or not self._way:
             return
-        left = self._way[0] - self._at
+        left, robot = self._way[0] - self._at, self._engine.data.xpos[self._robot, :2]
+        if math.dist(robot, self._at) < YIELDS_M and float((robot - self._at) @ left) > 0.0:
+            return
         left_m, step_m = float(np.hypot(*left)), self._speed_m_s * STEP_S
         self._at = self._way.pop(0) if left_m <= step_m else self._at + left * (step_m / left_m)
         if left_m > 0.0:

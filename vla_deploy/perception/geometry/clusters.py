@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.perception.geometry.cloud import Cloud, Floats, Mask
+from vla_deploy.perception.geometry.outline import judge_outline
 from vla_deploy.perception.geometry.supports import Support, inside
 from vla_deploy.perception.naming.colour import colour_names
 
@@ -68,25 +69,26 @@ class _Hidden:
 
 
 def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
-    """Return the clusters on each support, without furniture and walls."""
+    """Return the clusters on each support, without furniture and walls, or parts of them."""
     clusters: list[Cluster] = []
     flat_points = cloud.points.reshape(-1, 3)
-    sigma_m = cloud.sigma_m()
     for index, support in enumerate(supports):
         heights = cv2.medianBlur(support.heights_above(cloud), 3)
-        standing = np.flatnonzero(cloud.valid & _stands_up(heights, sigma_m, support.is_floor))
+        standing = np.flatnonzero(cloud.valid & _stands_up(heights, cloud, support))
         standing = standing[inside(support.outline, flat_points[standing], OUTLINE_MARGIN_M)]
         for higher in supports[:index]:
             standing = standing[~_belongs_to(higher, support, flat_points[standing])]
-        clusters += _split(cloud, support, heights, standing)
+        found = _split(cloud, support, heights, standing)
+        clusters += [one for one in found if not judge_outline(cloud, heights, one.pixels).is_part]
     return clusters
 
 
-def _stands_up(heights: Floats, sigma_m: Floats, is_floor: bool) -> Mask:
+def _stands_up(heights: Floats, cloud: Cloud, support: Support) -> Mask:
     """Return which pixels are higher than their support, with the low edges of what is higher."""
-    lowest_m = MIN_HEIGHT_ON_FLOOR_M if is_floor else MIN_HEIGHT_M
+    lowest_m = MIN_HEIGHT_ON_FLOOR_M if support.is_floor else MIN_HEIGHT_M
+    sigma_m: Floats = np.maximum(cloud.sigma_m(), support.uneven_m)
     surely: Mask = heights > np.maximum(lowest_m, NOISE_SIGMAS * sigma_m)
-    if is_floor:
+    if support.is_floor:
         return surely
     barely = (heights > np.maximum(EDGE_HEIGHT_M, EDGE_SIGMAS * sigma_m)).astype(np.uint8)
     _, parts = cv2.connectedComponents(barely, connectivity=8)
@@ -205,11 +207,13 @@ def _hidden_shares(cloud: Cloud, rows: NDArray[np.intp], columns: NDArray[np.int
     nearer = cloud.own_body[around] | ((depth_m > 0.0) & (depth_m < beside - OCCLUDER_M))
     above, left, right = (np.zeros_like(ring) for _ in range(3))
     above[:-2] = member[2:] > 0
+    highest = above & ring
+    highest[int(rows.min()) - top :] = False
     left[:, :-2] = member[:, 2:] > 0
     right[:, 2:] = member[:, :-2] > 0
     return _Hidden(
         outline=_share(nearer, ring),
-        top=_share(nearer, above & ring),
+        top=max(_share(nearer, above & ring), _share(nearer, highest)),
         end=max(_share(nearer, left & ring), _share(nearer, right & ring)),
     )
 

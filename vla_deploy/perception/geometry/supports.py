@@ -22,16 +22,23 @@ FLOOR_M = 0.04
 STRIDE = 2
 FIT_POINTS = 2000
 CORNER_M = 0.003
+# Standard deviation of normal errors over the median of their sizes.
+SIGMA_OF_MEDIAN = 1.4826
 _FIT_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Support:
-    """Hold one surface: z = a x + b y + c within a convex outline (n, 2) in the base frame."""
+    """Hold one surface: z = a x + b y + c within a convex outline (n, 2) in the base frame.
+
+    `uneven_m` is the standard deviation of its points from the plane: of a table that is the depth
+    noise, of a pillow's top much more.
+    """
 
     plane: tuple[float, float, float]
     outline: Floats
     is_floor: bool = False
+    uneven_m: float = 0.0
 
     def height_m(self, x_m: float, y_m: float) -> float:
         """Return the surface's height above the floor at a point."""
@@ -145,6 +152,7 @@ def _pieces(
 ) -> list[Support]:
     """Split the pixels of one plane into surfaces that do not touch."""
     xy = points[on_plane][:, :2]
+    off_m = np.abs(_above(points[on_plane], plane))
     low = xy.min(axis=0)
     cells = ((xy - low) / CELL_M).astype(np.intp)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=np.uint8)
@@ -157,9 +165,11 @@ def _pieces(
     areas = np.bincount(label, weights=area[on_plane])
     supports = []
     for index in np.flatnonzero(areas >= MIN_KNOWN_AREA_M2):
-        piece = xy[label == index]
+        member = label == index
+        piece = xy[member]
         if areas[index] >= MIN_AREA_M2 or _is_on(piece, known):
-            supports.append(Support(plane=plane, outline=_outline(piece)))
+            uneven_m = SIGMA_OF_MEDIAN * float(np.median(off_m[member]))
+            supports.append(Support(plane=plane, outline=_outline(piece), uneven_m=uneven_m))
     return supports
 
 

@@ -1,4 +1,7 @@
-"""Find an object: in memory, on the furniture in view, then from each viewpoint of the home."""
+"""Find an object: in memory, on the furniture in view, then from each viewpoint of the home.
+
+Where it was last comes first, what was looked at just now comes last, between them what is near.
+"""
 
 import math
 from collections.abc import Mapping
@@ -24,6 +27,7 @@ from vla_deploy.skills.movements.gaze import (
     watch_for,
 )
 from vla_deploy.world import Query
+from vla_deploy.world.memory import where_to_look
 from vla_deploy.world.surfaces import FURNITURE_AHEAD_M
 
 FURNITURE_HEIGHT_M = 0.5
@@ -33,6 +37,10 @@ PERHAPS_SEEN_M = 2.9
 NECK_RANGE_RAD = 1.7
 # A way that is not much longer than the line of sight leads around no wall.
 DETOUR_RATIO, DETOUR_M = 1.3, 0.6
+# So near the middle of furniture is what lies on it.
+ON_FURNITURE_M = 0.7
+# In so short a time nobody has put anything there.
+JUST_SEEN_S = 30.0
 GLANCE = (0.0, 0.55)
 # Where the eyes sweep at a viewpoint, as (pan, tilt).
 SWEEP = ((0.0, 0.85), (0.65, 0.65), (-0.65, 0.65))
@@ -62,7 +70,7 @@ def _search(context: SkillContext, query: Query) -> Skill:
         yield from speak(context, {"text": f"I leave out the {_left_out(context)}."})
     yield from _look_around(context, query, left)
     while left and remembered(context, query) is None:
-        viewpoint = min(left, key=lambda one: _way_m(context, one))
+        viewpoint = min(left, key=lambda one: _rank(context, query, one))
         del left[viewpoint]
         yield from _search_from(context, viewpoint, query)
 
@@ -71,10 +79,14 @@ def _look_around(context: SkillContext, query: Query, left: dict[Pose2D, None]) 
     """Look ahead, then at the furniture in sight; drop the viewpoints that this makes needless."""
     if context.robot.parts.head is None:
         yield from carry(context)  # out of the view of a camera that stands fast
-    yield from _sweep(context, query, (GLANCE,))
-    for distance_m, viewpoint in sorted(_in_sight(context, left), key=lambda one: one[0]):
+    in_sight = sorted(_in_sight(context, left), key=lambda one: one[0])
+    if not in_sight or not _is_just_seen(context, in_sight[0][1]):
+        yield from _sweep(context, query, (GLANCE,))
+    for distance_m, viewpoint in in_sight:
         if remembered(context, query) is not None:
             return
+        if _is_just_seen(context, viewpoint):
+            continue
         yield from gaze_at(context, _furniture_of(viewpoint))
         yield from watch_for(context, query)
         if distance_m < SURELY_SEEN_M:
@@ -117,6 +129,42 @@ def _in_sight(
         if _way_m(context, viewpoint) < DETOUR_RATIO * distance_m + DETOUR_M:
             seen.append((distance_m, viewpoint))
     return seen
+
+
+def _rank(context: SkillContext, query: Query, viewpoint: Pose2D) -> tuple[bool, bool, float]:
+    """Return what to search by, the least first."""
+    return (
+        not _was_there(context, query, viewpoint),
+        _is_just_seen(context, viewpoint),
+        _way_m(context, viewpoint),
+    )
+
+
+def _was_there(context: SkillContext, query: Query, viewpoint: Pose2D) -> bool:
+    """Return whether what is meant was seen there, even if that is long ago or it has left."""
+    scene = context.link.snapshot()
+    if scene is None:
+        return False
+    guesses = where_to_look(query, scene, {})
+    return any(
+        _is_on(guess.position_m[:2], viewpoint)
+        for guess in guesses
+        if guess.position_m is not None and not is_out_of_reach(context, guess.thing_id)
+    )
+
+
+def _is_just_seen(context: SkillContext, viewpoint: Pose2D) -> bool:
+    """Return whether things on a viewpoint's furniture, near by, were seen a moment ago."""
+    x_m, y_m, _ = to_base(context.link.pose, _furniture_of(viewpoint))
+    scene = context.link.snapshot() if math.hypot(x_m, y_m) < SURELY_SEEN_M else None
+    return scene is not None and any(
+        scene.unseen_s(one) < JUST_SEEN_S and not one.held_by and _is_on(one.xy_m, viewpoint)
+        for one in scene.things
+    )
+
+
+def _is_on(xy_m: tuple[float, float], viewpoint: Pose2D) -> bool:
+    return math.dist(xy_m, _furniture_of(viewpoint)[:2]) < ON_FURNITURE_M
 
 
 def _furniture_of(viewpoint: Pose2D) -> tuple[float, float, float]:
