@@ -93,9 +93,10 @@ class DriveState:
 
 
 class DriveBus(Protocol):
-    """Command all wheel drives of one CAN bus; nothing but `connect` waits.
+    """Command all wheel drives of one bus; nothing but `connect` waits.
 
-    Every drive stops by itself when the calls of `cycle` stop.
+    Every drive stops by itself when the calls of `cycle` stop; servos without a bus watchdog do
+    not, and say so (docs/safety.md).
     """
 
     @property

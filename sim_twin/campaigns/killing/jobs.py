@@ -34,8 +34,19 @@ ON_A_TABLE: Final = Jobs(
     ),
     put_down=("put it down",),
 )
+ON_THE_FLOOR: Final = Jobs(
+    commands=(
+        "pick up the nearest red block and put it on the floor",
+        "turn left by 30 degrees",
+        "pick up the nearest blue block and put it on the floor",
+        "turn right by 30 degrees",
+    ),
+    put_down=("put it down",),
+)
 
 
 def jobs_of(robot: RobotDescription) -> Jobs:
-    """Return what a robot is asked for: in its home, or on the table that it is mounted on."""
-    return ON_A_TABLE if robot.parts.base is None else AT_HOME
+    """Return what a robot is asked for: in its home, on the table of its mount, or on the floor."""
+    if robot.finds_its_way:
+        return AT_HOME
+    return ON_A_TABLE if robot.parts.base is None else ON_THE_FLOOR
