@@ -38,7 +38,7 @@ from vla_deploy.supervisor.runs.log_files import complaint, last_words
 from vla_deploy.supervisor.runs.options import RunOptions
 from vla_deploy.supervisor.runs.run import Run
 from vla_deploy.supervisor.systemd import NotifyTarget, own_target, status_line
-from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RunContext
+from vla_deploy.supervisor.table import GivingUp, ProcessSpec, RunContext, table_of
 
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
@@ -64,7 +64,7 @@ class Supervisor:
     def __init__(
         self,
         options: RunOptions,
-        table: tuple[ProcessSpec, ...] = TABLE,
+        table: tuple[ProcessSpec, ...] | None = None,
         clock: Clock | None = None,
         notify: NotifyTarget | None = None,
     ) -> None:
@@ -75,7 +75,7 @@ class Supervisor:
         """The profile in force."""
         self._robot = load_robot(options.robot)
         self._options = options
-        self._table = table
+        self._table = table = table_of(self._robot) if table is None else table
         self._given_clock = clock
         self._notify = own_target() if notify is None else notify
         self._records = {spec.name: ProcessRecord() for spec in table}

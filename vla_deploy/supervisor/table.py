@@ -5,7 +5,7 @@ previous one start together, and stop together.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from platforms import Profile
@@ -153,6 +153,9 @@ _TWIN = (
 )
 _DEVICES = ("--devices-dir", "{devices_dir}")
 
+UNWATCHED_WHEELS_S = 1.0
+"""As long a control that hangs may leave wheels turning that have no watchdog of their own."""
+
 TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="twin",
@@ -263,3 +266,18 @@ TABLE: tuple[ProcessSpec, ...] = (
         giving_up=GivingUp.CARRY_ON,  # it is then not moved over ROS
     ),
 )
+
+
+def table_of(robot: RobotDescription) -> tuple[ProcessSpec, ...]:
+    """Return the table for a robot: wheels that no watchdog stops wait for no hung control."""
+    if not robot.servo_bus.wheels:
+        return TABLE
+    return tuple(_sooner(spec) if spec.name == "control" else spec for spec in TABLE)
+
+
+def _sooner(spec: ProcessSpec) -> ProcessSpec:
+    limits_s = (one.silence_limit_s and UNWATCHED_WHEELS_S for one in spec.watched)
+    watched = zip(spec.watched, limits_s, strict=True)
+    return replace(
+        spec, watched=tuple(replace(one, silence_limit_s=limit_s) for one, limit_s in watched)
+    )

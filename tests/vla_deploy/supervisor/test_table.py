@@ -2,7 +2,7 @@ from dataclasses import replace
 
 from platforms import load_profile
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.table import TABLE, RunContext, optional, twin_only
+from vla_deploy.supervisor.table import TABLE, RunContext, optional, table_of, twin_only
 
 CONTEXT = RunContext(twin=True, robot=load_robot("butler"), profile=load_profile("desktop"))
 
@@ -39,3 +39,12 @@ def test_the_rows_that_the_budgets_may_suspend():
     everything = replace(CONTEXT, ros=True, suspended={row.name: "too hot" for row in TABLE})
     suspended = [row.name for row in TABLE if row.when(everything) == "too hot"]
     assert suspended == ["perception", "speech", "planner", "executor", "dashboard", "ros"]
+
+
+def test_a_hung_control_is_ended_sooner_where_no_watchdog_stops_the_wheels() -> None:
+    def limits_s(robot: str) -> list[float | None]:
+        rows = table_of(load_robot(robot))
+        return [one.silence_limit_s for row in rows if row.name == "control" for one in row.watched]
+
+    assert limits_s("butler") == [5.0, None]
+    assert limits_s("lekiwi") == [1.0, None]
