@@ -21,6 +21,8 @@ from vla_deploy.ipc.payloads.motion import OperatorActName
 from vla_deploy.ipc.stop_button import ESTOP
 
 EMERGENCY_STOP: Final = "/emergency_stop"
+LOOKS: Final = 50
+"""Steps in which the name of who asks for a reset or to arm is waited for: neither is urgent."""
 WAIT_S: Final = 5.0
 _log = logging.getLogger(__name__)
 
@@ -86,7 +88,8 @@ class Acts(GatewayPart):
         if asked.act == ESTOP:
             self._asked.append(asked)
         else:
-            graph.when_named(partial(graph.caller, asked.service), partial(self._operate, asked))
+            find, act = partial(graph.caller, asked.service), partial(self._operate, asked)
+            graph.when_named(find, act, looks=LOOKS)
 
     def _operate(self, asked: _Asked, caller: str) -> None:
         self._gateway.link.operate(asked.act, "over ROS", caller)
