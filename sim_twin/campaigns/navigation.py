@@ -184,7 +184,7 @@ def _drive(course: _Course, kind: str, notes: _Notes) -> None:
                 break
         if not (outcome or {}).get("success"):
             notes.failures.append(f"{room}: {(outcome or {}).get('error') or 'no end in time'}")
-        if "chair" not in course.person.taken:
+        if "chair" not in course.person.document()["taken"]:
             course.person.take("chair")
     if kind == "drives" and held:
         notes.failures.append(f"held {held} times with nothing in the way")

@@ -49,7 +49,9 @@ class WorldPerson:
         self._engine = engine
         self._pull: _Pull | None = None
         self._furniture = tuple(one for one in engine.brought if one != BODY)
-        self._taken: list[str] = list(self._furniture)
+        self._away: set[str] = set(self._furniture)
+        """What of the furniture is not there."""
+        self._taken: list[str] = []
         self._told = ""
         self._robot = engine.model.body(ROBOT_ROOT).id
         self._at: NDArray[np.float64] | None = None
@@ -73,7 +75,7 @@ class WorldPerson:
         return {
             "things": {name: at for name, at in things.items() if name not in self._taken},
             "held_by_robot": truth["held"],
-            "taken": list(self._taken),
+            "taken": [*self._taken, *sorted(self._away)],
             "pulls_at": self.pulls_at,
             "at_m": None if self._at is None else self._at.tolist(),
             "walks": bool(self._way),
@@ -86,7 +88,7 @@ class WorldPerson:
         Raises:
             RefereeRefusal: there is no such thing, or the person has it, or pulls at another.
         """
-        if name in self._taken:
+        if name in self._taken or name in self._away:
             raise RefereeRefusal(f"the person has the {name} already; put it somewhere first")
         if name in self._furniture:
             self._put_away(name)
@@ -119,6 +121,7 @@ class WorldPerson:
             raise RefereeRefusal(f"the robot touches the {name}; take it first")
         self._engine.place(name, *(float(one) for one in numbers if one is not None))
         self._taken = [one for one in self._taken if one != name]
+        self._away.discard(name)
 
     def walk(self, way_m: Any, speed_m_s: Any) -> None:
         """Appear at the first of (n, 2) points of the map, and walk on along the others.
@@ -169,8 +172,8 @@ class WorldPerson:
             self._engine.move(BODY, float(self._at[0]), float(self._at[1]), heading_rad)
 
     def _put_away(self, name: str) -> None:
-        self._engine.place(name, AWAY_M[0], -float(len(self._taken)) - 2.0, 0.0, 0.0)
-        self._taken.append(name)
+        self._engine.place(name, *AWAY_M, 0.0, 0.0)
+        self._away.add(name)
 
     def _keep(self) -> None:
         if (pull := self._pull) is None:

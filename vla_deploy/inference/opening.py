@@ -131,6 +131,7 @@ class RunWatch:
     def __exit__(self, *_: object) -> None:
         if self._timer is not None:
             self._timer.cancel()
+            self._timer.join()
 
     def _end(self) -> None:
         self.is_over = True

@@ -11,6 +11,7 @@ from vla_deploy.ipc import BadPayload
 from vla_deploy.ipc.memory.delta import DeltaReader
 from vla_deploy.ipc.memory.packing import Catalogue, types_within
 from vla_deploy.safety import SafetyInputs, SafetyLimits, SafetyState, Verdict, evaluate
+from vla_deploy.safety.causes import RULES
 from vla_deploy.telemetry.errors import FlightForeign
 
 JUDGED_TYPES = types_within(SafetyState, SafetyInputs, SafetyLimits, Verdict)
@@ -68,7 +69,7 @@ def judge_again(records: Iterable[bytes]) -> FlightJudgement:
     """Judge the ticks of one flight again, up to the first difference.
 
     Raises:
-        FlightForeign: they were recorded by a version whose inputs do not fit this one.
+        FlightForeign: they were recorded by a version whose inputs or rules do not fit this one.
     """
     ticks = unread = 0
     before: tuple[int, SafetyState] | None = None
@@ -79,6 +80,11 @@ def judge_again(records: Iterable[bytes]) -> FlightJudgement:
             unread += 1
             continue
         ticks += 1
+        if len(tick.state.counts) != len(RULES):
+            raise FlightForeign(
+                f"recorded by other rules: {len(tick.state.counts)} causes, this version has "
+                f"{len(RULES)}; judge it with the version that recorded it"
+            )
         state, verdict = evaluate(tick.state, tick.inputs, tick.limits)
         chained = before is not None and before[0] + 1 == tick.tick
         difference = _first_difference(tick.tick, tick.verdict, verdict) or (

@@ -171,7 +171,7 @@ def test_a_manifest_that_a_person_wrote_is_read(read):
 
 @pytest.mark.parametrize("text", [DETECTOR, WEAK, BY_CLASS, SPOTTER, PLAIN, WHISPER, LANGUAGE])
 def test_what_is_written_is_read_as_the_same(read, tmp_path, text):
-    manifest = dataclasses.replace(read(text), summary='sagt "Käse" \\ und\nnoch mehr')
+    manifest = dataclasses.replace(read(text), summary='sagt "Käse" \\ und noch mehr')
     write_manifest(tmp_path / "mine", manifest)
     assert read_manifest(tmp_path / "mine") == manifest
 

@@ -20,6 +20,7 @@ BY_REACTION: Final[Mapping[Reaction, AlarmSeverity]] = {
 }
 UNITS: Final[Mapping[Cause, str]] = {
     Cause.STANDSTILL_MOTION: "rad/s",
+    Cause.TIP_MARGIN: "",
     Cause.SERVO_BUS_LOST: "s",
     Cause.CAN_BUS_LOST: "s",
     Cause.SERVO_HARDWARE_ERROR: "(error bits)",
