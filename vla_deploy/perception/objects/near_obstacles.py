@@ -87,10 +87,9 @@ class NearObstacles:
         points = self._points()[:, :2]
         by_them = np.linalg.norm(points[:, None] - left[None, :, 1:], axis=2) < BODY_M
         gone = np.ones(len(points), dtype=np.bool_)
-        for stamps in zip(
-            *((one.first_ns, one.last_ns) for one in self._cells.values()), strict=True
-        ):
-            then = np.abs(np.array(stamps)[:, None] - left[None, :, 0]) < SAME_MOMENT_NS
+        seen_ns = np.array([(one.first_ns, one.last_ns) for one in self._cells.values()])
+        for stamps_ns in seen_ns.T:
+            then = np.abs(stamps_ns[:, None] - left[None, :, 0]) < SAME_MOMENT_NS
             gone &= (by_them & then).any(axis=1)
         self._forget(gone)
 
