@@ -41,6 +41,8 @@ BESIDE_M: Final = (0.8, 1.6)
 FOLLOWED_SHARE: Final = 0.95
 COVERED: Final = 0.95
 WALK_M_S: Final = 0.7
+BEGINS_M: Final = 1.2
+"""Nobody appears out of nothing nearer to the robot."""
 STROLL_M_S: Final = 0.35
 """The base does 0.45 m/s at most."""
 CHAIR_HALF_M: Final = 0.2
@@ -218,11 +220,13 @@ def _cross(course: _Course, way: _Points) -> None:
     spots = _spots(way)
     if not spots:
         return
-    x_m, y_m = course.random.choice(spots)
-    angle_rad = course.random.uniform(-math.pi, math.pi)
-    dx, dy = math.cos(angle_rad), math.sin(angle_rad)
-    points = [[x_m + reach_m * dx, y_m + reach_m * dy] for reach_m in (1.5, 0.0, -3.0)]
-    course.person.walk(points, WALK_M_S)
+    (x_m, y_m), robot = course.random.choice(spots), course.at
+    begin = robot
+    while math.dist(begin, robot) < BEGINS_M:
+        angle_rad = course.random.uniform(-math.pi, math.pi)
+        dx, dy = math.cos(angle_rad), math.sin(angle_rad)
+        begin = (x_m + 1.5 * dx, y_m + 1.5 * dy)
+    course.person.walk([begin, (x_m, y_m), (x_m - 3.0 * dx, y_m - 3.0 * dy)], WALK_M_S)
 
 
 def _spots(way: _Points) -> list[tuple[float, float]]:
