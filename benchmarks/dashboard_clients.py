@@ -8,10 +8,7 @@ dashboard's share of one core. `connected` clients are subscribed to what the vi
 priority; still they take a part of this computer.
 """
 
-import json
 import statistics
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +20,7 @@ import psutil
 
 from benchmarks.core import REALTIME_PRIORITY, realtime
 from benchmarks.live_robot import live_robot
+from benchmarks.load_process import load_process
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.ticks import TickWatch
 from vla_deploy.cli.session import RobotSession
@@ -122,16 +120,6 @@ def _clients(
         yield told
         return
     words = (*address, str(CLIENTS), str(FROZEN), ",".join(topics), str(base))
-    with subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.live_clients", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        if process.stdout.readline() != "ready\n":
-            raise NotServed("the clients could not connect")
+    failure = NotServed("the clients could not connect")
+    with load_process("benchmarks.live_clients", words, told, failure):
         yield told
-        process.stdin.close()
-        told |= json.loads(process.stdout.readline())

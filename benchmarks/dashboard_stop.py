@@ -10,11 +10,8 @@ notice a finger is not in it. `loaded` presses the dashboard's door alone under 
 connections, 30 threads of costly reads and 40 of TLS handshakes.
 """
 
-import json
 import random
 import socket
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -23,6 +20,7 @@ from typing import Any, Final
 
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
 from benchmarks.live_robot import live_robot
+from benchmarks.load_process import load_process
 from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.harness.processes import ProcessStack
@@ -198,33 +196,15 @@ def _load(address: tuple[str, int], base: Path) -> Iterator[dict[str, int]]:
     """Load the dashboard; how much came through is told at the end."""
     came: dict[str, int] = {}
     words = [address[0], str(address[1]), str(base)]
-    with subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.dashboard_load", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        if process.stdout.readline() != "ready\n":
-            raise NoStop("the dashboard could not be loaded")
+    failure = NoStop("the dashboard could not be loaded")
+    with load_process("benchmarks.dashboard_load", words, came, failure):
         yield came
-        process.stdin.close()
-        came |= json.loads(process.stdout.readline())
 
 
 @contextmanager
 def _pages(address: tuple[str, int], base: Path) -> Iterator[None]:
     """Keep pages connected, which take what the dashboard tells."""
     words = [address[0], str(address[1]), str(CLIENTS), "0", _TOPICS, str(base)]
-    with subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.live_clients", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        if process.stdout.readline() != "ready\n":
-            raise NoStop("the pages could not connect")
+    failure = NoStop("the pages could not connect")
+    with load_process("benchmarks.live_clients", words, {}, failure):
         yield
-        process.kill()
