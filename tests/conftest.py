@@ -60,6 +60,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol() -> Iterator[None]:
+    """Give each test the mask of new files anew: a robot's process that runs in a test sets it."""
+    own = os.umask(0o022)
+    os.umask(own)
+    try:
+        return (yield)
+    finally:
+        os.umask(own)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection() -> None:
     """Disable garbage collection while ten thousand tests are collected."""

@@ -1,7 +1,22 @@
 """Write files and links so that a power cut leaves the old or the new, never half of one."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
+
+_FOR_ALL_TO_READ: Final = 0o022
+
+
+@contextmanager
+def readable_by_all() -> Iterator[None]:
+    """Let all users enter the folders made meanwhile: root's own mask may keep the service out."""
+    own = os.umask(_FOR_ALL_TO_READ)
+    try:
+        yield
+    finally:
+        os.umask(own)
 
 
 def write_file(path: Path, text: str, mode: int) -> None:

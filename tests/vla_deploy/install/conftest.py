@@ -55,8 +55,13 @@ class Computer:
         """Run a command in the computer; return what it printed."""
         enter = ["nsenter", "-t", str(self.pid), "-m", "-p", "-C"]
         done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=120)
-        assert not check or done.returncode == 0, done.stderr + self.logs()
+        if check and done.returncode != 0:
+            raise AssertionError(done.stderr + self.why_not() + self.logs())
         return done.stdout
+
+    def why_not(self) -> str:
+        """Return with which exit status the commands of each service ended."""
+        return self.run("systemctl", "status", "--no-pager", "--full", "*.service", check=False)
 
     def show(self, unit: str, name: str) -> str:
         """Return one property of a unit."""

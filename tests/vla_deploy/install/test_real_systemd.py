@@ -1,6 +1,7 @@
 """The unit does under a real systemd what it says."""
 
 import json
+import os
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -50,7 +51,9 @@ notifier.stopping()
 
 @pytest.fixture(scope="module")
 def computer(image: Path, boot: Callable[[], Any], add_environment: Callable[[Path], None]) -> Any:
+    own = os.umask(0o077)  # as root has it on a hardened computer; the service is another user
     assert main(["install", "--root", str(image), "--twin"]) == 0
+    os.umask(own)
     release = image / "opt/vla-deploy/releases/tiny"
     add_environment(release)
     (release / "tiny.py").write_text(TINY)

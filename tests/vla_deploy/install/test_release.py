@@ -1,6 +1,7 @@
 """A release is built from a wheel beside the others; it is there whole or not at all."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -58,7 +59,10 @@ def test_a_wheel_becomes_a_release_that_is_switched_to_and_back(
     old.write_text("#!/bin/sh\n")
     old.chmod(0o755)
     assert json.loads(release("switch", "old"))["end"] == "switched"
+    os.umask(0o077)  # as root has it on a hardened computer; the service is another user
     added = json.loads(release("add", str(wheel), "--share-packages", PACKAGES))["added"]
+    made = (prefix / "releases" / added).rglob("*")
+    assert all(path.stat().st_mode & 0o004 for path in made if not path.is_symlink())
     assert added.startswith("9.8.7-")
     assert json.loads(release("switch", added))["current"] == added  # it has checked the robot
     status = json.loads(release("status"))

@@ -40,7 +40,7 @@ from vla_deploy.install.commands import (
     require_tools,
     run_command,
 )
-from vla_deploy.install.disk import remove_if_empty
+from vla_deploy.install.disk import readable_by_all, remove_if_empty
 from vla_deploy.install.files import service_profile
 from vla_deploy.install.layout import DEFAULT_PREFIX
 from vla_deploy.robots import load_robot
@@ -128,9 +128,10 @@ def run_install(arguments: argparse.Namespace) -> int:
         require_tools(commands)
     _report(arguments, changes, commands)
     if not arguments.dry_run:
-        write_manifest(layout, during(known, changes), choice)
-        apply_changes(layout, changes)
-        write_manifest(layout, afterwards(known, changes), choice)
+        with readable_by_all():
+            write_manifest(layout, during(known, changes), choice)
+            apply_changes(layout, changes)
+            write_manifest(layout, afterwards(known, changes), choice)
         _run(commands)
     return 0
 

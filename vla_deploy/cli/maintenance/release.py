@@ -16,6 +16,7 @@ from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.maintenance.install import add_layout_arguments, layout_of
 from vla_deploy.install.changes import installed_choice
+from vla_deploy.install.disk import readable_by_all
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
 from vla_deploy.install.releases import ReleaseSource, ReleaseStore, add_release, version_of
 from vla_deploy.install.switch import End, Switch, SwitchPlan, SystemdService, recover
@@ -89,7 +90,8 @@ def _add(arguments: argparse.Namespace, store: ReleaseStore) -> int:
             system_packages=arguments.system_packages,
             packages_of=arguments.share_packages,
         )
-        add_release(store, release_id, source)
+        with readable_by_all():
+            add_release(store, release_id, source)
     return emit(arguments, {"added": release_id}, f"added {release_id}", indent=None)
 
 
