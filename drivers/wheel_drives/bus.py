@@ -105,8 +105,8 @@ class DriveBus(Protocol):
         ...
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return what the link and the drives have counted since the start."""
+    def counters(self) -> dict[str, int] | None:
+        """Return what the link and the drives have counted since the start; None where it is another line that counts."""
         ...
 
     @property

@@ -11,6 +11,7 @@ from sim_twin.harness.lockstep_stack import LockstepControl
 from vla_deploy.ipc import topics
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.skills.node import ExecutorNode
+from vla_deploy.supervisor.health import bus_troubles
 
 WHEEL_IDS = (7, 8, 9)
 
@@ -58,6 +59,7 @@ def test_it_drives_back_turns_and_goes_sideways_as_its_wheels_tell(base: Lockste
         pose(base), abs=0.02
     )
     assert base.state() == "armed"
+    assert list(bus_troubles(base.status())) == []  # any would end the service
 
 
 def test_too_much_for_the_wheels_slows_the_whole_motion(base: LockstepControl) -> None:

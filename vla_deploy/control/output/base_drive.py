@@ -48,8 +48,8 @@ class BaseDrive(Protocol):
         ...
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return what the bus has counted."""
+    def counters(self) -> dict[str, int] | None:
+        """Return what the base's own bus has counted; None where it has none of its own."""
         ...
 
     def open(self) -> None:
@@ -117,9 +117,9 @@ class FixedBase:
         self.odometry = Odometry(DifferentialDrive(wheel_radius_m=1.0, track_m=1.0))
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return nothing: there is no bus."""
-        return {}
+    def counters(self) -> None:
+        """Return that there is no bus."""
+        return None
 
     def open(self) -> None:
         """Do nothing."""

@@ -68,9 +68,9 @@ class ServoDrives:
         )
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return nothing: the line counts for all its servos."""
-        return {}
+    def counters(self) -> None:
+        """Return that these servos have no bus of their own: the line counts for all of it."""
+        return None
 
     @property
     def notes(self) -> tuple[str, ...]:

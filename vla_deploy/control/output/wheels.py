@@ -131,8 +131,8 @@ class Wheels:
         return all(abs(speed) < _STILL_RAD_S for speed in self.state.velocity_rad_s.tolist())
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return what the bus has counted; empty before it was opened."""
+    def counters(self) -> dict[str, int] | None:
+        """Return what the bus has counted; empty before it was opened, None on the servo line."""
         return {} if self._bus is None else self._bus.counters
 
     def samples(self) -> tuple[DriveSample, ...]:

@@ -43,7 +43,7 @@ class Status:
         self._servos = servos
         self._wheels = wheels
         self._never_moves = never_moves
-        self._buses = (servos, wheels) if wheels.has_wheels else (servos,)
+        self._buses = (servos, wheels)
         self._pace = StatusPace()
 
     def due(self, every_ticks: int) -> ControlStatus | None:

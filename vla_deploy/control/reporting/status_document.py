@@ -20,8 +20,8 @@ class Bus(Protocol):
     name: str
 
     @property
-    def counters(self) -> Mapping[str, Any]:
-        """Return what it has counted; empty while it is not open."""
+    def counters(self) -> Mapping[str, Any] | None:
+        """Return what it has counted; empty while it is not open, None where there is none."""
         ...
 
 
@@ -46,7 +46,8 @@ def detail(*parts: str) -> str:
 
 def bus_document(*buses: Bus) -> dict[str, Mapping[str, Any]]:
     """Return each bus' counters by its name."""
-    return {bus.name: bus.counters for bus in buses}
+    told = ((bus.name, bus.counters) for bus in buses)
+    return {name: counters for name, counters in told if counters is not None}
 
 
 def joint_document(state: BusState) -> JointReadings:
