@@ -106,7 +106,7 @@ class DriveBus(Protocol):
 
     @property
     def counters(self) -> dict[str, int] | None:
-        """Return what the link and the drives have counted since the start; None where it is another line that counts."""
+        """Return what link and drives have counted since the start; None on another bus's line."""
         ...
 
     @property
