@@ -18,7 +18,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.killing.moment import Work
 from sim_twin.campaigns.killing.rest import RestWatch
-from sim_twin.campaigns.killing.rules import RULES, Injection, KillRule, injections
+from sim_twin.campaigns.killing.rules import RULES, Injection, KillRule, injections, rule_of
 from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.robot import RobotFailed
@@ -37,6 +37,7 @@ class KillCampaign:
 
     def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
         self._hit_ns: dict[str, int] = {}
+        self._described = load_robot(robot)
         self._machine = Machine(folder / "machine", robot=robot, seed=seed)
         self._clock = self._machine.clock
         try:
@@ -54,13 +55,13 @@ class KillCampaign:
         try:
             return self._hit(injection)
         finally:
-            if RULES[injection.process, injection.signal].rest_s is not None:
+            if rule_of(self._described, injection).rest_s is not None:
                 self._work.end()  # the robot stopped, and with it what it was told to do
             self._hit_ns[injection.process] = self._clock.now_ns()
 
     def _hit(self, injection: Injection) -> CampaignCase:
         """Wait for the moment, send the signal, and judge what follows."""
-        rule = RULES[injection.process, injection.signal]
+        rule = rule_of(self._described, injection)
         met = self._work.meet(injection)
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()

@@ -4,11 +4,13 @@ import random
 import signal
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
 from sim_twin.physics.truth import STANDSTILL_RAD_S
+from vla_deploy.robots import RobotDescription
+from vla_deploy.supervisor.table import UNWATCHED_WHEELS_S
 
 _Pair = tuple[str, signal.Signals]
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
@@ -81,6 +83,15 @@ RULES: Final[Mapping[tuple[str, signal.Signals], KillRule]] = {
         rest_s=15.0, ready_s=30.0, states=("silent",), ends=True, rest_rad_s=0.05
     ),
 }
+
+
+def rule_of(robot: RobotDescription, injection: "Injection") -> KillRule:
+    """Return the rule; wheels without a watchdog turn until a hung control is ended and anew."""
+    case = (injection.process, injection.signal)
+    rule = RULES[case]
+    if not robot.servo_bus.wheels or case != ("control", signal.SIGSTOP):
+        return rule
+    return replace(rule, rest_s=UNWATCHED_WHEELS_S + (rule.rest_s or 0.0))
 
 
 GRAVEST: Final = (
