@@ -97,6 +97,7 @@ def test_bad_requests_are_one_line_each_and_lose_nothing(run: Run, tmp_path: Pat
         ("say", ""): 'I do not understand ""; try: ',
         ("say", "--plan", str(plan)): 'the plan was refused: action "a": unknown skill "fly"',
         ("say", "--plan", str(tmp_path / "none.json")): "No such file or directory",
+        ("profile", "tune", "--out", str(plan)): "expected a new file that ends in .toml",
         ("run", "--twin"): f"a supervisor already runs in {run.base} (pid {run.process.pid}",
     }
     pids = run.pids()
@@ -253,6 +254,9 @@ def test_a_session_from_the_first_command_to_ctrl_c(run: Run) -> None:
     assert said.returncode == 0, said
     assert said.stdout.startswith("plan: turn")
     assert "executor     ready" in run.ask("status").stdout
+    seen = json.loads(run.ask("profile", "measure", "--minutes", "0.05", "--json").stdout)
+    assert seen["processes"].keys() >= {"control", "perception", "supervisor"}
+    assert seen["rates"]["control_rate_hz"]["reached_hz"] > 0
 
     saying = run.drive()
     assert run.ask("estop").returncode == 0

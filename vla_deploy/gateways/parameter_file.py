@@ -6,7 +6,6 @@ The parameters may also name the model server that the planner asks.
 import json
 import logging
 import os
-import re
 import shutil
 from collections.abc import Iterable, Mapping, MutableMapping
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ import yaml
 
 from platforms import load_profile
 from platforms.profile_source import merged, read_source
+from platforms.toml_text import toml_lines
 from vla_deploy.client.access.private_file import open_private
 from vla_deploy.gateways.ros.applying import ParameterEffects, effects_of
 from vla_deploy.gateways.ros.errors import ParametersUnusable
@@ -138,7 +138,7 @@ def _derived_robot(robot: str, effects: ParameterEffects, folder: Path, file: st
     derived = folder / "robots" / own.parent.resolve().name
     shutil.copytree(own.parent, derived)
     overrides, _ = read_overrides(derived)
-    text = _HEADER.format(file=file) + _as_toml(merged(overrides, effects.robot))
+    text = _HEADER.format(file=file) + toml_lines(merged(overrides, effects.robot))
     (derived / OVERRIDES_FILE).write_text(text, encoding="utf-8")
     return derived if own.name == ROBOT_FILE else derived / own.name
 
@@ -158,7 +158,7 @@ def _derived_profile(
         planning["servers"] = [choice.name, *(one for one in others if one != choice.name)]
     derived = folder / "profiles" / f"{source.name}_with_parameters.toml"
     document = {"inherits": source.name} | ({"planning": planning} if planning else {})
-    derived.write_text(_HEADER.format(file=file) + _as_toml(document), encoding="utf-8")
+    derived.write_text(_HEADER.format(file=file) + toml_lines(document), encoding="utf-8")
     return derived
 
 
@@ -171,25 +171,6 @@ def _derived_parameters(given: Mapping[str, Any], folder: Path, file: str) -> Pa
     text = _HEADER.format(file=file) + yaml.safe_dump(document, allow_unicode=True)
     derived.write_text(text, encoding="utf-8")
     return derived
-
-
-def _as_toml(table: Mapping[str, Any]) -> str:
-    return "".join(f"{_key(key)} = {_inline(value)}\n" for key, value in table.items())
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, Mapping):
-        rows = (f"{_key(key)} = {_inline(one)}" for key, one in value.items())
-        return f"{{{', '.join(rows)}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_inline, value))}]"
-    if isinstance(value, str | bool | int | float):
-        return json.dumps(value, ensure_ascii=False)
-    return str(value)  # a date, as tomllib reads it
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
 
 
 def chosen_server(

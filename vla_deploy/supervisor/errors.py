@@ -4,6 +4,7 @@ SupervisorError
 ├── AlreadyRunning      another supervisor holds the runtime directory: stop it or choose another
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
 ├── RosNotFound         no environment of ROS 2, or none as it was named: install it, or name it
+├── ProfileDoesNotFit   no rates and budgets fit this computer: take a smaller model or robot
 ├── ProcessGivenUp      the robot cannot go on without that process: the run ends
 └── StartFailed         a process did not become ready: its last log lines are in the message
     ├── StartCrashed    it crashed or hung on its way: another try may help
@@ -25,6 +26,10 @@ class RuntimeUnavailable(SupervisorError):
 
 class RosNotFound(SupervisorError):
     """Name where an environment of ROS 2 was looked for, or why it cannot be used."""
+
+
+class ProfileDoesNotFit(SupervisorError):
+    """Name what the computer lacks for a robot, by how much."""
 
 
 class StartFailed(SupervisorError):

@@ -14,6 +14,7 @@ from platforms.profile import PROFILES, profile_from, profile_names
 from platforms.profile_source import ProfileSource, flat, read_source
 from vla_deploy.cli.commands import add_command, add_top_command, emit
 from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.maintenance import profile_tuning
 from vla_deploy.cli.session import RobotSession, attach, base_of
 from vla_deploy.install.files import slice_too_small
 from vla_deploy.install.layout import SERVICE_RUNTIME, InstallLayout
@@ -29,6 +30,7 @@ EXAMPLES = """  vla-deploy profile list
   vla-deploy profile show jetson_orin_nx --diff desktop
   vla-deploy profile detect
   vla-deploy profile validate my_board.toml
+  vla-deploy profile tune --out mine.toml       for the robot that runs, on this computer
   vla-deploy profile use jetson_orin_nano_8gb     on the running robot, or for its next start
 """
 
@@ -54,6 +56,7 @@ def register(commands: Any) -> None:
             ),
         )
     }
+    profile_tuning.register(acts)
     show, use = added["show"], added["use"]
     show.add_argument("name", nargs="?", help="name or path (default: the one for this computer)")
     show.add_argument("--diff", metavar="OTHER", help="show only what differs from another one")
