@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.install.releases import LAUNCHER, ReleaseStore
+from vla_deploy.install.building import LAUNCHER
+from vla_deploy.install.releases import ReleaseStore
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
 TRIAL = "/opt/vla-deploy/trial"
