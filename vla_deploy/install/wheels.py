@@ -13,7 +13,7 @@ from packaging.version import InvalidVersion, Version
 
 from vla_deploy.install.errors import ReleaseRefused
 
-# A wheel of vla-deploy has 1,500 entries, 50 MB, and packs to a third of that.
+# The wheel of vla-deploy 0.2.0 has 1,722 entries, 49 MB, packed to 38 MB.
 MAX_WHEEL_BYTES: Final = 512 * 1024**2
 MAX_UNPACKED_BYTES: Final = 1024**3
 MAX_ENTRIES: Final = 20_000

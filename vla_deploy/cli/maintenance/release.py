@@ -176,7 +176,8 @@ def _switch_to(release_id: str, arguments: argparse.Namespace, store: ReleaseSto
     undone = recover(store, lambda pid: pid != os.getpid() and psutil.pid_exists(pid))
     if undone:
         logging.getLogger(__name__).warning(undone)
-    service = SystemdService() if arguments.root == Path("/") else None
+    program = store.prefix / "current/bin/vla-deploy"
+    service = SystemdService(program) if arguments.root == Path("/") else None
     report = Switch(store, plan, service, MonotonicClock()).run()
     document = {
         "end": report.end.value,
