@@ -100,12 +100,16 @@ class ReleaseStore:
             watcher=int(lines["watcher"]),
         )
 
+    def boot(self) -> str:
+        """Return the id of this boot of the computer."""
+        return self._boot_id.read_text().strip()
+
     def begin_trial(self, release_id: str) -> None:
         """Write down, before anything changes, what to go back to."""
         trial = ReleaseTrial(
             to=release_id,
             origin=self.current(),
-            boot=self._boot_id.read_text().strip(),
+            boot=self.boot(),
             watcher=os.getpid(),
         )
         (self.prefix / "trial-started").unlink(missing_ok=True)
@@ -167,8 +171,11 @@ class ReleaseStore:
         for word, kept in (("in use", self.current()), ("the one to go back to", self.previous())):
             if release_id == kept:
                 raise ReleaseRefused(f"release {release_id} is {word}; switch to another first")
+        for left in self._releases.glob(".leaving-*"):
+            shutil.rmtree(left)  # what an interrupted removal has left
         leaving = self._releases / f".leaving-{release_id}"
         folder.rename(leaving)
+        sync_folder(self._releases)  # else its name may come back after its files have gone
         shutil.rmtree(leaving)
 
     def prune(self, keep: int) -> tuple[str, ...]:

@@ -348,7 +348,7 @@ def recover(store: ReleaseStore, is_running: Callable[[int], bool]) -> str:
     trial = store.trial()
     if trial is None:
         return ""
-    if is_running(trial.watcher):
+    if trial.boot == store.boot() and is_running(trial.watcher):  # a pid means nothing later
         raise ReleaseRefused(
             f"a switch to {trial.to} is going on (process {trial.watcher}); wait for its end"
         )

@@ -260,6 +260,8 @@ def test_a_switch_that_goes_on_is_not_disturbed(store: ReleaseStore) -> None:
     with pytest.raises(ReleaseRefused, match="is going on"):
         recover(store, lambda pid: pid == os.getpid())
     assert store.trial() is not None
+    (store.prefix / "boot").write_text("boot-2\n")  # the watcher's pid is another process now
+    assert "was undone" in recover(store, lambda pid: pid == os.getpid())
 
 
 @pytest.mark.parametrize(("to", "words"), [("old", "in use already"), ("none", "no release")])

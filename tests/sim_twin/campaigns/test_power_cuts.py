@@ -1,0 +1,56 @@
+"""A power cut at any operation of an update leaves a release that runs; half updates are found."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from sim_twin.campaigns.cutting.disk_history import (
+    StateChoice,
+    as_emptied,
+    as_killed,
+    as_lost,
+    recorded,
+)
+from sim_twin.campaigns.cutting.power_cuts import SCENARIOS, played
+from vla_deploy.install import releases
+
+BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
+
+
+def test_an_update_is_cut_off_and_the_computer_comes_up() -> None:
+    case = played(BY_NAME["switch"], draws=0, seed=0, every=5)
+    assert case.failures == ()
+    assert case.figures["cuts"] > 20
+
+
+def test_a_removal_that_does_not_sync_its_rename_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(releases, "sync_folder", lambda _folder: None)
+    case = played(BY_NAME["remove"], draws=2, seed=0, every=3)
+    assert "listed, but not whole: new" in case.failures[0]
+
+
+LEFT: dict[str, tuple[StateChoice, dict[str, str]]] = {
+    "killed": (as_killed, {"new": "2", "synced": "1"}),
+    "lost": (as_lost, {"old": "0"}),
+    "emptied": (as_emptied, {"new": "", "synced": "1"}),
+}
+
+
+@pytest.mark.parametrize("what", LEFT)
+def test_what_was_not_synced_may_be_lost(tmp_path: Path, what: str) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "old").write_text("0")
+    with recorded(folder) as history:
+        with (folder / "synced").open("w") as file:
+            file.write("1")
+            file.flush()
+            os.fsync(file.fileno())
+        (folder / "old").unlink()
+        (folder / "fresh").write_text("2")
+        (folder / "fresh").rename(folder / "new")
+    choose, expected = LEFT[what]
+    history.lay_out(len(history.operations) - 1, choose, tmp_path / "left")
+    left = {path.name: path.read_text() for path in (tmp_path / "left").iterdir()}
+    assert left == expected
