@@ -16,8 +16,8 @@ from vla_deploy.install.robot_report import Report, moving_in, robot_report, tic
 from vla_deploy.supervisor.systemd import trouble_in
 
 _POLL_NS: Final = NS_PER_S // 5
-_ASK_NS: Final = NS_PER_S  # asking takes a part of a core for half a second
-_SILENT_NS: Final = 5 * NS_PER_S
+_ASK_NS: Final = 3 * NS_PER_S  # asking keeps a core busy for a second
+_SILENT_NS: Final = 8 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
