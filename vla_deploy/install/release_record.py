@@ -45,9 +45,11 @@ class ReleaseRecord:
 def record_of(folder: Path) -> ReleaseRecord:
     """Return the record of a release; of one that has none, or a damaged one, little is known."""
     try:
-        return ReleaseRecord(**json.loads((folder / RECORD_NAME).read_text()))
+        record = ReleaseRecord(**json.loads((folder / RECORD_NAME).read_text()))
+        Version(record.version)
     except (OSError, ValueError, TypeError):
         return ReleaseRecord()
+    return record
 
 
 def newest(records: dict[str, ReleaseRecord]) -> tuple[str, Version] | None:

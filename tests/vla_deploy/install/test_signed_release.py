@@ -174,6 +174,8 @@ def test_a_release_keeps_its_signer_its_packages_come_by_hashes_and_older_ones_a
     assert "UNSIGNED: nobody vouches for" in err
     rows = computer.release("list")[1]
     assert [row["signed_by"] for row in rows] == [KEY.public.key_id, "UNSIGNED"]
+    (computer.releases / "2.0/release.json").write_text('{"version": "?"}')
+    assert computer.release("list")[1][0]["signed_by"] == "unknown"
 
 
 def test_a_signed_wheel_without_a_lock_file_is_refused(computer: Computer, tmp_path: Path) -> None:
@@ -224,6 +226,7 @@ def test_a_key_is_made_and_signs_what_it_is_trusted_for(computer: Computer, tmp_
     assert computer.release("keygen", "--key", secret)[0] == 0
     assert secret.stat().st_mode & 0o777 == 0o600
     assert "is there already" in computer.release("keygen", "--key", secret)[2]
+    assert "such as release.key" in computer.release("keygen", "--key", tmp_path / "a.pub")[2]
     wheel = tiny_wheel(tmp_path)
     assert computer.release("sign", wheel, "--key", secret)[0] == 0
     computer.trust((tmp_path / "release.pub").read_text())

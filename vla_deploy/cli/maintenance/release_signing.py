@@ -24,6 +24,8 @@ def make_key(arguments: argparse.Namespace) -> int:
     """Write a fresh secret key that only its owner may read, and its public key."""
     secret = _key_file(arguments)
     public = secret.with_suffix(".pub")
+    if secret == public:
+        raise UsageError(f"--key {secret}: expected the secret key's name, such as release.key")
     for path in (secret, public):
         if path.exists():
             raise UsageError(f"{path} is there already; choose another name: --key FILE")
