@@ -85,6 +85,12 @@ class DiskHistory:
     moments: list[Moment] = field(default_factory=list)
     syncs: dict[int, int | None] = field(default_factory=dict)
 
+    def last_with(self, name: str) -> int:
+        """Return the last operation before which the folder itself held a name, -1 for none."""
+        roots = (moment[ROOT_NODE] for moment in self.moments)
+        held = [isinstance(one, FolderNode) and name in dict(one.names) for one in roots]
+        return max((at for at, holds in enumerate(held) if holds), default=-1)
+
     def lay_out(self, cut: int, choose: StateChoice, folder: Path) -> None:
         """Write what a cut before the operation `cut` leaves, as `choose` has it."""
         self._write(ROOT_NODE, cut, choose, folder)

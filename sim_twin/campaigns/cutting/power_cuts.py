@@ -151,7 +151,7 @@ def played(scenario: CutScenario, draws: int, seed: int, every: int = 1) -> Camp
         _prepare(root, scenario)
         with recorded(root / _PREFIX) as history:
             scenario.act(root)
-        cuts, failures = 0, []
+        cuts, failures, on_trial_until = 0, [], history.last_with("trial")
         for number, state in enumerate(_states(history, draws, seed, every)):
             left = Path(folder) / str(number)
             history.lay_out(state.cut, state.choose, left / _PREFIX)
@@ -160,7 +160,7 @@ def played(scenario: CutScenario, draws: int, seed: int, every: int = 1) -> Camp
                 continue
             cuts += 1
             with synced_by(lambda _fd: None, lambda: None):
-                trouble = _trouble(left, scenario, state)
+                trouble = _trouble(left, scenario, state, is_proved=state.cut > on_trial_until)
             if trouble:
                 failures.append(f"{state.name} ({history.operations[state.cut]}): {trouble}")
             shutil.rmtree(left)
@@ -241,7 +241,7 @@ def _write_wheel(wheel: Path) -> None:
         archive.writestr(f"{stem}.dist-info/RECORD", "")
 
 
-def _trouble(root: Path, scenario: CutScenario, state: _CutState) -> str:
+def _trouble(root: Path, scenario: CutScenario, state: _CutState, *, is_proved: bool) -> str:
     """Return what does not work on a computer that is started after the cut, "" where all does."""
     store = ReleaseStore(root / _PREFIX)
     if state.guard_calls:
@@ -250,6 +250,8 @@ def _trouble(root: Path, scenario: CutScenario, state: _CutState) -> str:
         trouble = _boot(store)
         if trouble:
             return trouble
+        if not is_proved and scenario.current not in ("", store.current()):
+            return f"{store.current()} is in use, and has not proved itself"
     trouble = _store_trouble(store, scenario)
     if trouble or not scenario.repeats:
         return trouble

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,10 +25,30 @@ def test_an_update_is_cut_off_and_the_computer_comes_up() -> None:
     assert case.figures["cuts"] > 20
 
 
-def test_a_removal_that_does_not_sync_its_rename_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(releases, "sync_folder", lambda _folder: None)
-    case = played(BY_NAME["remove"], draws=2, seed=0, every=3)
-    assert "listed, but not whole: new" in case.failures[0]
+FAULTY: dict[str, tuple[str, str, Any, str]] = {
+    "a rename is not synced": (
+        "remove",
+        "sync_folder",
+        lambda _folder: None,
+        "listed, but not whole: new",
+    ),
+    "a trial is not synced": (
+        "switch",
+        "write_file",
+        lambda path, text, _mode: path.write_text(text),
+        "new is in use, and has not proved itself",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTY)
+def test_an_update_that_forgets_to_sync_is_found(
+    monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    scenario, function, faulty, words = FAULTY[fault]
+    monkeypatch.setattr(releases, function, faulty)
+    case = played(BY_NAME[scenario], draws=2, seed=0, every=3)
+    assert any(words in failure for failure in case.failures)
 
 
 LEFT: dict[str, tuple[StateChoice, dict[str, str]]] = {
