@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from sim_twin.campaigns import demos, load, missions, navigation, soak
+from sim_twin.campaigns.cutting import power_cuts
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
@@ -26,6 +27,7 @@ CAMPAIGNS: Final[
     "load": load.run,
     "missions": missions.run,
     "navigation": navigation.run,
+    "power-cuts": power_cuts.run,
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,

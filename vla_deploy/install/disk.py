@@ -26,8 +26,8 @@ def write_file(path: Path, text: str, mode: int) -> None:
     with fresh.open("w") as file:
         file.write(text)
         file.flush()
+        os.fchmod(file.fileno(), mode)
         os.fsync(file.fileno())
-    fresh.chmod(mode)
     fresh.replace(path)
     sync_folder(path.parent)
 

@@ -5,6 +5,7 @@ InstallError
 ├── ArgumentRefused      a name or path cannot stand in a unit
 ├── NotPermitted         writing there needs another user
 ├── ReleaseRefused       the release cannot be added, used or removed; nothing was changed
+│   └── SignatureRefused a trusted key has not signed it, or a key or signature cannot be read
 ├── ToolMissing          a program of the system is not there, or does not answer; nothing changed
 ├── SystemCommandFailed  a program of the system did not do what it was asked
 └── SwitchFailed         the new release did not prove itself; the one before is back in use
@@ -29,6 +30,10 @@ class NotPermitted(InstallError):
 
 class ReleaseRefused(InstallError):
     """Say which release, and why not."""
+
+
+class SignatureRefused(ReleaseRefused):
+    """Say which file, what is wrong with key or signature, and how to get a good one."""
 
 
 class SwitchFailed(InstallError):

@@ -1,6 +1,6 @@
-"""Build releases from wheels and keep them side by side, one of them in use.
+"""Keep releases side by side, one of them in use.
 
-<prefix>/releases/<id>/   a release: its own environment and `bin/vla-deploy`
+<prefix>/releases/<id>/   a release: its own environment, `bin/vla-deploy`, and its `release.json`
 <prefix>/current          link to the release in use
 <prefix>/previous         link to the one that was in use before it
 <prefix>/trial            exists while a new release has to prove itself; read by `release-guard`
@@ -9,16 +9,13 @@
 import os
 import re
 import shutil
-import sys
-import zipfile
 from dataclasses import dataclass
-from email.parser import HeaderParser
 from pathlib import Path
 from typing import Final
 
-from vla_deploy.install.commands import run_command
 from vla_deploy.install.disk import point, sync_folder, write_file
 from vla_deploy.install.errors import ReleaseRefused
+from vla_deploy.install.release_record import ReleaseRecord, record_of
 
 _ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 BOOT_ID: Final = Path("/proc/sys/kernel/random/boot_id")
@@ -65,6 +62,10 @@ class ReleaseStore:
             )
         return self._releases / release_id
 
+    def records(self) -> dict[str, ReleaseRecord]:
+        """Return what is recorded of each release, the oldest first."""
+        return {release: record_of(self._releases / release) for release in self.ids()}
+
     def current(self) -> str:
         """Return the release in use, empty when there is none."""
         return self._target("current")
@@ -99,12 +100,16 @@ class ReleaseStore:
             watcher=int(lines["watcher"]),
         )
 
+    def boot(self) -> str:
+        """Return the id of this boot of the computer."""
+        return self._boot_id.read_text().strip()
+
     def begin_trial(self, release_id: str) -> None:
         """Write down, before anything changes, what to go back to."""
         trial = ReleaseTrial(
             to=release_id,
             origin=self.current(),
-            boot=self._boot_id.read_text().strip(),
+            boot=self.boot(),
             watcher=os.getpid(),
         )
         (self.prefix / "trial-started").unlink(missing_ok=True)
@@ -166,8 +171,11 @@ class ReleaseStore:
         for word, kept in (("in use", self.current()), ("the one to go back to", self.previous())):
             if release_id == kept:
                 raise ReleaseRefused(f"release {release_id} is {word}; switch to another first")
+        for left in self._releases.glob(".leaving-*"):
+            shutil.rmtree(left)  # what an interrupted removal has left
         leaving = self._releases / f".leaving-{release_id}"
         folder.rename(leaving)
+        sync_folder(self._releases)  # else its name may come back after its files have gone
         shutil.rmtree(leaving)
 
     def prune(self, keep: int) -> tuple[str, ...]:
@@ -190,83 +198,3 @@ class ReleaseStore:
 
 def _is_release(path: Path) -> bool:
     return path.is_dir() and not path.name.startswith(".")
-
-
-# A robot that runs keeps the release that it was started from, whatever `current` says later.
-LAUNCHER = """#!/bin/sh
-here=$(dirname "$(readlink -f "$0")")
-exec "$here/../venv/bin/python" -I -m vla_deploy.cli "$@"
-"""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReleaseSource:
-    """Say what a release is made of.
-
-    `wheelhouse` is a folder of wheels to install from without a network. `system_packages` lets it
-    see those of the computer, such as TensorRT's. `packages_of` is a folder of packages that it
-    shares instead of installing its own.
-    """
-
-    wheel: Path
-    wheelhouse: Path | None = None
-    system_packages: bool = False
-    packages_of: Path | None = None
-
-
-def version_of(wheel: Path) -> str:
-    """Return the version that a wheel declares.
-
-    Raises:
-        ReleaseRefused: it is no wheel of vla-deploy.
-    """
-    try:
-        with zipfile.ZipFile(wheel) as archive:
-            names = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
-            header = HeaderParser().parsestr(archive.read(names[0]).decode())
-    except (OSError, zipfile.BadZipFile, IndexError) as error:
-        raise ReleaseRefused(
-            f"{wheel} is no wheel ({error}); build one: pip wheel --no-deps ."
-        ) from error
-    if header["Name"] != "vla-deploy":
-        raise ReleaseRefused(f"{wheel} is a wheel of {header['Name']}, expected vla-deploy")
-    return str(header["Version"])
-
-
-def add_release(store: ReleaseStore, release_id: str, source: ReleaseSource) -> Path:
-    """Build a release next to the others; it has its name only once it is complete.
-
-    Raises:
-        ReleaseRefused: the id is taken or no name.
-        SystemCommandFailed: the environment cannot be made.
-    """
-    folder = store.incoming(release_id)
-    venv = folder / "venv"
-    flags = ["--system-site-packages"] if source.system_packages else []
-    run_command([sys.executable, "-m", "venv", "--without-pip", *flags, str(venv)])
-    python = venv / "bin" / "python"
-    if source.packages_of is not None:
-        share = f"import site; site.addsitedir({str(source.packages_of)!r})\n"  # with its own .pth
-        write_file(_site_packages(venv) / "shared.pth", share, 0o644)
-    run_command(_pip_install(python, source))
-    write_file(folder / "bin" / "vla-deploy", LAUNCHER, 0o755)
-    return store.accept(release_id)
-
-
-def _pip_install(python: Path, source: ReleaseSource) -> list[str]:
-    offline = source.wheelhouse is not None or source.packages_of is not None
-    options = ["--no-index"] if offline else []
-    options += ["--find-links", str(source.wheelhouse)] if source.wheelhouse else []
-    options += ["--no-deps", "--ignore-installed"] if source.packages_of else []
-    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet"]
-    return [
-        *pip,
-        "--disable-pip-version-check",
-        "--no-warn-script-location",
-        *options,
-        str(source.wheel),
-    ]
-
-
-def _site_packages(venv: Path) -> Path:
-    return venv / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"

@@ -4,16 +4,20 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Final, Protocol
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.install.commands import run_command
 from vla_deploy.install.errors import ReleaseRefused, SwitchFailed, SystemCommandFailed
-from vla_deploy.install.layout import SERVICE
+from vla_deploy.install.layout import SERVICE, SERVICE_RUNTIME
 from vla_deploy.install.releases import ReleaseStore
+from vla_deploy.install.robot_report import Report, moving_in, robot_report, tick_of
 from vla_deploy.supervisor.systemd import trouble_in
 
-_POLL_NS = NS_PER_S // 5
+_POLL_NS: Final = NS_PER_S // 5
+_ASK_NS: Final = 3 * NS_PER_S  # asking keeps a core busy for a second
+_SILENT_NS: Final = 8 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +34,7 @@ class ServiceState:
 
 
 class ServiceControl(Protocol):
-    """Restart one service and return its state."""
+    """Restart one service, return its state, and ask the robot that it runs."""
 
     def restart(self) -> None:
         """Restart it; return when it is ready.
@@ -46,12 +50,21 @@ class ServiceControl(Protocol):
             SystemCommandFailed: the service manager does not answer.
         """
 
+    def report(self) -> Report:
+        """Return the robot's own status, by the program of the release that is in use.
+
+        Raises:
+            SystemCommandFailed: the robot is not reached.
+        """
+
 
 class SystemdService:
-    """Restart the robot's service by systemctl."""
+    """Restart the robot's service by systemctl; `program` is that of the release in use."""
 
-    def __init__(self, unit: str = SERVICE) -> None:
+    def __init__(self, program: Path, unit: str = SERVICE, runtime: Path = SERVICE_RUNTIME) -> None:
+        self._program = program
         self._unit = unit
+        self._runtime = runtime
 
     def restart(self) -> None:
         """Restart it, also when it had been given up; return when it is ready."""
@@ -75,12 +88,51 @@ class SystemdService:
                 f"systemctl show {self._unit}: cannot read {text!r}"
             ) from error
 
+    def report(self) -> Report:
+        """Return the robot's own status."""
+        return robot_report(self._program, self._runtime)
+
+
+class _TickWatch:
+    """Ask the robot now and then; its control has to have gone on since."""
+
+    def __init__(self, service: ServiceControl, clock: Clock) -> None:
+        self._service = service
+        self._clock = clock
+        self._tick: int | None = None
+        self._silence = "not asked yet"
+        self._ask_ns = self._well_ns = clock.now_ns()
+        self.has_ticked = False
+
+    def trouble(self) -> str:
+        """Return why control is not known to go on, "" while it is or may still answer."""
+        if self._clock.now_ns() >= self._ask_ns:
+            self._ask()
+            self._ask_ns = self._clock.now_ns() + _ASK_NS
+        is_silent = self._clock.now_ns() - self._well_ns >= _SILENT_NS
+        return self._silence if is_silent else ""
+
+    def _ask(self) -> None:
+        try:
+            tick = tick_of(self._service.report())
+        except SystemCommandFailed as error:
+            self._silence = f"the robot cannot be reached: {error}"
+            return
+        if tick is None:
+            self._silence = "control is silent"
+        elif tick == self._tick:
+            self._silence = f"control stands still at tick {tick}"
+        else:
+            self.has_ticked = self._tick is not None
+            self._tick, self._well_ns = tick, self._clock.now_ns()
+
 
 def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float, known: str = "") -> str:
     """Watch a service that is ready; return what went wrong, empty when it stays well.
 
-    systemd restarts what fails or misses its watchdog: another process is a failure. A process of
-    the robot that fails or is late is one, too, unless the trouble was `known` before.
+    Well means that the robot answers and its control ticks on. systemd restarts what fails or
+    misses its watchdog: another process is a failure. A process of the robot that fails or is late
+    is one, too, unless the trouble was `known` before.
 
     Raises:
         SystemCommandFailed: the service manager does not answer.
@@ -89,15 +141,34 @@ def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float, know
     if first.active != "active":
         return f"the service is {first.active}, expected active"
     end_ns = clock.now_ns() + round(healthy_s * NS_PER_S)
+    ticks = _TickWatch(service, clock)
     while True:
         if replace(now, status=first.status) != first:
             return f"it became {now.active} after {now.restarts - first.restarts} restarts"
         if trouble_in(now.status) not in ("", known):
             return f"it says: {now.status}"
-        if clock.now_ns() >= end_ns:
+        if trouble := ticks.trouble():
+            return trouble
+        if clock.now_ns() >= end_ns and ticks.has_ticked:
             return ""
         clock.sleep_until(clock.now_ns() + _POLL_NS)
         now = service.state()
+
+
+def motion_of(service: ServiceControl) -> str:
+    """Return what moves, "" for a robot at rest or one that does not run.
+
+    What is not ready and does not answer is taken for one that does not run: a service that fails
+    again and again has to be replaceable.
+    """
+    try:
+        is_ready = service.state().active == "active"
+    except SystemCommandFailed:
+        is_ready = False
+    try:
+        return moving_in(service.report())
+    except SystemCommandFailed as error:
+        return f"the robot does not answer: {error}" if is_ready else ""
 
 
 def known_trouble(service: ServiceControl) -> str:
@@ -116,6 +187,7 @@ class SwitchStep(StrEnum):
     """Name what is done, in this order when nothing fails."""
 
     CHECK = "check that the new release runs"
+    REST = "check that nothing moves"
     MARK = "write down what to go back to"
     SWAP = "put it in use"
     RESTART = "restart the service"
@@ -138,7 +210,8 @@ class End(StrEnum):
 
 # What follows a step that succeeded, and one that failed.
 NEXT: Final[Mapping[SwitchStep, tuple[SwitchStep | End, SwitchStep | End]]] = {
-    SwitchStep.CHECK: (SwitchStep.MARK, End.REFUSED),
+    SwitchStep.CHECK: (SwitchStep.REST, End.REFUSED),
+    SwitchStep.REST: (SwitchStep.MARK, End.REFUSED),
     SwitchStep.MARK: (SwitchStep.SWAP, SwitchStep.SWAP_BACK),
     SwitchStep.SWAP: (SwitchStep.RESTART, SwitchStep.SWAP_BACK),
     SwitchStep.RESTART: (SwitchStep.WATCH, SwitchStep.SWAP_BACK),
@@ -189,6 +262,7 @@ class Switch:
         self._known_trouble = ""
         self.do: dict[SwitchStep, Callable[[], None]] = {
             SwitchStep.CHECK: self._check,
+            SwitchStep.REST: self._rest,
             SwitchStep.MARK: self._mark,
             SwitchStep.SWAP: lambda: store.use(plan.to),
             SwitchStep.RESTART: self._restart,
@@ -230,6 +304,14 @@ class Switch:
         for arguments in self._plan.self_tests():
             run_command([program, *arguments])
 
+    def _rest(self) -> None:
+        moving = motion_of(self._service) if self._service is not None else ""
+        if moving:
+            raise ReleaseRefused(
+                f"expected a robot at rest, got: {moving}; a restart takes the arms' power: end "
+                "the work first (vla-deploy stop), or the service (sudo systemctl stop vla-deploy)"
+            )
+
     def _mark(self) -> None:
         if self._service is not None:
             self._known_trouble = known_trouble(self._service)
@@ -266,7 +348,7 @@ def recover(store: ReleaseStore, is_running: Callable[[int], bool]) -> str:
     trial = store.trial()
     if trial is None:
         return ""
-    if is_running(trial.watcher):
+    if trial.boot == store.boot() and is_running(trial.watcher):  # a pid means nothing later
         raise ReleaseRefused(
             f"a switch to {trial.to} is going on (process {trial.watcher}); wait for its end"
         )

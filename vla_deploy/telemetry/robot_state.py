@@ -1,5 +1,6 @@
 """Collect the status that the processes of a run publish."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -41,3 +42,33 @@ def pose_document(sample: Sample) -> dict[str, Any]:
         "doubt": doubt.name.lower(),
         "covariance": np.reshape(sample.data["covariance"], (3, 3)).tolist(),
     }
+
+
+def motion_now(link: RobotLink) -> dict[str, Any]:
+    """Return the speed of the base, that of the fastest joint, and the missions at work.
+
+    SI units; null where control is silent or there is no base, a joint by its number in the robot
+    file.
+    """
+    base = link.fresh(topics.BASE_STATE, age_limit_s=1.0)
+    joints = link.fresh(topics.JOINT_STATE, age_limit_s=1.0)
+    missions = link.document(topics.MISSIONS)
+    shown = [] if missions is None else missions["missions"]
+    return {
+        "base": None if base is None else _base_speed(base),
+        "joint": None if joints is None else _fastest_joint(joints),
+        "missions": [one["mission_id"] for one in shown if one["state"] == "executing"],
+    }
+
+
+def _base_speed(sample: Sample) -> dict[str, float]:
+    ahead, left = float(sample.data["v_m_s"]), float(sample.data["left_m_s"])
+    return {"speed_m_s": math.hypot(ahead, left), "w_rad_s": float(sample.data["w_rad_s"])}
+
+
+def _fastest_joint(sample: Sample) -> dict[str, float] | None:
+    speeds = np.abs(sample.data["velocity"][: int(sample.data["joint_count"])])
+    if not len(speeds):
+        return None
+    fastest = int(np.argmax(speeds))
+    return {"number": fastest, "velocity": float(speeds[fastest])}

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.install.releases import LAUNCHER, ReleaseStore
+from vla_deploy.install.building import LAUNCHER
+from vla_deploy.install.releases import ReleaseStore
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
 TRIAL = "/opt/vla-deploy/trial"
@@ -147,6 +149,24 @@ def test_the_twin_comes_up_in_the_sandbox_and_stops_in_order(
     status = json.loads(computer.run(*vla_deploy, *words))
     states = {row["name"]: row["state"] for row in status["process_table"]["processes"]}
     assert {states[name] for name in ("control", "perception", "twin")} == {"ready"}
+    (robot.parent / "next").symlink_to("robot")
+    chosen = ("--robot", "butler", "--profile", "desktop", "--healthy", "3", "--json")
+    switch = (PROGRAM, "release", "switch", "next", *chosen)
+    talk = (*vla_deploy, *words[:2])
+    computer.run(*talk, "arm")
+    computer.run("sh", "-c", f"{shlex.join((*talk, 'say', 'go to the kitchen'))} >/dev/null 2>&1 &")
+
+    def is_at_work() -> bool:
+        executor = json.loads(computer.run(*vla_deploy, *words))["executor"]
+        return executor is not None and executor["state"] == "executing"
+
+    computer.await_that(is_at_work)
+    refused = json.loads(computer.run(*switch, check=False))
+    assert refused["end"] == "refused"
+    assert "skill navigate_to" in refused["failures"][0]
+    computer.run(*talk, "stop")
+    computer.await_that(lambda: not is_at_work())
+    computer.await_that(lambda: json.loads(computer.run(*switch, check=False))["end"] == "switched")
     computer.run("systemctl", "stop", UNIT)
     assert computer.show(UNIT, "Result") == "success"
     assert "vla-deploy" not in computer.run("ls", "/run")

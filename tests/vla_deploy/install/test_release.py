@@ -10,13 +10,17 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 
 from vla_deploy.cli.main import main
+from vla_deploy.install.building import ReleaseSource, add_release, examined
 from vla_deploy.install.errors import InstallError, ReleaseRefused
-from vla_deploy.install.releases import ReleaseSource, ReleaseStore, add_release, version_of
+from vla_deploy.install.releases import ReleaseStore
+from vla_deploy.install.wheels import CheckedWheel
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = next(path for path in sys.path if path.endswith("site-packages"))
+UNSIGNED = ("--unsigned", "--share-packages", PACKAGES)
 SUFFIXES = (".py", ".toml", ".xml", ".yaml", ".pgm", ".json", ".eds", ".typed")
 
 
@@ -60,7 +64,7 @@ def test_a_wheel_becomes_a_release_that_is_switched_to_and_back(
     old.chmod(0o755)
     assert json.loads(release("switch", "old"))["end"] == "switched"
     os.umask(0o077)  # as root has it on a hardened computer; the service is another user
-    added = json.loads(release("add", str(wheel), "--share-packages", PACKAGES))["added"]
+    added = json.loads(release("add", str(wheel), *UNSIGNED))["added"]
     made = (prefix / "releases" / added).rglob("*")
     assert all(path.stat().st_mode & 0o004 for path in made if not path.is_symlink())
     assert added.startswith("9.8.7-")
@@ -76,7 +80,7 @@ def test_a_wheel_becomes_a_release_that_is_switched_to_and_back(
 
 
 def test_an_add_cut_off_leaves_nothing_under_the_final_name(wheel: Path, tmp_path: Path) -> None:
-    words = ["release", "add", str(wheel), "--share-packages", PACKAGES, "--id", "new"]
+    words = ["release", "add", str(wheel), *UNSIGNED, "--id", "new"]
     command = [sys.executable, "-m", "vla_deploy.cli.main", *words, "--root", str(tmp_path)]
     process = subprocess.Popen(command)
     releases = tmp_path / "opt/vla-deploy/releases"
@@ -89,22 +93,22 @@ def test_an_add_cut_off_leaves_nothing_under_the_final_name(wheel: Path, tmp_pat
     assert list(store.incoming("new").iterdir()) == []  # the next add begins afresh
 
 
-def test_a_wheel_that_cannot_be_installed_becomes_no_release(tmp_path: Path) -> None:
-    wheel = tmp_path / "vla_deploy-1.0-py3-none-any.whl"
-    wheel.write_bytes(b"no archive")
+def test_a_wheel_that_cannot_be_installed_leaves_nothing(tmp_path: Path) -> None:
+    name = "vla_deploy-1.0-py3-none-any.whl"
+    wheel = CheckedWheel(name=name, data=b"no archive", version=Version("1.0"), lock="")
     store = ReleaseStore(tmp_path / "prefix")
     with pytest.raises(InstallError, match="pip"):
         add_release(store, "new", ReleaseSource(wheel=wheel, wheelhouse=tmp_path))
-    assert store.ids() == ()
+    assert list((tmp_path / "prefix/releases").iterdir()) == []
 
 
 def test_a_file_that_is_no_wheel_of_ours_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.whl").write_text("hello")
     with pytest.raises(ReleaseRefused, match="is no wheel"):
-        version_of(tmp_path / "text.whl")
+        examined(tmp_path / "text.whl", keys=None)
     other = build_wheel(tmp_path, "1.0", name="other")
     with pytest.raises(ReleaseRefused, match="a wheel of other, expected vla-deploy"):
-        version_of(other)
+        examined(other, keys=None)
 
 
 @pytest.mark.parametrize("name", ["../x", "", ".hidden", "a b"])

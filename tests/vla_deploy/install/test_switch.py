@@ -1,8 +1,10 @@
 """A switch ends with a release that works, whatever fails and wherever it is cut off."""
 
+import dataclasses
 import os
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -49,6 +51,8 @@ class RecordedService:
         self._store = store
         self._fails = fails or {}  # release -> "start", "later", or the status that it tells then
         self._asked = 0
+        self.ticks = 0
+        self.told: dict[str, Any] = {}
 
     def restart(self) -> None:
         self.started.append(self._store.current())
@@ -67,6 +71,14 @@ class RecordedService:
             restarts=int(died),
             status=what if told else "all 9 processes ready",
         )
+
+    def report(self) -> dict[str, Any]:
+        what = self._fails.get(self._store.current(), "")
+        self.ticks += what != "hangs"
+        if what == "unreached":
+            raise SystemCommandFailed("no robot runs in /run/vla-deploy")
+        control = None if what == "silent" else {"state": "armed", "tick": self.ticks}
+        return {"control": control, **self.told}
 
 
 @pytest.fixture
@@ -114,7 +126,7 @@ def test_a_release_that_does_not_run_changes_nothing(store: ReleaseStore) -> Non
     assert report.failures[0].startswith("check that the new release runs: ")
 
 
-@pytest.mark.parametrize("when", ["start", "later", *TROUBLES])
+@pytest.mark.parametrize("when", ["start", "later", "hangs", "silent", "unreached", *TROUBLES])
 def test_a_release_that_does_not_stay_well_is_taken_back(store: ReleaseStore, when: str) -> None:
     service = RecordedService(store, {"new": when})
     report = switch_of(store, service).run()
@@ -136,6 +148,44 @@ def test_a_release_that_changes_the_trouble_is_blamed_for_it(store: ReleaseStore
     report = switch_of(store, service).run()
     assert (report.end, report.current) == (End.ROLLED_BACK, "old")
     assert report.failures == (f"watch its health: it says: {TROUBLES[1]}",)
+
+
+MOVING: dict[str, tuple[str, dict[str, Any]]] = {
+    "a skill": ("skill pick_up", {"executor": {"state": "executing", "skill": "pick_up"}}),
+    "a mission": ("mission m-1", {"motion": {"missions": ["m-1"]}}),
+    "a motion": ("motions [7]", {"control": {"state": "armed", "tick": 1, "active_motions": [7]}}),
+    "stopping": ("control is stopping", {"control": {"state": "stopping", "tick": 1}}),
+    "the base": ("the base at", {"motion": {"base": {"speed_m_s": 0.02, "w_rad_s": 0.0}}}),
+    "a turn": ("the base at", {"motion": {"base": {"speed_m_s": 0.0, "w_rad_s": -0.1}}}),
+    "a joint": ("joint 3 at 0.06", {"motion": {"joint": {"number": 3, "velocity": 0.06}}}),
+    "nobody knows": ("control is silent", {"control": None}),
+}
+
+
+@pytest.mark.parametrize("case", MOVING)
+def test_a_robot_that_moves_is_not_restarted(store: ReleaseStore, case: str) -> None:
+    words, told = MOVING[case]
+    service = RecordedService(store)
+    service.told = told
+    report = switch_of(store, service).run()
+    assert (report.end, report.current, service.started) == (End.REFUSED, "old", [])
+    assert words in report.failures[0]
+    service.told = {"motion": {"base": {"speed_m_s": 0.005, "w_rad_s": 0.0}, "joint": None}}
+    assert switch_of(store, service).run().end is End.SWITCHED
+
+
+def test_a_robot_that_does_not_answer_is_restarted_only_where_it_is_not_ready(
+    store: ReleaseStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = RecordedService(store, {"old": "unreached"})
+    assert "does not answer" in switch_of(store, service).run().failures[0]
+    state = service.state()
+    monkeypatch.setattr(
+        service,
+        "state",
+        lambda: state if service.started else dataclasses.replace(state, active="activating"),
+    )
+    assert switch_of(store, service).run().end is End.SWITCHED
 
 
 def test_a_service_that_is_down_with_either_release_is_reported(store: ReleaseStore) -> None:
@@ -210,6 +260,8 @@ def test_a_switch_that_goes_on_is_not_disturbed(store: ReleaseStore) -> None:
     with pytest.raises(ReleaseRefused, match="is going on"):
         recover(store, lambda pid: pid == os.getpid())
     assert store.trial() is not None
+    (store.prefix / "boot").write_text("boot-2\n")  # the watcher's pid is another process now
+    assert "was undone" in recover(store, lambda pid: pid == os.getpid())
 
 
 @pytest.mark.parametrize(("to", "words"), [("old", "in use already"), ("none", "no release")])

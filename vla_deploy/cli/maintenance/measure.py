@@ -35,6 +35,7 @@ CAMPAIGNS: Final = {
     "load": "the main job repeatedly, with eight busy loops: only its duration may change",
     "missions": "whole missions in lock-step: side by side, paused, as the documents have them",
     "navigation": "drives around what is on no map, following, sweeping",
+    "power-cuts": "the power goes at each operation of `release`: what boots has to run",
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",

@@ -10,7 +10,7 @@ from vla_deploy.cli.session import attach
 from vla_deploy.client.battery import battery_words
 from vla_deploy.client.place_state import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profiles.profile_change import ChangeOutcome
-from vla_deploy.telemetry.robot_state import collect
+from vla_deploy.telemetry.robot_state import collect, motion_now
 
 KEEPS_UP: Final = 0.95
 """Share of real time below which a process is named that holds the twin's time."""
@@ -29,7 +29,8 @@ def register(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the status of the run on this machine."""
-    status = collect(attach(arguments.runtime_base))
+    session = attach(arguments.runtime_base)
+    status = {**collect(session), "motion": motion_now(session)}
     return emit(arguments, status, lambda: as_text(status))
 
 

@@ -1,10 +1,15 @@
 """What a person is told of how the robot sees."""
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from drivers.clock import MonotonicClock
 from vla_deploy.cli.observation.status import as_text
+from vla_deploy.install.robot_report import moving_in, tick_of
+from vla_deploy.ipc import SharedSpace, topics
 
 SILENT = ("twin", "process_table", "profile", "control", "pose", "planner", "executor", "speech")
 MODEL = {
@@ -90,3 +95,36 @@ def test_how_fast_the_twins_time_goes_and_who_holds_it_is_shown(factor: float, w
     twin = {"pace": "real", "real_time_factor": factor, "held_by": "perception"}
     lines = text_of(twin=twin).splitlines()
     assert words in lines
+
+
+@pytest.mark.parametrize(
+    ("joint_rad_s", "base_m_s", "mission", "moving"),
+    [
+        (0.02, 0.004, "completed", ""),
+        (-0.3, 0.0, "completed", "joint 1 at 0.3 rad/s"),
+        (0.0, -0.2, "completed", "the base at {'speed_m_s': 0.2, 'w_rad_s': 0.0}"),
+        (0.0, 0.0, "executing", "mission m-1"),
+    ],
+)
+def test_an_update_reads_from_the_status_whether_the_robot_moves(
+    run_dir: Path,
+    vla: Callable[..., Any],
+    joint_rad_s: float,
+    base_m_s: float,
+    mission: str,
+    moving: str,
+) -> None:
+    space = SharedSpace(run_dir / "ipc", MonotonicClock())
+    names = ("position", "velocity", "setpoint", "effort_ratio", "age_s", "error", "torque_enabled")
+    joints: dict[str, Any] = {name: [0, 0] for name in names}
+    velocity = [0.0, joint_rad_s]
+    space.cell_writer(topics.JOINT_STATE).put(**{**joints, "joint_count": 2, "velocity": velocity})
+    pose = dict.fromkeys(("x_m", "y_m", "yaw_rad", "w_rad_s", "enabled"), 0)
+    space.cell_writer(topics.BASE_STATE).put(v_m_s=base_m_s, **pose)
+    control = {"state": "armed", "tick": 41, "active_motions": [], "cause": "", "detail": ""}
+    space.cell_writer("control_status").put_document(control)
+    document = {"missions": [{"mission_id": "m-1", "state": mission}], "trouble": ""}
+    space.cell_writer("missions").put_document(document)
+    report = vla("status", "--json").document
+    space.close()
+    assert (moving_in(report), tick_of(report)) == (moving, 41)

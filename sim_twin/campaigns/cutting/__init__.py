@@ -1,0 +1,1 @@
+"""Cut the power while releases are added, switched and removed."""
