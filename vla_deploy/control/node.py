@@ -16,6 +16,7 @@ from vla_deploy.control.modes.resetting import Resetting
 from vla_deploy.control.modes.retuning import Tuning, require_bus_rate, retuned, tuning_of
 from vla_deploy.control.modes.standstill import Standstill
 from vla_deploy.control.modes.state_machine import Mode
+from vla_deploy.control.modes.stop_proof import ASKED_TO_REST, StopProof
 from vla_deploy.control.modes.stopping import Stopping
 from vla_deploy.control.modes.switching_off import SwitchingOff
 from vla_deploy.control.motion.axes import Flags, any_of
@@ -31,6 +32,7 @@ from vla_deploy.control.reporting.status import Status
 from vla_deploy.control.reporting.telemetry import Telemetry, TickClock
 from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import StopCategory
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.power_off import power_off_asked
 from vla_deploy.safety import Cause
@@ -92,11 +94,12 @@ class ControlNode:
             self._motions,
             never_moves=robot.never_moves,
         )
+        self._proof = StopProof(robot, self._judging.limits, servos, wheels)
         self._commands = space.ring_reader(topics.MOTION_COMMAND, from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
         self._status = Status(
             *(self._ticks, self._modes, self._judging, self._inbox, self._motions),
-            *(servos, wheels),
+            *(self._proof, servos, wheels),
             never_moves=robot.never_moves,
         )
 
@@ -124,11 +127,12 @@ class ControlNode:
         self._judge(now_ns)
         self._change_mode()
         self._take_commands()
+        self._prove_stop(now_ns)
         self._feel()
         self._ease_off(period_s)
         self._telemetry.tell_results(self._joints.move(period_s))
         self._move_base(period_s)
-        self._tell()
+        self._tell(now_ns)
 
     def stop(self) -> None:
         """Ramp to rest, release what may be released, and close the buses.
@@ -285,10 +289,25 @@ class ControlNode:
         else:
             self._base.brake(period_s)
 
-    def _tell(self) -> None:
+    def _prove_stop(self, now_ns: int) -> None:
+        """Follow a stop to standstill: that of a verdict, or of an operator who asks for rest."""
+        verdict, asked_by = self._judging.verdict, self._dispatcher.take_rest()
+        if self._modes.stop_begun:
+            category = self._stopping.category(verdict)
+            self._proof.begin(now_ns, verdict.cause.value, verdict.subject, category)
+        elif asked_by is not None and self._modes.mode is Mode.ARMED:
+            self._proof.begin(now_ns, ASKED_TO_REST, asked_by, StopCategory.STOP_KEEP_POWER)
+        if not self._proof.under_way:
+            return
+        if self._modes.mode is Mode.ARMED and self._motions.active_ids:
+            self._proof.fail("a new motion began before standstill was proved")
+        else:
+            self._proof.step(now_ns)
+
+    def _tell(self, now_ns: int) -> None:
         self._judging.note_sent(self._joints.sent, self._base.ramp.velocity)
         self._telemetry.tell_joints(self._servos.state, self._joints.sent)
         self._telemetry.tell_base(self._wheels)
-        document = self._status.due(self._tuning.status_every)
+        document = self._status.due(self._tuning.status_every, now_ns)
         if document is not None:
             self._telemetry.tell_status(document)

@@ -367,6 +367,10 @@ class SkillLink:
             self.cancel(motion_id)
         self.rest_base()
 
+    def notify_rest(self, source: str) -> None:
+        """Have control verify that all comes to rest, now that all motions are cancelled."""
+        self._commands.publish({"kind": "rest", "motion_id": 0, "source": source})
+
     def halt_actor(self, actor: str) -> None:
         """Cancel the motions of one action, and bring the base to rest if it drives."""
         for motion_id in sorted(one for one, whose in self._active.items() if whose == actor):

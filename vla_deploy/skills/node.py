@@ -226,6 +226,7 @@ class ExecutorNode:
             self._call_off(job, "cancelled on request")
         if of is None:
             self._skills.link.halt()
+            self._skills.link.notify_rest(command_id)
             self._skills.link.resume()
         self._events.publish(end_without_actions(command_id))
 

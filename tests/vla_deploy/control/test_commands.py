@@ -57,7 +57,7 @@ def test_a_cancel_needs_its_id_only() -> None:
     [
         ({**GOAL, "motion_id": "4"}, "motion_id: expected an integer"),
         ({**GOAL, "motion_id": True}, "motion_id: expected an integer"),
-        ({**GOAL, "kind": None}, "kind: expected goal, trajectory or cancel"),
+        ({**GOAL, "kind": None}, "kind: expected goal, trajectory, cancel or rest"),
         ({**GOAL, "targets": {}}, "at least one joint"),
         ({**GOAL, "together": 1}, "together: expected true or false, got 1"),
         ({**GOAL, "targets": [1.0]}, "targets: expected a value per joint"),

@@ -44,6 +44,7 @@ def as_text(status: dict[str, Any]) -> str:
             _profile(status),
             f"activity: {activity_words(status.get('activity'))}",
             _control(status),
+            *_last_stop(status),
             _pose(status),
             *_battery(status),
             *_planner(status),
@@ -120,6 +121,23 @@ def _control(status: dict[str, Any]) -> str:
     why = ": ".join(word for word in (control["cause"], control["detail"]) if word)
     latched = ", emergency stop latched" if control["estop_latched"] else ""
     return f"control: {control['state']}{latched}{_bounds(control)}" + (f" ({why})" if why else "")
+
+
+def _last_stop(status: dict[str, Any]) -> list[str]:
+    stop = (status["control"] or {}).get("last_stop")
+    return [] if stop is None else [f"last stop: {last_stop_words(stop)}"]
+
+
+def last_stop_words(stop: Mapping[str, Any]) -> str:
+    """Return whether control has verified its last stop, and why not."""
+    outcome = {
+        "in_progress": "in progress",
+        "verified": f"VERIFIED, at rest after {stop['standstill_s'] or 0.0:.2f} s",
+        "failed": f"FAILED: {stop['reason']}",
+    }[stop["state"]]
+    by = f" ({stop['source']})" if stop["source"] else ""
+    limit = f"category {stop['category']}, limit {stop['allowed_s']:.2f} s"
+    return f"{outcome}; {stop['cause']}{by}, {stop['age_s']:.0f} s ago, {limit}"
 
 
 def _bounds(control: dict[str, Any]) -> str:

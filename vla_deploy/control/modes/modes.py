@@ -22,6 +22,8 @@ class Modes:
         self.mode = Mode.DISARMED
         self._never_moves = never_moves
         self.notice = ""
+        self.stop_begun = False
+        """Whether this tick began a stop, or one that is more severe."""
         self._arming = arming
         self._stopping = stopping
         self._motions = motions
@@ -37,6 +39,7 @@ class Modes:
     ) -> list[MotionResult]:
         """Do one tick's share, and return the motions that it ends."""
         before = self.mode
+        self.stop_begun = False
         if act in (OperatorAct.ARM, OperatorAct.DISARM):
             self.notice = ""
         self.mode = next_mode(
@@ -74,6 +77,7 @@ class Modes:
             case Mode.DISARMING:
                 return self._motions.stop("disarmed")
             case Mode.PAUSING:
+                self.stop_begun = True
                 return self._motions.stop(verdict.text)
             case Mode.STOPPING:
                 self._stopping.forget()
@@ -92,6 +96,7 @@ class Modes:
         ended: list[MotionResult] = []
         if self.mode in (Mode.STOPPING, Mode.STOPPED) and self._stopping.is_exceeded_by(verdict):
             self.mode = Mode.STOPPING
+            self.stop_begun = True
             ended = self._stopping.begin(verdict)
         if self.mode is Mode.STOPPED and tick % _INSIST_TICKS == 0:
             self._stopping.insist()

@@ -27,6 +27,9 @@ class StopPlan:
             (category[joint] for joint in robot.wheel_joints),
             default=StopCategory.STOP_THEN_REMOVE_POWER,
         )
+        self._strictest = min(joints)
+        if robot.wheel_joints:
+            self._strictest = min(self._strictest, self.base)
         self.every_joint: Axes = np.arange(len(joints))
         self._joints = np.array(joints)
         self._carrying = {
@@ -63,6 +66,10 @@ class StopPlan:
         if reaction is Reaction.BASE_OFF:
             return min(self.base, StopCategory.STOP_THEN_REMOVE_POWER)
         return self.base if reaction is Reaction.GROUP_STOP else StopCategory.STOP_KEEP_POWER
+
+    def category(self, reaction: Reaction) -> StopCategory:
+        """Return the lowest category by which a part stops; what a hand holds does not count."""
+        return self._strictest if reaction is Reaction.GROUP_STOP else self.base_category(reaction)
 
     def _categories(self, holding: Collection[str]) -> NDArray[np.int64]:
         categories = self._joints.copy()

@@ -45,6 +45,10 @@ class Stopping:
         """Return whether a verdict asks for more than the stop that is under way."""
         return verdict.reaction > self._reaction
 
+    def category(self, verdict: Verdict) -> StopCategory:
+        """Return the lowest stop category by which a part stops."""
+        return self._plan.category(verdict.reaction)
+
     def begin(self, verdict: Verdict) -> list[MotionResult]:
         """Stop by the verdict's reaction: at once where power goes now, on ramps elsewhere.
 

@@ -19,6 +19,26 @@ class BaseLimits:
     turn_acceleration_rad_s2: float
     stop_deceleration_m_s2: float
 
+    @property
+    def brake_ratio(self) -> float:
+        """Return how much harder it brakes where it must stop than it speeds up."""
+        return max(1.0, self.stop_deceleration_m_s2 / self.acceleration_m_s2)
+
+    @property
+    def slowing_s(self) -> float:
+        """Return how long it slows down from its top speeds; a base that is not there stands."""
+        if not self.acceleration_m_s2:
+            return 0.0
+        return max(
+            self.speed_m_s / self.acceleration_m_s2,
+            self.turn_rad_s / self.turn_acceleration_rad_s2,
+        )
+
+    @property
+    def braking_s(self) -> float:
+        """Return the same where it must stop."""
+        return self.slowing_s / self.brake_ratio if self.slowing_s else 0.0
+
 
 def base_limits(robot: RobotDescription) -> BaseLimits:
     """Return what the robot file allows the base; none may move where there is none."""
@@ -76,9 +96,7 @@ class BaseRamp:
 
     def brake(self, period_s: float) -> None:
         """Move towards rest for one period, as fast as the robot can bear where it must stop."""
-        limits = self._limits
-        harder = max(1.0, limits.stop_deceleration_m_s2 / limits.acceleration_m_s2)
-        self._move(STANDING, harder, period_s)
+        self._move(STANDING, self._limits.brake_ratio, period_s)
 
     def _move(self, wanted: BaseVelocity, harder: float, period_s: float) -> None:
         limits, before = self._limits, self.velocity

@@ -48,7 +48,14 @@ class Cancel:
     motion_id: int
 
 
-Command = JointGoal | Waypoints | Cancel
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestAsked:
+    """Say that all that the sender moves comes to rest now, because somebody asked for it."""
+
+    source: str
+
+
+Command = JointGoal | Waypoints | Cancel | RestAsked
 
 
 def motion_id_of(payload: Mapping[str, Any]) -> int | None:
@@ -73,8 +80,10 @@ def parse_command(payload: Mapping[str, Any], joint_index: Mapping[str, int]) ->
             return _waypoints(motion_id, payload, joint_index)
         case "cancel":
             return Cancel(motion_id=motion_id)
+        case "rest":
+            return RestAsked(source=str(payload.get("source", "")))
         case other:
-            raise CommandRefused(f"kind: expected goal, trajectory or cancel, got {other!r}")
+            raise CommandRefused(f"kind: expected goal, trajectory, cancel or rest, got {other!r}")
 
 
 def _goal(motion_id: int, payload: Mapping[str, Any], joint_index: Mapping[str, int]) -> JointGoal:

@@ -11,6 +11,7 @@ from vla_deploy.control.motion.commands import (
     Cancel,
     CommandRefused,
     JointGoal,
+    RestAsked,
     Waypoints,
     motion_id_of,
     parse_command,
@@ -52,6 +53,13 @@ class Dispatcher:
         self._contact_nm = contact_torque(robot)
         self._motions = motions
         self._servos = servos
+        self.rest_source: str | None = None
+        """Who asked since the last tick that all comes to rest."""
+
+    def take_rest(self) -> str | None:
+        """Return once who asked that all comes to rest, or None."""
+        source, self.rest_source = self.rest_source, None
+        return source
 
     def handle(self, payload: Mapping[str, Any], refusal: str) -> list[MotionResult]:
         """Carry out one command, unless there is a reason to refuse all, and return what ended."""
@@ -67,6 +75,9 @@ class Dispatcher:
         command = parse_command(payload, self._index)
         if isinstance(command, Cancel):
             return self._motions.cancel(command.motion_id)
+        if isinstance(command, RestAsked):
+            self.rest_source = command.source
+            return []
         if refusal:
             raise CommandRefused(refusal)
         if isinstance(command, JointGoal):

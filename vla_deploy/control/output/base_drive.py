@@ -5,7 +5,7 @@ from typing import Protocol
 from drivers.clock import Clock
 from drivers.opener import DeviceOpener
 from drivers.servo.state import SILENT_S
-from drivers.wheel_drives.bus import DriveBus
+from drivers.wheel_drives.bus import DriveBus, DriveState
 from platforms import Profile
 from vla_deploy.control.motion.base_velocity import STANDING, BaseVelocity
 from vla_deploy.control.output.base_kinematics import DifferentialDrive
@@ -24,6 +24,7 @@ class BaseDrive(Protocol):
     name: str
     lost: bool
     failure: str
+    state: DriveState | None
     velocity: BaseVelocity
     odometry: Odometry
 
@@ -113,6 +114,7 @@ class FixedBase:
         self.name = "base"
         self.lost = False
         self.failure = ""
+        self.state: DriveState | None = None
         self.velocity = STANDING
         self.odometry = Odometry(DifferentialDrive(wheel_radius_m=1.0, track_m=1.0))
 

@@ -6,6 +6,7 @@ from vla_deploy.control.judging.safety_stage import Judging
 from vla_deploy.control.modes.modes import Modes
 from vla_deploy.control.modes.operator_acts import OperatorInbox
 from vla_deploy.control.modes.state_machine import status_name
+from vla_deploy.control.modes.stop_proof import StopProof
 from vla_deploy.control.motion.motions import MotionSet
 from vla_deploy.control.output.base_drive import BaseDrive
 from vla_deploy.control.output.servos import ServoLine
@@ -30,6 +31,7 @@ class Status:
         judging: Judging,
         inbox: OperatorInbox,
         motions: MotionSet,
+        proof: StopProof,
         servos: ServoLine,
         wheels: BaseDrive,
         *,
@@ -40,17 +42,18 @@ class Status:
         self._judging = judging
         self._inbox = inbox
         self._motions = motions
+        self._proof = proof
         self._servos = servos
         self._wheels = wheels
         self._never_moves = never_moves
         self._buses = (servos, wheels)
         self._pace = StatusPace()
 
-    def due(self, every_ticks: int) -> ControlStatus | None:
+    def due(self, every_ticks: int, now_ns: int) -> ControlStatus | None:
         """Return the document where this tick has to tell it."""
         if not self._pace.is_due(self._ticks.tick, self._matters(), every_ticks):
             return None
-        return self._document()
+        return self._document(now_ns)
 
     def _matters(self) -> tuple[Any, ...]:
         """Return what of it nobody may learn late."""
@@ -58,10 +61,10 @@ class Status:
         return (
             *(modes.mode, modes.notice, inbox.complaint, self._motions.active_ids),
             *(verdict.cause, verdict.reaction, verdict.latched, verdict.subject, verdict.blocked),
-            self._judging.state.latched,
+            *(self._judging.state.latched, self._proof.news),
         )
 
-    def _document(self) -> ControlStatus:
+    def _document(self, now_ns: int) -> ControlStatus:
         verdict, ticks = self._judging.verdict, self._ticks
         return {
             "state": status_name(self._modes.mode, verdict.reaction),
@@ -78,4 +81,5 @@ class Status:
             "buses": bus_document(*self._buses),
             "joints": joint_document(self._servos.state),
             "active_motions": self._motions.active_ids,
+            "last_stop": self._proof.document(now_ns),
         }

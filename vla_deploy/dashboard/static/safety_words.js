@@ -104,6 +104,18 @@ export function boundsWords(control) {
   return lines;
 }
 
+/** Return whether control has verified its last stop: `{failed, text}`, or null before the first. */
+export function lastStopWords(stop) {
+  if (!stop) return null;
+  const who = `${causeWords(stop.cause)}${stop.source ? ` (${words(stop.source)})` : ""}`;
+  const outcome = {
+    in_progress: "in progress",
+    verified: `VERIFIED, at rest after ${stop.standstill_s?.toFixed(2)} s`,
+    failed: `FAILED: ${stop.reason}`,
+  }[stop.state];
+  return { failed: stop.state === "failed", text: `Last stop: ${outcome}. ${who}, ${Math.round(stop.age_s)} s ago` };
+}
+
 function slowed(control, state) {
   if (control.state !== "armed" || !control.cause) return {};
   return { tone: "warn", icon: "alert", means: boundsWords(control).join(". ") || state.means };

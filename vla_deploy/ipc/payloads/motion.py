@@ -6,6 +6,7 @@ from typing import Any, Literal, NotRequired, TypedDict
 OperatorActName = Literal["estop", "reset", "arm", "disarm"]
 MotionStatusName = Literal["done", "touched", "cancelled", "refused", "stopped"]
 ControlStateName = Literal["disarmed", "armed", "stopping", "protective_stop", "stopped", "fault"]
+StopStateName = Literal["in_progress", "verified", "failed"]
 
 
 class OperatorRequest(TypedDict):
@@ -54,7 +55,18 @@ class CancelMotion(TypedDict):
     motion_id: int
 
 
-MotionCommand = GoalMotion | TrajectoryMotion | CancelMotion
+class RestNotice(TypedDict):
+    """Say that all that the sender moves comes to rest now, so that control verifies it.
+
+    It follows the cancels of its motions, and ends nothing itself. `source` is who asked.
+    """
+
+    kind: Literal["rest"]
+    motion_id: int
+    source: str
+
+
+MotionCommand = GoalMotion | TrajectoryMotion | CancelMotion | RestNotice
 
 
 class MotionEnd(TypedDict):
@@ -93,8 +105,29 @@ class JointReadings(TypedDict):
     voltage_v: list[float | None]
 
 
+class StopRecord(TypedDict):
+    """Say whether a stop was verified, by control's own measurements.
+
+    `cause` is one of the safety rules, or `stop` of an operator; `source` who or what it was.
+    `category` is the lowest of IEC 60204-1 by which a part stops. `standstill_s` counts from
+    `begun_ns` of the run's clock, null until verified; `allowed_s` is the most it may be. `reason`
+    says which part moved on, or was not measured, where the stop failed.
+    """
+
+    number: int
+    state: StopStateName
+    cause: str
+    source: str
+    category: int
+    begun_ns: int
+    age_s: float
+    allowed_s: float
+    standstill_s: float | None
+    reason: str
+
+
 class ControlStatus(VerdictFields):
-    """Hold control's state, the verdict in force, tick statistics, each bus' counters."""
+    """Hold control's state, verdict in force, last stop, tick statistics, each bus' counters."""
 
     state: ControlStateName
     estop_latched: bool
@@ -109,3 +142,4 @@ class ControlStatus(VerdictFields):
     buses: dict[str, Mapping[str, Any]]
     joints: JointReadings
     active_motions: list[int]
+    last_stop: StopRecord | None

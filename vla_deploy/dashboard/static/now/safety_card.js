@@ -4,13 +4,14 @@ import { duration, sentence, significant, words } from "../format.js";
 import { useTopic } from "../following.js";
 import { Icon } from "../icons.js";
 import { Freshness } from "../parts.js";
-import { boundsWords, reactionWords, safetyWords, unitOf } from "../safety_words.js";
+import { boundsWords, lastStopWords, reactionWords, safetyWords, unitOf } from "../safety_words.js";
 import { html } from "../ui.js";
 import { Acts } from "./acts.js";
 
 export function SafetyCard() {
   const { data, stale, age_s } = useTopic("control_status");
   const told = safetyWords(data, stale);
+  const lastStop = stale ? null : lastStopWords(data?.last_stop);
   const detail = stale ? "" : (data?.detail ?? "");
   return html`
     <section class="safety" data-tone=${told.tone} aria-label="Safety state">
@@ -24,6 +25,7 @@ export function SafetyCard() {
         <p class="safety-cause">${told.cause || told.means}</p>
         ${told.cause && html`<p class="quiet">${told.means}</p>`}
         ${detail && html`<p class="safety-detail">${sentence(detail)}</p>`}
+        ${lastStop && html`<p class=${lastStop.failed ? "safety-detail" : "quiet"}>${lastStop.text}</p>`}
       </div>
       <${Acts} control=${data} stale=${stale} />
       ${data?.cause && html`<${Numbers} control=${data} stale=${stale} />`}
