@@ -16,7 +16,9 @@ from sim_twin.campaigns.pressing import pressure
 from sim_twin.campaigns.report import CampaignReport, make_room
 from sim_twin.campaigns.selection import OptionRefused
 from sim_twin.campaigns.suites import suite
+from sim_twin.campaigns.suites.page import write_page
 from sim_twin.campaigns.suites.ray_tasks import LOCAL
+from sim_twin.campaigns.suites.report import SuiteReport
 from sim_twin.campaigns.switching import switches
 from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_number
 from vla_deploy.cli.maintenance.measure import SUITES
@@ -64,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _to_stdout(json.dumps(report.document(), indent=2) if options.json else report.text())
     if options.junit is not None:
         report.write_junit(options.junit)
+    if options.html is not None and isinstance(report, SuiteReport):
+        write_page(report, options.html)
     return 0 if report.passed else 1
 
 

@@ -70,15 +70,16 @@ class ReportComparison:
         }
 
 
-def read_scored_cases(path: Path) -> dict[str, dict[str, float]]:
-    """Return the cases of a report that `--json` has printed.
+def read_scored_cases(path: Path, names: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the cases of a report that `--json` has printed; `names` are of those to come.
 
     Raises:
-        EarlierReportUnusable: there is no such file, or it is no report of a suite.
+        EarlierReportUnusable: there is no such file, it is no report of a suite, or it has none
+            of these cases.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        return {
+        found = {
             one["name"]: {name: float(value) for name, value in one["metrics"].items()}
             for one in document["results"]
             if not one["skipped"]
@@ -90,20 +91,17 @@ def read_scored_cases(path: Path) -> dict[str, dict[str, float]]:
             f"--compare {path}: expected what `vla-deploy validate suite --json` prints, "
             f"got something else ({error!r})"
         ) from error
+    if found.keys().isdisjoint(names):
+        raise EarlierReportUnusable(
+            f"--compare {path}: none of the {len(names)} cases is among its {len(found)}; "
+            "play the same suite with the same --seed and --count"
+        )
+    return found
 
 
 def compare(earlier: ScoredCases, now: ScoredCases, told_earlier: str) -> ReportComparison:
-    """Return what has changed over the cases that both have.
-
-    Raises:
-        EarlierReportUnusable: they have no case in common.
-    """
+    """Return what has changed over the cases that both have."""
     common = [name for name in now if name in earlier]
-    if not common:
-        raise EarlierReportUnusable(
-            f"--compare {told_earlier}: none of the {len(now)} cases is in it; "
-            "play the same suite with the same --seed and --count"
-        )
     before, after = (_by_suite(common, cases) for cases in (earlier, now))
     return ReportComparison(
         earlier=told_earlier,

@@ -12,6 +12,8 @@ from sim_twin.campaigns.suites.metrics import METRICS, SCORE, SCORE_SPREAD
 from sim_twin.campaigns.suites.report import SuiteReport
 
 _TEMPLATE: Final = Path(__file__).with_name("page.html")
+_LEAST_POINTS: Final = 20
+"""Of a way that is worth a plot: they are 0.03 m and more apart."""
 
 
 def write_page(report: SuiteReport, path: Path) -> None:
@@ -42,7 +44,7 @@ def page(report: SuiteReport) -> str:
             case.name: [
                 Markup(plots.floor_plan(seen, f"way of {case.name}"))
                 for seen in case.evidence
-                if len(seen.path_m) > 1
+                if len(seen.path_m) >= _LEAST_POINTS
             ]
             for case in report.cases
         },

@@ -2,12 +2,12 @@
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from sim_twin.campaigns.processes import played
 from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.suites.comparison import compare, read_scored_cases
-from sim_twin.campaigns.suites.page import write_page
 from sim_twin.campaigns.suites.ray_tasks import played_by_ray
 from sim_twin.campaigns.suites.report import ScoredCase, SuiteReport
 from sim_twin.campaigns.suites.scenes import ALL, SuiteScene, play, scenes_of
@@ -20,14 +20,12 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> SuiteReport
     count = COUNT if options.count is None else options.count
     seeds = range(options.seed, options.seed + count)
     mine = chosen(scenes_of(options.suite or ALL, seeds), options.only, lambda case: case.name)
-    earlier = None if options.compare is None else read_scored_cases(options.compare)
+    names = [case.name for case in mine]
+    earlier = None if options.compare is None else read_scored_cases(options.compare, names)
     report = SuiteReport(campaign="suite", cases=_played(mine, options, tell))
-    if earlier is not None:
-        compared = compare(earlier, report.scored, str(options.compare))
-        report = SuiteReport(campaign="suite", cases=report.cases, comparison=compared)
-    if options.html is not None:
-        write_page(report, options.html)
-    return report
+    if earlier is None:
+        return report
+    return replace(report, comparison=compare(earlier, report.scored, str(options.compare)))
 
 
 def _played(
