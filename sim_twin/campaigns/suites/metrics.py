@@ -13,7 +13,7 @@ _WORST_RESPONSE_S: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Metric:
+class SuiteMetric:
     """Describe one figure; `worth` turns its cases' values into 0 (bad) to 1 (as good as can be).
 
     Two runs of the same seeds may differ by `spread`; more to the worse is a regression.
@@ -38,7 +38,7 @@ def _share_of_zeros(values: Values) -> float:
 
 
 METRICS: Final = (
-    Metric(
+    SuiteMetric(
         name="success_rate",
         unit="",
         weight=4.0,
@@ -47,7 +47,7 @@ METRICS: Final = (
         spread=0.0,
         meaning="share of the cases in which nothing was wrong",
     ),
-    Metric(
+    SuiteMetric(
         name="accuracy",
         unit="",
         weight=2.0,
@@ -57,7 +57,7 @@ METRICS: Final = (
         meaning="commands understood, time beside who is followed, actions that succeeded, "
         "causes named right",
     ),
-    Metric(
+    SuiteMetric(
         name="path_efficiency",
         unit="",
         weight=1.0,
@@ -66,7 +66,7 @@ METRICS: Final = (
         spread=0.001,
         meaning="length of the map's shortest way over the way driven",
     ),
-    Metric(
+    SuiteMetric(
         name="collisions",
         unit="",
         weight=2.0,
@@ -77,7 +77,7 @@ METRICS: Final = (
         meaning="contacts by MuJoCo: the robot pushed what stands fast or itself with more than "
         "60 N, or touched something on a drive",
     ),
-    Metric(
+    SuiteMetric(
         name="placement_mm",
         unit="mm",
         weight=1.0,
@@ -87,7 +87,7 @@ METRICS: Final = (
         less_is_better=True,
         meaning="median distance of a thing from the middle of what it was put into",
     ),
-    Metric(
+    SuiteMetric(
         name="response_s",
         unit="s",
         weight=1.0,
@@ -98,7 +98,7 @@ METRICS: Final = (
         meaning="median of the twin's time from the last word to the first action, from a fault "
         "or stop to rest, or to the reaction where the robot may move on",
     ),
-    Metric(
+    SuiteMetric(
         name="coordination",
         unit="",
         weight=1.0,

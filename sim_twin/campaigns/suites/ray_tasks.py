@@ -1,5 +1,6 @@
 """Play cases on a Ray cluster: each is a task on one core, and Ray decides where."""
 
+import os
 from collections.abc import Callable, Iterable
 from typing import Any, Final, TypeVar
 
@@ -46,6 +47,7 @@ def _begun(address: str, workers: int) -> Any:
         raise RayUnusable(
             "--ray: Ray is not installed; install it with: pip install 'vla-deploy[ray]'"
         ) from error
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it reports to its makers otherwise
     here = {"num_cpus": workers, "include_dashboard": False}
     where = here if address == LOCAL else {"address": address}
     try:

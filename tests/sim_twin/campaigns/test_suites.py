@@ -15,7 +15,7 @@ from sim_twin.campaigns.evidence import SceneEvidence
 from sim_twin.campaigns.report import CampaignCase
 from sim_twin.campaigns.suites import suite
 from sim_twin.campaigns.suites.comparison import compare
-from sim_twin.campaigns.suites.metrics import METRICS, measured, measured_by_suite
+from sim_twin.campaigns.suites.metrics import METRICS, SuiteMetric, measured, measured_by_suite
 from sim_twin.campaigns.suites.page import page
 from sim_twin.campaigns.suites.ray_tasks import LOCAL, RayUnusable, played_by_ray
 from sim_twin.campaigns.suites.report import ScoredCase, SuiteReport
@@ -69,6 +69,13 @@ def test_cases_are_measured_by_the_one_table(
     found = measured(cases)
     assert {name: found[name] for name in expected} == pytest.approx(expected, abs=1e-4)
     assert found.keys() - {"score"} == {name for case in cases for name in case}
+
+
+@pytest.mark.parametrize("metric", METRICS, ids=lambda one: one.name)
+def test_the_documentation_has_each_weight_and_spread(metric: SuiteMetric) -> None:
+    docs = Path(__file__).parents[3] / "docs" / "validation.md"
+    row = f"| `{metric.name}` | {metric.weight:g} | {metric.spread:g} | {metric.meaning} |"
+    assert row in docs.read_text(encoding="utf-8")
 
 
 def test_every_suite_weighs_the_same_in_the_overall_score() -> None:
