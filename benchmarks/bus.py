@@ -22,8 +22,8 @@ from benchmarks.bus_feetech import measure_feetech
 from benchmarks.bus_paced import measure_paced
 from benchmarks.bus_rounds import BusRound, run_whole_round
 from benchmarks.command import parser, show
-from benchmarks.core import own_core
 from benchmarks.emulated_bus import READ_BYTES, SERVER, WRITE_BYTES, emulated_bus, wire_s
+from sim_twin.harness.cores import own_core
 
 _BAUD: Final = 1_000_000
 _RATIOS: Final = {

@@ -18,12 +18,12 @@ import numpy as np
 from benchmarks.bus_clients import REPLY_MARGIN_S, BusClient
 from benchmarks.bus_paced import free_run_s, warm_up
 from benchmarks.bus_rounds import BusRound, run_whole_round
-from benchmarks.core import own_core, realtime
 from benchmarks.emulated_bus import BITS_PER_BYTE, emulated_bus
 from drivers.clock import MonotonicClock
 from drivers.feetech.bus import FeetechBus
 from drivers.feetech.servo import FeetechServo
 from drivers.serial_port import SerialPort
+from sim_twin.harness.cores import own_core, realtime
 
 SERVOS: Final = 6
 MODEL: Final = "STS3215-C018"

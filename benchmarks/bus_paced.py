@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.bus_clients import ours
-from benchmarks.core import realtime
 from benchmarks.emulated_bus import SERVER, emulated_bus, wire_s
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.harness.cores import realtime
 
 SHARE_HZ: Final = 100
 ASKED_HZ: Final = {1_000_000: 205, 3_000_000: 510}

@@ -18,11 +18,11 @@ from urllib.parse import urlsplit
 
 import psutil
 
-from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import live_robot
 from benchmarks.load_process import load_process
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.ticks import TickWatch
+from sim_twin.harness.cores import REALTIME_PRIORITY, realtime
+from sim_twin.harness.live_robot import live_robot
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc.topics import CONTROL_STATUS, DASHBOARD_STATUS
 

@@ -11,31 +11,28 @@ connections, 30 threads of costly reads and 40 of TLS handshakes.
 """
 
 import random
-import socket
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import live_robot
 from benchmarks.load_process import load_process
-from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S, Clock
+from sim_twin.harness.cores import REALTIME_PRIORITY, busy_cores, realtime
+from sim_twin.harness.live_robot import live_robot
 from sim_twin.harness.processes import ProcessStack
-from sim_twin.harness.robot import RobotFailed
+from sim_twin.harness.stop_presser import StopPresser
+from sim_twin.harness.stop_witness import NoStop
 
 CLIENTS: Final = 20
 BOTH: Final = ("page", "door")
 BLOCKED_S: Final = 10.0
 KILLS: Final = 3
-_PATHS: Final = {"page": "/api/v1/stop", "door": "/stop"}
 _TOPICS: Final = "control_status,process_table,joint_state,pose,scan,scene"
 _SETTLED_S: Final = 8.0  # of a frozen dashboard's 10 s, so that a press never meets the thaw
 _LOADED_S: Final = 3.0  # until all of a load goes on
 _START_S: Final = 90.0
-_NS_PER_MS: Final = 1e6
 
 
 def measure(requests: int = 100, seed: int = 0) -> dict[str, Any]:
@@ -48,7 +45,7 @@ def measure(requests: int = 100, seed: int = 0) -> dict[str, Any]:
         tempfile.TemporaryDirectory(prefix="vla-") as folder,
         realtime() as permitted,  # who measures must not wait for whom it keeps busy
         live_robot(Path(folder), REALTIME_PRIORITY if permitted else 0) as robot,
-        closing(_Presser(robot, random.Random(seed))) as presser,
+        closing(StopPresser(robot, random.Random(seed))) as presser,
         busy_cores(),
     ):
         with _pages(presser.address("page"), robot.base):
@@ -81,70 +78,7 @@ def _figures(way: str, times_ms: list[float]) -> dict[str, Any]:
     }
 
 
-class _Presser:
-    """Arm, press by some doors, and see when the wire tells."""
-
-    def __init__(self, robot: ProcessStack, draw: random.Random) -> None:
-        self.robot = robot
-        self._draw = draw
-        self._witness = StopWitness(robot.run_dir)
-
-    def address(self, door: str) -> tuple[str, int]:
-        """Return where a door was told to be, also once it is gone."""
-        topic = {"page": "dashboard_status", "door": "stop_door_status"}[door]
-        if not self.robot.wait_until(lambda: self.robot.document(topic), _START_S):
-            raise NoStop(f"nobody tells where the {door} is; see `vla-deploy status`")
-        return "127.0.0.1", int(self.robot.document(topic)["port"])
-
-    def presses(
-        self, count: int, doors: Sequence[str], goes_on: Callable[[], bool] = lambda: True
-    ) -> list[float]:
-        """Return how long each press took, in ms.
-
-        The busy machine itself may stop the robot before, or keep it from being armed again: such
-        presses are left out.
-        """
-        pressed = (self._press(doors) for _ in range(count) if goes_on())
-        return [time_ms for time_ms in pressed if time_ms is not None]
-
-    def close(self) -> None:
-        """Leave the bus."""
-        self._witness.close()
-
-    def _press(self, doors: Sequence[str]) -> float | None:
-        addresses = {door: self.address(door) for door in doors}
-        if not self._is_armed() or not self._witness.operates():
-            return None
-        with ExitStack() as opened:
-            asked_ns = self.robot.clock.now_ns()
-            for door, address in addresses.items():
-                _send(opened, door, address)
-            time_ms = (self._witness.stop_frame_ns() - asked_ns) / _NS_PER_MS
-            self.robot.await_change("armed")
-        return time_ms
-
-    def _is_armed(self) -> bool:
-        try:
-            self.robot.arm()
-        except RobotFailed:
-            return False
-        self.robot.pause(self._draw.uniform(0.02, 0.1))
-        return True
-
-
-def _send(opened: ExitStack, door: str, address: tuple[str, int]) -> None:
-    """Send a press without waiting for anything; who is gone refuses it."""
-    client = opened.enter_context(socket.socket())
-    host = f"{address[0]}:{address[1]}"
-    head = f"POST {_PATHS[door]} HTTP/1.1\r\nHost: {host}\r\nContent-Length: 0\r\n\r\n"
-    try:
-        client.connect(address)  # the kernel answers for a process that is frozen
-        client.sendall(head.encode())
-    except ConnectionError:
-        return  # as after a kill: the other door is pressed, too
-
-
-def _while_frozen(presser: _Presser, count: int) -> list[float]:
+def _while_frozen(presser: StopPresser, count: int) -> list[float]:
     """Press while the dashboard is frozen, in turns with spans in which it goes on."""
     times_ms: list[float] = []
     clock = presser.robot.clock
@@ -174,7 +108,7 @@ def _frozen(robot: ProcessStack) -> Iterator[None]:
         robot.thaw("dashboard")
 
 
-def _after_kills(presser: _Presser) -> list[float]:
+def _after_kills(presser: StopPresser) -> list[float]:
     """Press right after each of a few kills, before the supervisor has the dashboard back."""
     times_ms: list[float] = []
     for _ in range(KILLS):

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.bus_clients import MODEL, SERVOS
-from benchmarks.core import hardware_cores
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.harness.cores import hardware_cores
 
 SERVER: Final = ("--servos", str(SERVOS), "--models", MODEL)
 WRITE_BYTES: Final = 94

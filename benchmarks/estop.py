@@ -21,15 +21,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.command import parser, show
-from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import live_robot
-from benchmarks.stop_witness import NoStop, StopWitness
 from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.campaigns.faulting.choreography import Phase
 from sim_twin.campaigns.faulting.phases import PhaseStage
+from sim_twin.harness.cores import REALTIME_PRIORITY, busy_cores, realtime
+from sim_twin.harness.live_robot import live_robot
 from sim_twin.harness.lockstep_stack import lockstep_robot
 from sim_twin.harness.processes import ProcessStack
+from sim_twin.harness.stop_witness import NoStop, StopWitness
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.ipc.stop_button import StopButton
 

@@ -19,9 +19,9 @@ import numpy as np
 import psutil
 
 from benchmarks.command import parser, show
-from benchmarks.live_robot import PROFILE_FILE, live_stack
 from drivers.clock import NS_PER_S
 from platforms import Profile, load_profile
+from sim_twin.harness.live_robot import PROFILE_FILE, live_stack
 from sim_twin.harness.robot import RobotFailed
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import topics

@@ -16,11 +16,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.live_robot import PROFILE_FILE, live_stack
 from benchmarks.percentiles import spread_s
 from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
+from sim_twin.harness.live_robot import PROFILE_FILE, live_stack
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
 from vla_deploy.ipc import topics

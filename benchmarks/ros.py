@@ -20,11 +20,11 @@ from typing import Any, Final
 import psutil
 
 from benchmarks.command import parser, show
-from benchmarks.core import REALTIME_PRIORITY, realtime
-from benchmarks.live_robot import live_stack
 from benchmarks.percentiles import percentile
 from drivers.clock import NS_PER_S
 from sim_twin.campaigns.ticks import TickWatch
+from sim_twin.harness.cores import REALTIME_PRIORITY, realtime
+from sim_twin.harness.live_robot import live_stack
 from vla_deploy.cli.session import RobotSession
 from vla_deploy.ipc import topics
 from vla_deploy.robots import load_robot

@@ -19,8 +19,8 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from benchmarks.core import realtime
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from sim_twin.harness.cores import realtime
 from vla_deploy.supervisor.runs.serial_workers import SerialWorkers
 
 _BYTES: Final = bytes(64)

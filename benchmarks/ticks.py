@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.command import parser, show
-from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import live_robot
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
 from sim_twin.campaigns.ticks import TickWatch
+from sim_twin.harness.cores import REALTIME_PRIORITY, busy_cores, realtime
+from sim_twin.harness.live_robot import live_robot
 from sim_twin.harness.processes import ProcessStack
 from vla_deploy.control.reporting.telemetry import TickClock
 from vla_deploy.ipc import topics

@@ -16,6 +16,8 @@ from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.pressing import pressure
 from sim_twin.campaigns.report import CampaignReport, make_room
 from sim_twin.campaigns.selection import OptionRefused
+from sim_twin.campaigns.stopping import stops
+from sim_twin.campaigns.stopping.report import StopReport
 from sim_twin.campaigns.suites import suite
 from sim_twin.campaigns.suites.page import write_page
 from sim_twin.campaigns.suites.ray_tasks import LOCAL
@@ -37,6 +39,7 @@ CAMPAIGNS: Final[
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,
+    "stops": stops.run,
     "suite": suite.run,
 }
 _EXAMPLES: Final = """examples:
@@ -44,11 +47,13 @@ _EXAMPLES: Final = """examples:
   vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20
   vla-deploy validate demos --robot so101
+  vla-deploy validate stops --short --report out
   vla-deploy validate suite safety --count 1 --html out/safety.html"""
 _EXIT_INTERRUPTED: Final = 130
 _WORKERS: Final = 2
 _FILES: Final = ("junit", "html")
 _OF_SUITES: Final = ("suite", "html", "compare", "ray")
+_OF_STOPS: Final = ("short", "report")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,6 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         for option in _FILES:
             if (path := getattr(options, option)) is not None:
                 make_room(f"--{option}", path)
+        if options.report is not None:
+            make_room("--report", options.report / "stops.html")
         report = CAMPAIGNS[options.campaign](options, progress)
     except OptionRefused as error:
         _to_stderr(f"validate {options.campaign}: {error}")
@@ -70,6 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         report.write_junit(options.junit)
     if options.html is not None and isinstance(report, SuiteReport):
         write_page(report, options.html)
+    if options.report is not None and isinstance(report, StopReport):
+        report.write(options.report)
     return 0 if report.passed else 1
 
 
@@ -82,6 +91,10 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
             if getattr(options, option) is not None:
                 name = "a suite's name" if option == "suite" else f"--{option}"
                 parser.error(f"{name} is of `validate suite`, not of `validate {options.campaign}`")
+    if options.campaign != "stops":
+        for option in _OF_STOPS:
+            if getattr(options, option):
+                parser.error(f"--{option} is of `validate stops`, not of {options.campaign}")
     if options.workers is None:
         options.workers = (os.cpu_count() or 1) if options.campaign == "suite" else _WORKERS
     return options
@@ -112,12 +125,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
     parser.add_argument("suite", nargs="?", choices=tuple(SUITES), help="of suite (default: all)")
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
-    parser.add_argument("--count", type=whole_number(), help="how many injections or switches")
+    parser.add_argument(
+        "--count", type=whole_number(), help="how many injections, switches, or stops"
+    )
     parser.add_argument(
         "--hours", type=number_above_zero("hours"), default=1.0, help="how long to soak"
     )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--robot", default="butler", help="of demos, faults, kills and load")
+    parser.add_argument("--robot", default="butler", help="of demos, faults, kills, load and stops")
     parser.add_argument(
         "--workers",
         type=whole_number(),
@@ -130,6 +145,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--ray", nargs="?", const=LOCAL, metavar="ADDRESS", help="of suite: play on a Ray cluster"
+    )
+    parser.add_argument("--short", action="store_true", help="of stops: a minute's worth of cells")
+    parser.add_argument(
+        "--report", type=Path, metavar="DIR", help="of stops: write a page, JSON and a table there"
     )
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     return parser

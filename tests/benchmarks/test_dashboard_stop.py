@@ -3,7 +3,8 @@ from contextlib import ExitStack, closing
 
 import pytest
 
-from benchmarks.dashboard_stop import NoStop, _figures, _send
+from benchmarks.dashboard_stop import NoStop, _figures
+from sim_twin.harness.stop_presser import send_press
 
 
 def test_the_figures_are_those_of_the_sorted_times():
@@ -23,9 +24,9 @@ def test_a_way_without_any_press_is_no_success():
 def test_a_press_waits_for_nobody_and_outlives_a_door_that_is_gone():
     with closing(socket.create_server(("127.0.0.1", 0))) as frozen, ExitStack() as opened:
         address = frozen.getsockname()
-        _send(opened, "page", address)
+        send_press(opened, "page", address)
         client, _ = frozen.accept()
         with closing(client):
             assert client.recv(100).startswith(b"POST /api/v1/stop HTTP/1.1\r\n")
     with ExitStack() as opened:
-        _send(opened, "door", address)
+        send_press(opened, "door", address)

@@ -93,7 +93,18 @@ class PhaseStage:
         self._drive()
 
     def _carry(self) -> None:
-        """Put the payload into the hand, hold it there until the fingers do, and set off."""
+        """Put the payload into the hand, and set off with it."""
+        self.take_payload()
+        if Phase.DRIVING in self.moves.phases:
+            self._drive()
+        self._stack.go(self.moves.carry_reach, 0.5)
+
+    def take_payload(self) -> None:
+        """Put the payload into the hand, and hold it there until the fingers do.
+
+        Raises:
+            NotSet: it did not stay there.
+        """
         robot, engine, moves = self._stack.robot, self._lockstep.twin.engine, self.moves
         hand = robot.hands[moves.hand]
         fingers = robot.group(hand.gripper).joints
@@ -116,6 +127,3 @@ class PhaseStage:
         self.run_for(_SETTLE_S)
         if not self.holds_payload:
             raise NotSet(f"{moves.payload} at {grip.xpos} did not stay in the {moves.hand} hand")
-        if Phase.DRIVING in moves.phases:
-            self._drive()
-        self._stack.go(moves.carry_reach, 0.5)

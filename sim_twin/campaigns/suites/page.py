@@ -26,7 +26,7 @@ def page(report: SuiteReport) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"figure": _figure, "picture": _picture}
+    environment.filters |= {"figure": figure, "picture": _picture}
     measured = report.metrics
     scores = {suite: figures[SCORE] for suite, figures in measured.items()}
     return environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
@@ -57,7 +57,8 @@ def _shares(figures: dict[str, float]) -> dict[str, float]:
     return {name: value for name, value in figures.items() if not units.get(name, "")}
 
 
-def _figure(value: object) -> str:
+def figure(value: object) -> str:
+    """Return a number, or what there is instead, for a table."""
     if value is None:
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -39,6 +39,7 @@ CAMPAIGNS: Final = {
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",
+    "stops": "every source of a stop in every phase: to the wire, to rest; --short, --report",
     "suite": "named scenes of one suite, or of all, with scores; --html, --compare, --ray",
 }
 SUITES: Final = {
@@ -53,12 +54,13 @@ _BENCH_EXAMPLES: Final = "  vla-deploy bench bus --family feetech --json\n  vla-
 _VALIDATE_EXAMPLES: Final = """  vla-deploy validate demos --robot so101
   vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20 --junit out/kills.xml
+  vla-deploy validate stops --short --report out
   vla-deploy validate suite all --html out/suite.html
   vla-deploy validate suite navigation --json --compare out/earlier.json
 """
 _PASSED_ON: Final = (
     *("only", "count", "hours", "seed", "workers", "junit", "robot"),
-    *("html", "compare", "ray"),
+    *("html", "compare", "ray", "report"),
 )
 
 
@@ -82,7 +84,9 @@ def register(commands: Any) -> None:
         "suite", nargs="?", choices=tuple(SUITES), help=f"of suite; {_listed(SUITES)}"
     )
     validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")
-    validate.add_argument("--count", type=whole_number(), help="how many injections or switches")
+    validate.add_argument(
+        "--count", type=whole_number(), help="how many injections, switches, or stops"
+    )
     validate.add_argument(
         "--hours", type=number_above_zero("hours"), help="how long to soak (default: 1)"
     )
@@ -91,11 +95,17 @@ def register(commands: Any) -> None:
         type=whole_number(),
         help="how many cases at a time (default: 2; of suite: one a core)",
     )
-    validate.add_argument("--robot", help="of demos, faults, kills and load (default: butler)")
+    validate.add_argument("--robot", help="of demos, faults, kills, load, stops (default: butler)")
     validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
     validate.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
     validate.add_argument(
         "--html", type=Path, metavar="FILE", help="of suite: write a page with plots too"
+    )
+    validate.add_argument(
+        "--report", type=Path, metavar="DIR", help="of stops: write a page, JSON and a table there"
+    )
+    validate.add_argument(
+        "--short", action="store_true", help="of stops: a minute's worth of cells"
     )
     validate.add_argument(
         "--compare", type=Path, metavar="FILE", help="of suite: a report that --json printed before"
@@ -133,6 +143,7 @@ def run_campaign(arguments: argparse.Namespace) -> int:
         value = vars(arguments)[name]
         if value is not None:
             command += [f"--{name}", str(value)]
+    command += ["--short"] if arguments.short else []
     if arguments.json:
         command.append("--json")
     os.execv(sys.executable, command)
