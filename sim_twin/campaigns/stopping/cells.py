@@ -28,7 +28,7 @@ class StopPhase(Enum):
     PLACING = "placing"
 
 
-class Payload(Enum):
+class HandLoad(Enum):
     """Name what is in the hand."""
 
     EMPTY = "empty"
@@ -111,7 +111,7 @@ class StopCell:
     """Name one cell of the twin's time."""
 
     source: StopSource
-    payload: Payload
+    payload: HandLoad
     phase: StopPhase
 
     @property
@@ -142,9 +142,9 @@ class WallCell:
 def cells() -> Iterator[StopCell]:
     """Return every cell that there can be."""
     for source in StopSource:
-        for payload in Payload:
+        for payload in HandLoad:
             for phase in StopPhase:
-                if phase is not StopPhase.PLACING or payload is Payload.CARRYING:
+                if phase is not StopPhase.PLACING or payload is HandLoad.CARRYING:
                     yield StopCell(source=source, payload=payload, phase=phase)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
 from sim_twin.campaigns.report import CampaignCase
-from sim_twin.campaigns.stopping.cells import SOURCES, Payload, StopCell, StopPhase, StopSource
+from sim_twin.campaigns.stopping.cells import SOURCES, HandLoad, StopCell, StopPhase, StopSource
 from sim_twin.harness.lockstep_stack import LockstepControl, lockstep_robot
 from sim_twin.harness.robot import RobotFailed
 from sim_twin.physics.truth import STANDSTILL_RAD_S
@@ -39,7 +39,7 @@ _RUN_UP_S: Final[Mapping[StopPhase, tuple[float, float]]] = {
 """How long the motion goes on before the stop; none has ended by then."""
 _SENSES_S: Final = 1.0
 _DRIVE_M_S: Final = 0.3
-_ARM_RATIO: Final[Mapping[Payload, float]] = {Payload.EMPTY: 0.7, Payload.CARRYING: 0.3}
+_ARM_RATIO: Final[Mapping[HandLoad, float]] = {HandLoad.EMPTY: 0.7, HandLoad.CARRYING: 0.3}
 _PLACE_RATIO: Final = 0.15
 """Of the joints' top speed: how an arm lets down what it holds."""
 _TABLE_AGE_S: Final = topics.PROCESS_TABLE.deadline_s
@@ -125,7 +125,7 @@ class StopTrials:
         """
         self._stack.arm()
         self._lockstep.run_for(_SENSES_S)  # a base waits for them
-        if self._cell.payload is Payload.CARRYING:
+        if self._cell.payload is HandLoad.CARRYING:
             self._stage.take_payload()
         for _ in range(count):
             self._stack.arm()
@@ -171,7 +171,7 @@ class StopTrials:
         if noticed_s > rule.notice_s:
             yield f"the stop began after {noticed_s:.3f} s, limit {rule.notice_s:g} s"
         yield from map(str, self._lockstep.twin.hazards.found)
-        if self._cell.payload is Payload.CARRYING and not self._stage.holds_payload:
+        if self._cell.payload is HandLoad.CARRYING and not self._stage.holds_payload:
             yield f"{self._stage.moves.payload} is no longer in the hand"
         said = str(proof.get("state", ""))
         if said != rule.proves:
@@ -217,7 +217,7 @@ class StopTrials:
             case StopPhase.DRIVING:
                 self._speed_m_s = way * _DRIVE_M_S
             case StopPhase.ARM_MOVING:
-                carries = self._cell.payload is Payload.CARRYING
+                carries = self._cell.payload is HandLoad.CARRYING
                 far = moves.carry_reach if carries else moves.reach
                 self._go(self._farther(far, moves.hold), _ARM_RATIO[self._cell.payload])
             case StopPhase.PLACING:
