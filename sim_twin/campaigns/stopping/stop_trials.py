@@ -38,6 +38,7 @@ _RUN_UP_S: Final[Mapping[StopPhase, tuple[float, float]]] = {
 }
 """How long the motion goes on before the stop; none has ended by then."""
 _SENSES_S: Final = 1.0
+_POSE_S: Final = 3.0
 _DRIVE_M_S: Final = 0.3
 _ARM_RATIO: Final[Mapping[HandLoad, float]] = {HandLoad.EMPTY: 0.7, HandLoad.CARRYING: 0.3}
 _PLACE_RATIO: Final = 0.15
@@ -127,8 +128,13 @@ class StopTrials:
         self._lockstep.run_for(_SENSES_S)  # a base waits for them
         if self._cell.payload is HandLoad.CARRYING:
             self._stage.take_payload()
+        else:  # off what the arms lie on when a robot is switched on
+            self._go(self._stage.moves.hold, 1.0)
+            self._lockstep.run_for(_POSE_S)
         for _ in range(count):
             self._stack.arm()
+            self._lockstep.run_for(_SETTLE_S)
+            self._stack.arm()  # joints that answer again may pause it for a moment
             yield self._trial(next(self._ways))
             self._undo()
 
