@@ -302,11 +302,12 @@ def hands_that_see_reach(document: Document) -> Iterator[TableFault]:
 
 def images_fit_their_ring(document: Document) -> Iterator[TableFault]:
     """An image is no larger than what processes share of it."""
-    size = [table(document, "camera").get(key) for key in ("width", "height")]
-    if all(isinstance(one, int) for one in size) and size[0] * size[1] > MOST_PIXELS:
+    camera = table(document, "camera")
+    width, height = camera.get("width"), camera.get("height")
+    if is_number(width) and is_number(height) and width * height > MOST_PIXELS:
         yield TableFault(
             key="camera.width, camera.height",
-            got=f"{size[0]} x {size[1]}",
+            got=f"{width} x {height}",
             expected=f"at most {MOST_PIXELS} pixels together, as 640 x 480 has: set a smaller "
             "size, which the camera or its driver scales to",
         )
