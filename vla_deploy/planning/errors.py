@@ -7,8 +7,9 @@ PlanError             of vla_deploy.plans.errors, with what is wrong with a plan
 │   └── NotAble       nor can any other planner: the robot lacks what it takes, or it is not there
 ├── Declined          ask the next back end: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
-└── NotReadyToMove    reset and arm the robot first
-    └── BatteryLow    let it charge
+├── NotReadyToMove    reset and arm the robot first
+│   └── BatteryLow    let it charge
+└── AgentRefused      let a person grant a lease, or do it: an agent asked
 """
 
 from collections.abc import Sequence
@@ -89,3 +90,11 @@ class NotReadyToMove(PlanError):
 
 class BatteryLow(NotReadyToMove):
     """Say that the battery is too low for a plan."""
+
+
+class AgentRefused(PlanError):
+    """Say which rule keeps an agent from what it asked for, and what a person can do."""
+
+    def __init__(self, rule: str, why: str) -> None:
+        self.rule = rule
+        super().__init__(f"agents may not: {why} (rule {rule})")
