@@ -99,7 +99,7 @@ def is_agent(source: str) -> bool:
     return source.partition(":")[0].strip().lower() == AGENT
 
 
-class LeaseDesk:
+class LeaseKeeper:
     """Grant and take back the lease of one run, and say how it stands."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:

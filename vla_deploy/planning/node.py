@@ -9,7 +9,7 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile
 from vla_deploy.client.access.audit_log import AuditLog
-from vla_deploy.client.agent_lease import LeaseDesk
+from vla_deploy.client.agent_lease import LeaseKeeper
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
 from vla_deploy.ipc.payloads.tasks import (
     PlanMessage,
@@ -79,7 +79,7 @@ class PlannerNode:
         self._prohibitions = prohibitions
         self._mission_store = missions
         self._wall_s = wall_s or _wall_time_of(context.clock)
-        self._agents = AgentGuard(LeaseDesk(self._space, self._clock), audit)
+        self._agents = AgentGuard(LeaseKeeper(self._space, self._clock), audit)
         self._missions: MissionManager
         self._keeper: MemoryKeeper | None = None
         self._battery: BatteryWatch | None = None

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.client.agent_lease import LeaseDesk, LeaseRule, is_agent, judge_lease, sender_of
+from vla_deploy.client.agent_lease import LeaseKeeper, LeaseRule, is_agent, judge_lease, sender_of
 from vla_deploy.ipc import SharedSpace
 
 MINUTE_NS = 60 * NS_PER_S
@@ -69,7 +69,7 @@ def test_a_document_that_is_no_lease_permits_nothing(lease):
 
 
 def test_a_lease_is_granted_shown_and_taken_back(space, clock):
-    desk, other = LeaseDesk(space, clock), LeaseDesk(space, clock)
+    desk, other = LeaseKeeper(space, clock), LeaseKeeper(space, clock)
     assert other.state().rule is LeaseRule.NOT_LEASED
     assert other.revoke("cli:anna").rule is LeaseRule.NOT_LEASED
     desk.grant("cli:anna", 10)
@@ -82,16 +82,16 @@ def test_a_lease_is_granted_shown_and_taken_back(space, clock):
 
 
 def test_a_lease_ends_with_the_run(tmp_path, space, clock):
-    LeaseDesk(space, clock).grant("cli:anna", 60)
+    LeaseKeeper(space, clock).grant("cli:anna", 60)
     next_run = SharedSpace(tmp_path / "next" / "ipc", clock)
-    assert LeaseDesk(next_run, clock).state().rule is LeaseRule.NOT_LEASED
+    assert LeaseKeeper(next_run, clock).state().rule is LeaseRule.NOT_LEASED
     next_run.close()
 
 
 @pytest.mark.parametrize("minutes", [0, -1, 60.1, float("nan"), float("inf")])
 def test_no_lease_is_granted_for_longer_than_an_hour(space, clock, minutes):
     with pytest.raises(ValueError, match="at most 60"):
-        LeaseDesk(space, clock).grant("cli:anna", minutes)
+        LeaseKeeper(space, clock).grant("cli:anna", minutes)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vla_deploy.client.access.audit_log import AuditFile, AuditLog
-from vla_deploy.client.agent_lease import LeaseDesk
+from vla_deploy.client.agent_lease import LeaseKeeper
 from vla_deploy.planning.dialogue.agent_guard import LEASE_ENDED
 
 AGENT = "agent:tester"
@@ -15,8 +15,8 @@ GO = "go to the kitchen"
 
 
 @pytest.fixture
-def lease(desk) -> LeaseDesk:
-    return LeaseDesk(desk.space, desk.clock)
+def lease(desk) -> LeaseKeeper:
+    return LeaseKeeper(desk.space, desk.clock)
 
 
 def asks(desk, **utterance: object) -> list[tuple[str, str]]:

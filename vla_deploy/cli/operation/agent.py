@@ -10,7 +10,7 @@ from vla_deploy.cli.commands import add_command, add_top_command, emit, number_w
 from vla_deploy.cli.session import attach
 from vla_deploy.client.access.accounts import UserRole
 from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
-from vla_deploy.client.agent_lease import LONGEST_MINUTES, LeaseDesk, LeaseState
+from vla_deploy.client.agent_lease import LONGEST_MINUTES, LeaseKeeper, LeaseState
 
 LEAST_MINUTES: Final = 0.1
 EXAMPLES: Final = """  vla-deploy agent lease --minutes 10
@@ -46,7 +46,7 @@ def register(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Grant the lease, take it back, or only print how it stands."""
     session = attach(arguments.runtime_base)
-    desk = LeaseDesk(session.space, session.clock)
+    desk = LeaseKeeper(session.space, session.clock)
     by = f"cli:{pwd.getpwuid(os.getuid()).pw_name}"
     acts: dict[str, Callable[[], LeaseState]] = {
         "lease": lambda: desk.grant(by, arguments.minutes),

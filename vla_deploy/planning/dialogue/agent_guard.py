@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.client.access.audit_log import AuditEntry, AuditLog, AuditOutcome
-from vla_deploy.client.agent_lease import AGENT, LeaseDesk, LeaseState, is_agent
+from vla_deploy.client.agent_lease import AGENT, LeaseKeeper, LeaseState, is_agent
 from vla_deploy.ipc import Event
 from vla_deploy.ipc.payloads.tasks import Utterance
 from vla_deploy.planning.dialogue.command import command_id_of
@@ -92,7 +92,7 @@ def refusal_of(request: AgentRequest) -> AgentRefused | None:
 class AgentGuard:
     """Judge agents' utterances where they enter, and know whose commands a lease's end ends."""
 
-    def __init__(self, leases: LeaseDesk, audit: AuditLog | None = None) -> None:
+    def __init__(self, leases: LeaseKeeper, audit: AuditLog | None = None) -> None:
         """Begin; refusals are recorded in `audit`."""
         self._leases = leases
         self._audit = audit
