@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final, TextIO, cast
 
-from vla_deploy.runtime.escaping import escaped
+from vla_deploy.client.escaping import escaped
 
 CLEAR_SCREEN: Final = "\x1b[H\x1b[2J"
 CLEAR_LINE: Final = "\r\x1b[K"

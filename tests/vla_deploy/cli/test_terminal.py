@@ -12,7 +12,7 @@ from vla_deploy.cli.terminal import (
     control,
     escaping_output,
 )
-from vla_deploy.runtime.escaping import escaped, escaped_document
+from vla_deploy.client.escaping import escaped, escaped_document
 
 
 @pytest.mark.parametrize(

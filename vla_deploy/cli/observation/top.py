@@ -25,8 +25,8 @@ from vla_deploy.cli.observation.status import twin_words
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.cli.terminal import plain
 from vla_deploy.client.battery import battery_words
+from vla_deploy.client.escaping import escaped_document
 from vla_deploy.ipc import TOPICS, PulseReader
-from vla_deploy.runtime.escaping import escaped_document
 
 DOCUMENTS: Final = (
     "process_table",
