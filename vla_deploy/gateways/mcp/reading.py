@@ -36,7 +36,7 @@ class RobotReader:
     def __init__(
         self, access: RobotAccess, plan_by: Callable[[RobotDescription, str], Planner] | None = None
     ) -> None:
-        """Begin; `plan_by` makes the planner of a robot and a profile where it is not the robot's."""
+        """Begin; `plan_by` makes the planner of a robot and a profile, not the shipped one."""
         self._access = access
         self._planner_of = lru_cache(maxsize=1)(plan_by or self._robots_own)
         self._robot_of = lru_cache(maxsize=1)(load_robot)

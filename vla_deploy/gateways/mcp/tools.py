@@ -164,7 +164,7 @@ TOOLS: Final[Mapping[str, AgentTool]] = {
     "stop": AgentTool(
         kind=_STOP,
         takes=NoArguments,
-        what="End all that goes on; the robot rests, and stays ready.",
+        what="End all that goes on; the robot rests and stays ready.",
     ),
     "estop": AgentTool(
         kind=_STOP,
