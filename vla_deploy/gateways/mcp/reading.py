@@ -38,8 +38,9 @@ class RobotReader:
     ) -> None:
         """Begin; `plan_by` makes the planner of a robot and a profile, not the shipped one."""
         self._access = access
-        self._planner_of = lru_cache(maxsize=1)(plan_by or self._robots_own)
+        self._plan_by = plan_by or self._shipped
         self._robot_of = lru_cache(maxsize=1)(load_robot)
+        self._planner_of = lru_cache(maxsize=1)(self._open_planner)
 
     def state(self) -> dict[str, Any]:
         """Return the status of every process, and how the lease stands."""
@@ -56,16 +57,16 @@ class RobotReader:
         document = link.document(topics.SCENE, _FRESH_S)
         if document is None:
             raise NoRobot("perception publishes no scene; ask for the state")
-        return scene_report(document, self._robot(link), link.clock.now_ns(), words)
+        robot = self._robot_of(self._robot_name(link))
+        return scene_report(document, robot, link.clock.now_ns(), words)
 
     def plan(self, text: str) -> dict[str, Any]:
         """Return the plan for a command, or what the robot would ask, or why it would refuse."""
         link = self._access.link()
-        robot = self._robot(link)
+        robot = self._robot_name(link)
         status = link.document(topics.PROFILE_STATUS, _FRESH_S)
-        profile = status["profile"] if status is not None else _DEFAULT_PROFILE
-        request = preview_request(text, robot, link)
-        return preview(self._planner_of(robot, profile), request).document()
+        planner = self._planner_of(robot, status["profile"] if status else _DEFAULT_PROFILE)
+        return preview(planner, preview_request(text, self._robot_of(robot), link)).document()
 
     def memory(self, like: str, limit: int) -> list[dict[str, Any]]:
         """Return remembered commands: the newest, or those like some words.
@@ -101,13 +102,16 @@ class RobotReader:
         document = found.document()
         return [{**document, "events": document["events"][-MOST_EVENTS:]}]
 
-    def _robot(self, link: RobotLink) -> RobotDescription:
+    def _robot_name(self, link: RobotLink) -> str:
         table = link.document(topics.PROCESS_TABLE, _FRESH_S)
         if table is None:
             raise NoRobot("the supervisor does not say which robot this is")
-        return self._robot_of(table["robot"])
+        return table["robot"]
 
-    def _robots_own(self, robot: RobotDescription, profile: str) -> Planner:
+    def _open_planner(self, robot: str, profile: str) -> Planner:
+        return self._plan_by(self._robot_of(robot), profile)
+
+    def _shipped(self, robot: RobotDescription, profile: str) -> Planner:
         return planner_for(robot, load_profile(profile), MonotonicClock(), self._access.base)
 
 

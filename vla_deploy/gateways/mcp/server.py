@@ -15,6 +15,7 @@ from mcp.server.stdio import stdio_server
 from mcp.server.subscriptions import InMemorySubscriptionBus, ListenHandler, ToolsListChanged
 from starlette.applications import Starlette
 
+from vla_deploy.gateways.mcp.acting import Pause
 from vla_deploy.gateways.mcp.calls import AgentCalls, AgentName
 from vla_deploy.gateways.mcp.tools import AgentTool, ToolKind, listed_tools
 
@@ -32,11 +33,17 @@ INSTRUCTIONS: Final = (
 Context = ServerRequestContext[None, Any]
 
 
+async def _look_at_lease() -> None:
+    await anyio.sleep(_LEASE_LOOK_S)
+
+
 class AgentServer:
     """Serve agents over any transport; tell them when a lease begins or ends."""
 
-    def __init__(self, calls: AgentCalls) -> None:
+    def __init__(self, calls: AgentCalls, pause: Pause = _look_at_lease) -> None:
+        """Begin; `pause` waits between two looks at the lease."""
         self._calls = calls
+        self._pause = pause
         self._bus = InMemorySubscriptionBus()
         self._session: ServerSession | None = None
         self.server: Server[None] = Server(
@@ -69,7 +76,7 @@ class AgentServer:
     async def _watch_lease(self) -> None:
         may_act = self._calls.may_act()
         while True:
-            await anyio.sleep(_LEASE_LOOK_S)
+            await self._pause()
             before, may_act = may_act, self._calls.may_act()
             if may_act is before:
                 continue
