@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import demos, load, missions, navigation, soak
+from sim_twin.campaigns import agents, demos, load, missions, navigation, soak
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
@@ -20,6 +20,7 @@ from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_numb
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
 ] = {
+    "agents": agents.run,
     "demos": demos.run,
     "faults": fault_matrix.run,
     "kills": kills.run,

@@ -27,6 +27,7 @@ from vla_deploy.gateways.mcp.tools import TOOLS, ActArguments, AgentTool, NoArgu
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc.errors import IpcError
 from vla_deploy.memory.errors import RecollectionError
+from vla_deploy.planning.errors import AgentRefused
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots.errors import RobotError
 from vla_deploy.supervisor.errors import SupervisorError
@@ -140,8 +141,10 @@ class AgentCalls:
             data = await anyio.to_thread.run_sync(lambda: read(*values), limiter=self._reads)
             return ToolAnswer(rule=tool.kind, outcome=AuditOutcome.DONE, data=data)
         data = await self._act(name, given, who.sender)
-        rule = _REFUSED_STATES.get(data["state"], tool.kind.value)
         is_refused = data["state"] == "rejected"
+        rule = _REFUSED_STATES.get(data["state"], tool.kind.value)
+        if is_refused:
+            rule = AgentRefused.rule_of(data["reason"]) or rule
         outcome = AuditOutcome.REFUSED if is_refused else AuditOutcome.DONE
         return ToolAnswer(rule=rule, outcome=outcome, data=data)
 

@@ -85,7 +85,7 @@ class EstopArguments(NoArguments):
 class ActArguments(NoArguments):
     """Say how long the end of a command is waited for; the command goes on after that."""
 
-    wait_s: Annotated[float, Field(ge=0.0, le=LONGEST_WAIT_S, strict=False)] = 30.0
+    wait_s: Annotated[float, Field(ge=0.0, le=LONGEST_WAIT_S)] = 30.0
 
     def content(self) -> UtteranceContent:
         """Return what is said to the planner."""

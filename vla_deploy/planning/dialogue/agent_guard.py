@@ -4,7 +4,6 @@ The rules are a table: the first one that holds refuses. What passes is planned 
 validator as everybody's commands are.
 """
 
-import logging
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Final
@@ -19,7 +18,6 @@ from vla_deploy.planning.patterns.steering import awaiting, resumes
 
 LEASE_ENDED: Final = "the lease of the agent that asked for it has ended"
 _MOST_REMEMBERED: Final = 256
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +143,6 @@ class AgentGuard:
 
     def _record(self, event: Event[Utterance], refused: AgentRefused) -> None:
         source = str(event.payload.get("source", ""))
-        _log.warning("%s refused: %s", source[:80], refused)
         if self._audit is None:
             return
         self._audit.record(
